@@ -67,7 +67,7 @@ def test_a_page_of_a_running_program() -> None:
     result = explain("E402")
 
     assert "// run in one_arm" in result.stdout
-    assert "error[E402]: the way to `right` leads joint 3 of ARM_1 beyond its limits" in result.stdout
+    assert "error[E402]: the path to `right` leads joint 3 of ARM_1 beyond its limits" in result.stdout
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a terminal of Unix")
@@ -75,7 +75,7 @@ def test_on_a_terminal() -> None:
     """Who watches sees the page in colour, every line of the message whole."""
     shown = watched("E403")
 
-    assert "\x1b[1mE403: the arm is singular on the way" in shown
+    assert "\x1b[1mE403: the arm is singular on the path" in shown
     assert "\x1b[94" in shown  # a word of the language
     assert "\x1b[1;31merror[E403]" in shown
     assert "the arm is singular there (wrist)" in shown

@@ -143,7 +143,7 @@ def test_a_stopped_move_shows_what_it_did(ends: str, tmp_path: Path) -> None:
     (stage,) = run["stages"]
     assert stage["stopped"] is True
     assert move["t1"] - move["t0"] == pytest.approx(stage["duration"], abs=1e-3)
-    note = f"stopped on its way, after {stage['duration']:.3f} s and {stage['length'] * 1e3:.1f} mm of "
+    note = f"stopped on its path, after {stage['duration']:.3f} s and {stage['length'] * 1e3:.1f} mm of "
     assert note in (out / "report.html").read_text()
     row = next(line for line in done.stdout.splitlines() if "PTP goal, stopped" in line)
     assert f"{stage['duration']:.3f}" in row
@@ -242,7 +242,7 @@ def test_a_way_round(tmp_path: Path) -> None:
     done = armwright("run", EXAMPLES / "around.rlo", "--cell", PUMA, "--around", "damped", "-o", tmp_path / "out")
 
     assert done.returncode == 0, done
-    assert "warning[W402]: ARM_1 leaves the straight way to `bottom`, by damped rates: " in done.stdout
+    assert "warning[W402]: ARM_1 leaves the straight line to `bottom`, by damped rates: " in done.stdout
     assert "around.rlo:12:3" in done.stdout
     run = json.loads((tmp_path / "out" / "run.json").read_text())
     assert run["options"]["around"] == "damped"
@@ -255,7 +255,7 @@ def test_a_way_round(tmp_path: Path) -> None:
     assert line["deviation"] == detour["position_deviation"]
     assert f"{detour['position_deviation'] * 1e3:.1f} mm off the line" in done.stdout
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "the straight way is stopped 50 % of the way there" in page
+    assert "the straight line is stopped 50 % of the path" in page
 
 
 def test_a_cell_that_goes_round(tmp_path: Path) -> None:

@@ -97,4 +97,4 @@ def test_program() -> None:
         cause="limits", reason="", joint=3, pose=0, fraction=0.5, length=0.2, place=np.zeros(3), certain=False
     )
 
-    assert stopped(obstacle, "f", "ARM_1", PUMA) == "the way to `f` leads joint 3 ('elbow') of ARM_1 beyond its limits"
+    assert stopped(obstacle, "f", "ARM_1", PUMA) == "the path to `f` leads joint 3 ('elbow') of ARM_1 beyond its limits"

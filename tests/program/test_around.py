@@ -28,7 +28,7 @@ SEAM = (EXAMPLES / "around.rlo").read_text()
 TOP, BOTTOM, BASE = np.array([0.55, -0.05, 0.36]), np.array([0.55, 0.35, 0.16]), np.array([0.0, 0.0, 0.67])
 # The legs of a way round are lines that keep the deviation of the cell, and 5 mrad for each mm of it.
 DEVIATION, TURN = 0.5e-3, 2.5e-3
-PLACE = re.compile(r"(\d+) % of the way there, ([\d.]+) of ([\d.]+) mm, at \(([-\d.]+), ([-\d.]+), ([-\d.]+)\) mm")
+PLACE = re.compile(r"(\d+) % of the path, ([\d.]+) of ([\d.]+) mm, at \(([-\d.]+), ([-\d.]+), ([-\d.]+)\) mm")
 
 
 def cell(name: str = "puma", around: Around | None = None) -> Cell:
@@ -84,7 +84,7 @@ def test_the_place_on_the_path() -> None:
     np.testing.assert_allclose(1e-3 * np.array(place) + BASE, TOP + along / length * (BOTTOM - TOP), atol=2e-4)
     assert "joint 6 would have to move" in error.notes[0]
     assert "(wrist)" in error.notes[0]
-    assert error.helps == ("`armwright run --around via` looks for a way round",)
+    assert error.helps == ("`armwright run --around via` searches for a detour",)
 
 
 @pytest.mark.parametrize("by", ["via", "damped"])
@@ -95,11 +95,11 @@ def test_the_warning(by: Around) -> None:
     (warning,) = warnings(recording)
     assert (warning.code, warning.is_error) == ("W402", False)
     assert SEAM[warning.span.start : warning.span.end] == "MOVE ARM_1 TO bottom STRAIGHTLY"
-    assert "the straight way to `bottom`" in warning.message
+    assert "the straight line to `bottom`" in warning.message
     assert stops(SEAM, cell()).notes[0] in warning.notes[0]
     assert ("via pose" if by == "via" else "damped rates") in warning.notes[1]
     assert re.search(r"[\d.]+ mm off the line, [\d.]+ mrad, \+[\d.]+ s$", warning.message)
-    assert "the straight way is stopped 50 % of the way there" in note_of(the_line(recording))
+    assert "the straight line is stopped 50 % of the path" in note_of(the_line(recording))
 
 
 @pytest.mark.parametrize("by", ["via", "damped"])
@@ -173,7 +173,7 @@ def test_round_a_limit() -> None:
 
 @pytest.mark.parametrize("by", ["via", "damped"])
 def test_no_way_round(by: Around, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where no way round is found the error is that of the line, and says that one was looked for."""
+    """Where no detour is found the error is that of the line, and says that one was looked for."""
     # A pose near the joint move would help by `via`.
     monkeypatch.setattr(detour, "_ON_THE_WAY", ())
     monkeypatch.setattr(detour, "_SCATTER", ())
@@ -182,7 +182,7 @@ def test_no_way_round(by: Around, monkeypatch: pytest.MonkeyPatch) -> None:
     plain, asked = stops(text, cell()), stops(text, cell(around=by))
 
     assert attrs.evolve(asked, helps=plain.helps) == plain
-    assert "no way round" in asked.helps[0]
+    assert "no detour" in asked.helps[0]
 
 
 def test_a_way_through_frames_is_not_gone_round() -> None:
@@ -192,13 +192,13 @@ def test_a_way_through_frames_is_not_gone_round() -> None:
     error = stops(text + "MOVE ARM_1 TO a ; MOVE ARM_1 TO b VIA (v) ; END.", cell(around="via"))
 
     assert error.code == "E401"
-    assert error.message == "the way to `b` leads out of what ARM_1 can reach"
-    assert "% of the way there from `v` (way 2 of 2), " in error.notes[0]
-    assert "is not gone round" in error.helps[0]
+    assert error.message == "the path to `b` leads out of the reach of ARM_1"
+    assert "% of the path from `v` (segment 2 of 2), " in error.notes[0]
+    assert "has no detour" in error.helps[0]
 
 
 def test_a_goal_that_cannot_be_had() -> None:
-    """Where the goal itself is the obstacle its place is told, and no way round is promised."""
+    """Where the goal itself is the obstacle its place is told, and no detour is promised."""
     text = down(far=(3, 0, 0.2)) + "MOVE ARM_1 TO far STRAIGHTLY ; END."
 
     error = stops(text, cell("stanford"))
@@ -208,7 +208,7 @@ def test_a_goal_that_cannot_be_had() -> None:
 
 
 def test_weak_motors() -> None:
-    """An arm that cannot hold itself up gets no way round by lines that keep its efforts: the error stays."""
+    """An arm that cannot hold itself up gets no detour by lines that keep its efforts: the error stays."""
     place = cell()
     arm = place.arms["ARM_1"].arm
     joints = [attrs.evolve(joint, limits=attrs.evolve(joint.limits, effort=0.1)) for joint in arm.joints]

@@ -275,7 +275,7 @@ def test_obstacle_on_a_line() -> None:
     error = _fails(text)
 
     assert error.diagnostic.code in ("E401", "E402", "E403")
-    assert "% of the way there" in error.diagnostic.notes[0]
+    assert "% of the path" in error.diagnostic.notes[0]
 
 
 def test_millimetres_for_metres() -> None:

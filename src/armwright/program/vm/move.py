@@ -22,7 +22,7 @@ from armwright.program.language.words import Standard
 from armwright.program.vm.contact import comes_down, contact_of, look_out, note_contact, send, stop
 from armwright.program.vm.expressions import evaluate_instructions
 from armwright.program.vm.machine import Handler, Machine
-from armwright.program.vm.move_diagnostics import CODES, stopped, ways_round, where_and_why
+from armwright.program.vm.move_diagnostics import CODES, detour_advice, stopped, where_and_why
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
 from armwright.program.vm.process import Activation, EarlyEnd, Guard, Motion, Process
 from armwright.program.vm.recording import Run, RunStage, efforts, peaks_of
@@ -288,7 +288,7 @@ def _fail_move(
         "cannot be reached",
         secondary=secondary,
         notes=(where_and_why(obstacle, kind, stage.frames, arm),),
-        helps=(*_other_unit(machine, process, goal, arm), *ways_round(obstacle, kind, machine.cell.around)),
+        helps=(*_other_unit(machine, process, goal, arm), *detour_advice(obstacle, kind, machine.cell.around)),
     )
 
 

@@ -15,10 +15,10 @@ _ITSELF = {
     "limits": "`{goal}` cannot be reached by {arm} inside its joint limits",
     "singular": "`{goal}` cannot be reached by {arm} on this path: the arm is singular there",
 }
-_ON_THE_WAY = {
-    "reach": "the way to `{goal}` leads out of what {arm} can reach",
-    "limits": "the way to `{goal}` leads {joint} of {arm} beyond its limits",
-    "singular": "`{goal}` cannot be reached by {arm} on this path: the arm is singular on the way",
+_ON_THE_PATH = {
+    "reach": "the path to `{goal}` leads out of the reach of {arm}",
+    "limits": "the path to `{goal}` leads {joint} of {arm} beyond its limits",
+    "singular": "`{goal}` cannot be reached by {arm} on this path: the arm is singular on the path",
 }
 # Farther away nobody counts tenths [mm].
 _FAR = 1e6
@@ -27,14 +27,14 @@ _METHODS = {"via": "by a via pose", "damped": "by damped rates"}
 
 
 def stopped(obstacle: Obstacle, goal: str, name: str, arm: Arm) -> str:
-    """Return the message of an error: what stops an arm, of that name, on its way to a frame."""
-    texts = _ITSELF if obstacle.certain else _ON_THE_WAY
+    """Return the message of an error: the obstacle of an arm, of that name, on its path to a frame."""
+    texts = _ITSELF if obstacle.certain else _ON_THE_PATH
     joint = "a joint" if obstacle.joint is None else arm.called(obstacle.joint - 1)
     return texts[obstacle.cause].format(goal=goal, arm=name, joint=joint)
 
 
 def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) -> str:
-    """Return the place on the path, in space, and the reason.
+    """Return the location on the path, in space, and the reason.
 
     Args:
         obstacle: what stops the stage.
@@ -42,54 +42,54 @@ def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) ->
         to: the frames it goes to, as the program spells them.
         arm: name of the arm.
     """
-    position = f"at {_place(obstacle.place)} mm from the base of {arm}"
+    position = f"at {_position(obstacle.place)} mm from the base of {arm}"
     if obstacle.along is None or obstacle.length is None or obstacle.certain:
         return f"{position}: {obstacle.reason}"
-    way = f"{obstacle.fraction * 100:.0f} % of the way there"
+    part = f"{obstacle.fraction * 100:.0f} % of the path"
     if kind in _THROUGH_FRAMES:
-        before = "where the hand was" if obstacle.pose == 0 else f"`{to[obstacle.pose - 1]}`"
-        way += f" from {before} (way {obstacle.pose + 1} of {len(to)})"
-    return f"{way}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, {position}: {obstacle.reason}"
+        before = "the start" if obstacle.pose == 0 else f"`{to[obstacle.pose - 1]}`"
+        part += f" from {before} (segment {obstacle.pose + 1} of {len(to)})"
+    return f"{part}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, {position}: {obstacle.reason}"
 
 
-def ways_round(obstacle: Obstacle, kind: str, around: str | None) -> tuple[str, ...]:
-    """Return advice for a way that is stopped: how to look for another, or that there is none.
+def detour_advice(obstacle: Obstacle, kind: str, around: str | None) -> tuple[str, ...]:
+    """Return advice for a path that is stopped: how to search for a detour, or that there is none.
 
     Args:
         obstacle: what stops the stage.
         kind: of the stage: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND``.
-        around: how a way round was looked for; None where it was not.
+        around: method by which a detour was searched for; None where none was.
     """
     if obstacle.certain or kind == "PTP":
         return ()
     if kind in _THROUGH_FRAMES:
         advice = "another VIA, or straight moves from frame to frame"
-        return (f"a way through several frames is not gone round by `--around`; {advice} may do",)
+        return (f"a path through several frames has no detour by `--around`; {advice} may do",)
     if around is None:
-        return ("`armwright run --around via` looks for a way round",)
-    other = "`--around via` looks further" if around == "damped" else "a VIA of the program may lead farther round"
-    return (f"no way round {_METHODS[around]} was found on which the whole MOVE could be made; {other}",)
+        return ("`armwright run --around via` searches for a detour",)
+    other = "`--around via` searches farther" if around == "damped" else "a VIA of the program may lead around it"
+    return (f"no detour {_METHODS[around]} was found on which the whole MOVE could be made; {other}",)
 
 
 def _lead(detour: Detour, arm: str) -> str:
-    """Return where a way round leads."""
+    """Return the course of a detour."""
     if detour.via is None:
-        return "the hand follows the line by damped rates, and leaves it where the arm is nearly singular"
-    return f"the hand stops on its way at a via pose at {_place(detour.via[:3, 3])} mm from the base of {arm}"
+        return "the tool follows the line by damped rates, and leaves it where the arm is nearly singular"
+    return f"the tool stops at a via pose at {_position(detour.via[:3, 3])} mm from the base of {arm}"
 
 
 def note_of(run: RunStage) -> str:
-    """Return what a report has to say beside a stage: where it was stopped, what it goes round, why it is slow."""
+    """Return what a report has to say beside a stage: where it was stopped, its detour, why it is slow."""
     stage = run.stage
     notes = [stage.slowed] if stage.slowed else []
     if run.stopped:
         notes.append(
-            f"stopped on its way, after {run.duration:.3f} s and {run.length * 1e3:.1f} mm "
+            f"stopped on its path, after {run.duration:.3f} s and {run.length * 1e3:.1f} mm "
             f"of {stage.trajectory.duration:.3f} s and {stage.length * 1e3:.1f} mm"
         )
     if stage.obstacle is not None and stage.detour is not None:
         why = where_and_why(stage.obstacle, stage.kind, run.to, run.arm)
-        notes = [f"the straight way is stopped {why}", f"{_lead(stage.detour, run.arm)}: {stage.detour.price}", *notes]
+        notes = [f"the straight line is stopped {why}", f"{_lead(stage.detour, run.arm)}: {stage.detour.price}", *notes]
     elif stage.obstacle is not None:
         notes.append(f"without stops it is stopped {where_and_why(stage.obstacle, stage.kind, run.to, run.arm)}")
     if stage.certificate is not None:
@@ -105,9 +105,9 @@ def detour_warning(run: RunStage) -> Diagnostic | None:
     return Diagnostic(
         code="W402",
         severity=Severity.WARNING,
-        message=f"{run.arm} leaves the straight way to `{run.to[-1]}`, {_METHODS[detour.method]}: {detour.price}",
+        message=f"{run.arm} leaves the straight line to `{run.to[-1]}`, {_METHODS[detour.method]}: {detour.price}",
         span=run.span,
-        label=f"stopped {obstacle.fraction * 100:.0f} % of the way there; begun at {run.t0:.3f} s",
+        label=f"stopped {obstacle.fraction * 100:.0f} % of the path; begun at {run.t0:.3f} s",
         notes=(
             f"it is stopped {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",
             _lead(detour, run.arm),
@@ -123,13 +123,13 @@ def stops_warning(run: RunStage) -> Diagnostic | None:
     return Diagnostic(
         code="W403",
         severity=Severity.WARNING,
-        message=f"{run.arm} stops at every frame on its way to `{run.to[-1]}`: rounded corners cannot be followed",
+        message=f"{run.arm} stops at every frame on its path to `{run.to[-1]}`: rounded corners cannot be followed",
         span=run.span,
         label=f"begun at {run.t0:.3f} s",
         notes=(f"without stops it is stopped {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",),
-        helps=("a frame farther from that place, or another posture at the start, may do without stops",),
+        helps=("a frame farther from that position, or another configuration at the start, may do without stops",),
     )
 
 
-def _place(p: Array) -> str:
+def _position(p: Array) -> str:
     return f"({', '.join(f'{x:.1f}' if abs(x) < _FAR else f'{x:.4g}' for x in (p * 1e3).tolist())})"
