@@ -35,7 +35,7 @@ class Node:
     Attributes:
         parent: the frame it hangs on.
         relation: (4, 4) its pose seen from the parent; None while the frame has no value.
-        rigid: whether the parent comes along when the frame is given another place.
+        rigid: whether the parent comes along when the frame is given another pose.
     """
 
     parent: str
@@ -160,13 +160,13 @@ class FrameTree:
         return self._with(name, Node(parent=parent, relation=relation))
 
     def leader(self, name: str) -> str:
-        """Return the frame that gets another place when ``name`` does: itself, or the end of its rigid links."""
+        """Return the frame that gets another pose when ``name`` does: itself, or the end of its rigid links."""
         while (node := self.nodes.get(name)) is not None and node.rigid:
             name = node.parent
         return name
 
     def without(self, name: str) -> FrameTree:
-        """Return the tree without a frame; what hung on it keeps its place and hangs on WORLD."""
+        """Return the tree without a frame; what hung on it keeps its pose and hangs on WORLD."""
         nodes = dict(self.nodes)
         for child, node in self.nodes.items():
             if node.parent == name:
@@ -177,7 +177,7 @@ class FrameTree:
 
     def would_ring(self, child: str, parent: str) -> bool:
         """Whether a frame cannot hang on another because that one hangs on it, or is the same."""
-        # What nothing hangs on can hang anywhere: no long way up for the common case.
+        # What nothing hangs on can hang anywhere: no long path up for the common case.
         return child == parent or (self._children.get(child, 0) > 0 and child in self.ancestors(parent))
 
     def affix(self, child: str, parent: str, relation: ArrayLike | None = None, *, rigid: bool = False) -> FrameTree:
@@ -187,7 +187,7 @@ class FrameTree:
             child: the frame that follows.
             parent: the frame it follows.
             relation: (4, 4) pose of the child seen from the parent; where both stand now when left out.
-            rigid: whether the parent comes along when the child is given another place.
+            rigid: whether the parent comes along when the child is given another pose.
 
         Raises:
             UnknownNameError: no such frame.
@@ -202,7 +202,7 @@ class FrameTree:
         return self._with(child, Node(parent=parent, relation=relation, rigid=rigid))
 
     def unfix(self, child: str) -> FrameTree:
-        """Return the tree with ``child`` cut loose: it keeps its place and hangs on WORLD."""
+        """Return the tree with ``child`` cut loose: it keeps its pose and hangs on WORLD."""
         return self._with(child, Node(parent=WORLD, relation=self.world(child)))
 
     def _node(self, name: str) -> Node:

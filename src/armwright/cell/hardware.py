@@ -32,13 +32,13 @@ class Hardware(Protocol):
         """Return the joint positions (n,) that the sensors of an arm read."""
 
     def begin(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
-        """Let an arm follow a trajectory that begins at its configuration, in place of what it does now.
+        """Let an arm follow a trajectory that begins at its configuration, instead of what it does now.
 
         Args:
             arm: its name.
             trajectory: from now on.
             now: the time.
-            tip: (4, 4) what shall come to the goal, seen from the hand: the part that may touch something.
+            tip: (4, 4) what shall come to the goal, seen from the gripper: the part that may touch something.
         """
 
     def touches_at(self, arm: str) -> float | None:
@@ -66,7 +66,7 @@ class Hardware(Protocol):
         """Close or open the fingers of an arm, wholly or to a width [m]; return the time it takes.
 
         Raises:
-            DeviceError: the hand did not answer.
+            DeviceError: the gripper did not answer.
         """
 
     def operate(self, device: str, *, on: bool) -> float:
@@ -77,7 +77,7 @@ class Hardware(Protocol):
         """
 
     def look(self, frame: str) -> tuple[Array, float]:
-        """Let the camera look for what ``frame`` stands for; return its pose in the world and the time it takes.
+        """Let the camera search for what ``frame`` stands for; return its pose in the world and the time it takes.
 
         Raises:
             DeviceError: nothing was found.

@@ -1,4 +1,4 @@
-"""The cell as its file tells it: arms on their bases, frames, what the camera will see, devices, obstacles."""
+"""The cell as its file describes it: arms on their bases, frames, what the camera will see, devices, obstacles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import one_pose
 
-# A path that turns its corners without a stop has to round them, and it is gross motion.
+# A path that passes its corners without a stop has to round them, and it is gross motion.
 _CORNER_DEVIATIONS = 20.0
 
 Around: TypeAlias = Literal["via", "damped"]
@@ -96,7 +96,7 @@ class Cell:
         corner: how far a path past several frames may be from the straight legs between them [m]; 20 deviations when
             left out, see ``corner_room``.
         period: of the servo [s].
-        around: how to go round what stops a straight line, by ``via`` poses or ``damped`` rates; None to stop there.
+        around: the kind of detour of a straight line, by ``via`` poses or ``damped`` rates; None to stop there.
     """
 
     name: str
@@ -130,7 +130,7 @@ class Cell:
     def tree(self) -> FrameTree:
         """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.
 
-        Between WORLD and the hand of an arm stands its base, so that a robot that is moved changes one line.
+        Between WORLD and the gripper of an arm stands its base, so that a robot that is moved changes one line.
         """
         nodes = {"STATION": Node(parent=WORLD, relation=np.eye(4)), **self.frames}
         for name, arm in self.arms.items():

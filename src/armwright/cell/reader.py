@@ -29,20 +29,20 @@ from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 # Two bases nearer than this are in one another [m].
 _APART = 0.01
-# Joints that it takes to bring the hand to any place in any orientation.
+# Joints that it takes to bring the gripper to any pose.
 _PLACE_AND_TURN = 6
 # The arm of a cell that names none: the report's.
 _REPORT_ARM = "stanford"
 _ARM_NAME = re.compile(r"ARM[-_]([0-9]+)", re.IGNORECASE | re.ASCII)
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
-# Rotations typed with two digits are off by up to 0.018; they are made exact. More is a mistake.
+# Rotations typed with two digits deviate by up to 0.018; they are made exact. More is a mistake.
 _TYPED_ROTATION = 2e-2
 # A faster servo fills a disk, a slower one controls nothing [ms].
 SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
 # No more than a corner of any use; a hundredth of a millimetre is no corner any more, but a stop.
 CORNER_MM = (1e-2, 1e3)
-# How to go round what stops a straight line, as it is written.
+# The kind of detour of a straight line, as it is written.
 WAYS_ROUND: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
 # What the camera finds after its last answer, as it is written.
 _AFTER_LAST = ("nothing", "same")
@@ -114,7 +114,7 @@ def _corner(motion: Table) -> float | None:
 
 
 def _around(motion: Table) -> Around | None:
-    """Read how to go round what stops a straight line; without the key nothing is gone round."""
+    """Read the kind of detour of a straight line; without the key there is no detour."""
     return WAYS_ROUND[motion.choice("around", WAYS_ROUND, default="none")]
 
 

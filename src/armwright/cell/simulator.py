@@ -27,7 +27,7 @@ class _Tip:
     """What may press on the plane while an arm follows a trajectory.
 
     Attributes:
-        pose: (4, 4) seen from the hand.
+        pose: (4, 4) seen from the gripper.
         above: (k,) its heights above the plane on the servo ticks [m].
         since: the first tick from which it counts; before, it stands below the plane without having come down on it.
     """
@@ -66,7 +66,7 @@ class _Run:
 class Simulator:
     """Arms that go where they are sent, fingers that close, tools that switch, a camera that answers in order.
 
-    Where the cell has a plane of contact, it gives way to what an arm brings down on it, with a force that grows with
+    Where the cell has a plane of contact, it yields to what an arm brings down on it, with a force that grows with
     the depth, for as long as the arm stands or moves in it.
     """
 
@@ -194,7 +194,7 @@ class Simulator:
     def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:  # noqa: ARG002 - see below
         """Close or open the fingers of an arm; return the time it takes [s].
 
-        The fingers of this simulator have one speed whatever the width: the file gives one time. What they let go does
+        The fingers of this simulator have one speed whatever the width: the file gives one time. What they release does
         not press any more.
         """
         if not closed:

@@ -1,7 +1,7 @@
-"""What holds and what gives way: joints at rest under dry friction, stops and brakes, all at once.
+"""What holds and what moves: joints at rest under dry friction, stops and brakes, all at once.
 
 A joint at rest is held by an effort between two bounds. Inside them it stays; where the lower bound is not low enough
-it moves forward and the effort stays at that bound, and the other way round. Whether one joint gives way depends on
+it moves forward and the effort stays at that bound, and the reverse. Whether one joint moves depends on
 what the others do, so all are found together:
 
     M x = b + r,    and for every joint at rest  x = 0 and lower <= r <= upper,
@@ -33,7 +33,7 @@ class ComplementaritySolution(NamedTuple):
     Attributes:
         x: (n,) accelerations, or speeds after an impact.
         r: (n,) efforts that hold or resist, or impulses; 0 for joints that are not at rest.
-        direction: (n,) of the joints at rest: 0 held, 1 gives way forward, -1 backward; 0 for all others.
+        direction: (n,) of the joints at rest: 0 held, 1 moves forward, -1 backward; 0 for all others.
     """
 
     x: Array
@@ -80,7 +80,7 @@ def solve_complementarity(
 def _of_guess(
     M: Array, b: Array, at_rest: npt.NDArray[np.bool_], direction: Signs, bounds: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Return accelerations and efforts when the held joints are held and the others give way as guessed."""
+    """Return accelerations and efforts when the held joints are held and the others move as guessed."""
     lower, upper = bounds
     r = np.where(direction > 0, lower, np.where(direction < 0, upper, 0.0))
     locked = at_rest & (direction == 0)

@@ -92,7 +92,7 @@ def pd_with_gravity(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
 
 
 def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike) -> Controller:
-    """Return a controller that turns the arm into n separate double integrators and steers those.
+    """Return a controller that makes the arm n separate double integrators and steers those.
 
     Rotors and viscous friction count. Dry friction is overcome in the direction in which the reference moves.
 

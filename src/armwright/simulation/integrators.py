@@ -49,7 +49,7 @@ class Stepper(Protocol):
 
 
 class Integrator(Protocol):
-    """A way to integrate."""
+    """A method of integration."""
 
     def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
         """Return a stepper from the state y at time t that stops at the time ``end``."""
@@ -180,7 +180,7 @@ class _AdaptiveStepper:
 
 
 def first_crossing(value: Callable[[float], float], start: float, end: float) -> float:
-    """Return a time just behind the place where a function falls through 0, between -1 and 0 if time allows.
+    """Return a time just behind the time at which a function falls through 0, between -1 and 0 if time allows.
 
     Args:
         value: the function; at least 0 at the start, below 0 at the end. It is measured in what counts as nothing.

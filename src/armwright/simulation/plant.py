@@ -20,7 +20,7 @@ from armwright.simulation.result import Brake, JointState
 # A speed and a distance that are nothing [rad/s, m/s, rad, m]. Events are found to within them.
 STILL = 1e-11
 TOUCH = 1e-12
-# A held joint gives way when the effort exceeds the bound by this part, more than rounding can.
+# A held joint moves when the effort exceeds the bound by this part, more than rounding can.
 _OVER = 1e-9
 
 
@@ -130,7 +130,7 @@ class Plant:
     def _pushed(
         self, t: float, q: Array, qd: Array, direction: Array, locked: Flags
     ) -> tuple[Array, Array, Array, Array]:
-        """Return mass matrix, efforts of drives, of friction, and what is left to accelerate with."""
+        """Return mass matrix, efforts of drives, of friction, and the remainder for acceleration."""
         M, bias = self.compiled.mass_and_bias(q, qd)
         tau = np.clip(np.asarray(self.controller(t, q, qd), dtype=np.float64), -self.effort, self.effort)
         dry = np.where(direction > 0, self.forward, np.where(direction < 0, -self.backward, 0.0))

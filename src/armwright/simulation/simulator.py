@@ -34,7 +34,7 @@ _ENTANGLED = 50
 _INSTANT = 1e-9
 # Part of a period that rounding may shift a sample by.
 _CRUMB = 1e-9
-# More moments than this are no result that anybody looks at, and fill the memory.
+# More moments than this are no result that anybody checks, and fill the memory.
 _MOMENTS = 10**7
 # No position or speed of a robot is as large; of larger angles no sine means anything.
 _LOST = LARGEST_ANGLE
@@ -68,7 +68,7 @@ def simulate(
         saturation: whether effort limits bound what the drives do.
 
     Returns:
-        The motion. When something goes wrong on the way, its status says what, and it ends there.
+        The motion. When something goes wrong meanwhile, its status says what, and it ends there.
 
     Raises:
         KindError: ``arm`` is no arm, a number none, or controller, integrator or a brake something else.
@@ -167,7 +167,7 @@ class _Sample(NamedTuple):
 
 
 class _Run:
-    """One simulation under way. Its state y holds positions, speeds, work of the drives and heat, n of each."""
+    """One simulation running. Its state y holds positions, speeds, work of the drives and heat, n of each."""
 
     def __init__(self, plant: Plant, integrator: Integrator, duration: float, period: float) -> None:
         self._plant, self._integrator = plant, integrator

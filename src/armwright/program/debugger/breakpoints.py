@@ -30,11 +30,11 @@ _COMPARISONS: Mapping[str, Callable[[int, int], bool]] = {
 
 
 class CountError(ArmwrightError, ValueError):
-    """A condition on how often a place is come to makes no sense."""
+    """A condition on how often a location is reached makes no sense."""
 
 
 def counts(condition: str, hits: int) -> bool:
-    """Whether a place is to be stopped at when it is come to for that time.
+    """Whether to stop at a location when it is reached for that time.
 
     Args:
         condition: ``3`` for the third time, ``>= 3`` from then on, ``% 3`` for every third.
@@ -58,7 +58,7 @@ class Breakpoint:
         start: the statement; None where there is none, or its condition makes no sense.
         condition: that must be true; empty for none.
         hits: a condition on how often it has been come to; empty for none.
-        log: what to say in place of stopping, with expressions in braces; empty to stop.
+        log: what to say instead of stopping, with expressions in braces; empty to stop.
         message: why it is not as it was asked for; empty where it is.
     """
 

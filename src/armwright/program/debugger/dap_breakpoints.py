@@ -10,7 +10,7 @@ from armwright.program.debugger.dap_session import LISTED, EditorSession
 
 
 def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
-    """Answer ``setBreakpoints``: those of a file, in place of all it had."""
+    """Answer ``setBreakpoints``: those of a file, instead of all it had."""
     source = arguments.part("source")
     requests = arguments.parts("breakpoints")
     for request in requests:
@@ -76,7 +76,7 @@ def _inside(session: EditorSession, reference: int) -> Any:
 
 
 def set_data_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
-    """Answer ``setDataBreakpoints``: all frames and variables that are watched, in place of those before."""
+    """Answer ``setDataBreakpoints``: all frames and variables that are watched, instead of those before."""
     debugger = session.live
     requests = [
         (session.number(), part.text("dataId"), part.text("condition", ""), part.text("hitCondition", ""))

@@ -205,7 +205,7 @@ class EditorSession:
         self.forget_places()
 
     def work(self, seconds: float) -> None:
-        """Do a slice of what the program has to do; tell what came of it."""
+        """Do a slice of what the program has to do; state what came of it."""
         debugger = self.live
         stop = debugger.work(seconds)
         self._tell_news(debugger)
@@ -213,7 +213,7 @@ class EditorSession:
             self.told(stop)
 
     def told(self, stop: Stop) -> None:
-        """Tell why the program stands still."""
+        """State why the program stands still."""
         debugger = self.live
         if stop.over:
             self._end(stop)
@@ -259,10 +259,11 @@ class EditorSession:
             self.send("exited", {"exitCode": int(ExitStatus.INTERRUPTED)})
             self.send("terminated", {})
 
-    # ---- what is told ----------------------------------------------------------------------------------------------
+    # ---- what is reported
+    # ----------------------------------------------------------------------------------------------
 
     def say(self, text: str, category: str, span: Span | None = None) -> None:
-        """Show a text to the user, with the place in the program that it comes from."""
+        """Show a text to the user, with the location in the program that it comes from."""
         position = {} if span is None else {"source": self.source(), **self.place(span, full=False)}
         self.send("output", {"category": category, "output": text, **position})
 
@@ -291,7 +292,8 @@ class EditorSession:
             self.send("thread", {"reason": "exited", "threadId": number})
         self._alive = alive
 
-    # ---- numbers of threads, places and breakpoints ----------------------------------------------------------------
+    # ---- numbers of threads, locations and breakpoints
+    # ----------------------------------------------------------------
 
     def thread(self, path: ProcessPath) -> int:
         """Return the number of a process."""

@@ -65,7 +65,7 @@ class Debugger:
         self.stop: Stop | None = None
         self._going = Execution(code, cell, limits)
         self._way: Way | None = None
-        # Where a way back was begun, to return to when it is given up.
+        # Where a run backwards was begun, to return to when it is given up.
         self._origin: Position | None = None
         self._numbers = 0
         self._told = 0
@@ -78,7 +78,7 @@ class Debugger:
 
     @property
     def running(self) -> bool:
-        """Whether the run is on its way to the next stop."""
+        """Whether the run runs to the next stop."""
         return self._way is not None
 
     @property
@@ -116,7 +116,7 @@ class Debugger:
                 self._way = execution.reverse()
 
     def work(self, seconds: float = math.inf) -> Stop | None:
-        """Do what the run has to do on its way to the next stop.
+        """Do what the run has to do up to the next stop.
 
         Args:
             seconds: give up after about so long [s]; the next call goes on.
@@ -147,7 +147,7 @@ class Debugger:
         return stop
 
     def pause(self) -> Stop:
-        """Stop the run where it is; a way back is given up."""
+        """Stop the run where it is; a run backwards is given up."""
         if self._way is not None:
             self._way.close()
             if self._origin is not None:
@@ -160,7 +160,7 @@ class Debugger:
     def _arrive(self, stop: Stop) -> None:
         self._way, self.stop = None, stop
         if self._origin is not None:
-            # What was done again on the way back is no news.
+            # What was done again on a run backwards is no news.
             self._told, self._origin = len(self.machine.state.effects), None
         self._told = min(self._told, len(self.machine.state.effects))
 
@@ -197,7 +197,7 @@ class Debugger:
             column: from 1, to choose among the statements of a line.
             condition: an expression that must be true.
             hits: how often the statement must have been come to: ``3``, ``>= 3``, ``% 3``.
-            log: say this in place of stopping; expressions in braces are worked out.
+            log: say this instead of stopping; expressions in braces are worked out.
 
         Returns:
             The breakpoint; one without a ``start`` stops nothing, and its ``message`` says why.
@@ -289,7 +289,7 @@ class Debugger:
 
     @property
     def view(self) -> Machine:
-        """The machine as it is seen now, with the arms where they are on their way."""
+        """The machine as it is seen now, with the arms where they are on their path."""
         return self._going.view
 
     @property
@@ -311,7 +311,7 @@ class Debugger:
         return stack(self.machine, self._process(path), self._going.statements)
 
     def scopes(self, path: Path = (), level: int = 0) -> list[Shown]:
-        """Return what there is to look at from one level of a stack.
+        """Return what there is to see from one level of a stack.
 
         Raises:
             DebuggerError: there is no such process or level.

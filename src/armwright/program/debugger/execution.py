@@ -20,7 +20,7 @@ from armwright.program.vm.interpreter import Limits, RunError
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Process
 
-# A way to the next stop; it can be left whenever it yields.
+# A path to the next stop; it can be left whenever it yields.
 Way: TypeAlias = Generator[None, None, Stop]
 # A moment of a run: the steps done, and the servo tick.
 Position: TypeAlias = tuple[int, int]
@@ -38,7 +38,7 @@ class Execution:
         breakpoints: lines at which it stops.
         watches: frames and variables at whose change it stops.
         catches: what errors it stops at: ``uncaught`` ones, and ``caught`` ones.
-        said: what breakpoints had to say in place of stopping.
+        said: what breakpoints had to say instead of stopping.
     """
 
     def __init__(self, code: Code, cell: Cell, limits: Limits | None) -> None:
@@ -101,7 +101,7 @@ class Execution:
         """Go on to the next stop.
 
         Args:
-            step: that ends the way, if no breakpoint does.
+            step: that ends the path, if no breakpoint does.
             tick: whether the next servo tick ends it.
             until: no farther than to this moment, which is no stop.
         """

@@ -14,7 +14,7 @@ from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.vm.interpreter import Limits, Machine, advance, due, ready
 from armwright.program.vm.process import Process
 
-# A moment is kept when the way from the last one has taken so long [s], or so many times what keeping one takes.
+# A moment is kept when the path from the last one has taken so long [s], or so many times what keeping one takes.
 _OFTEN = 0.05
 _SHARE = 20.0
 # With more moments than this every second one is forgotten.
@@ -33,7 +33,7 @@ class _Moment(NamedTuple):
 
 
 class Marks:
-    """What a debugger remembers of the way to a moment, beside the state of the program itself.
+    """What a debugger remembers of the path to a moment, beside the state of the program itself.
 
     Attributes:
         blocked: processes whose statement was begun and found that it has to wait.
@@ -59,7 +59,7 @@ class Timeline:
 
     Attributes:
         machine: its state now.
-        marks: of the way to here.
+        marks: of the path to here.
         done: steps done so far.
     """
 
@@ -69,7 +69,7 @@ class Timeline:
         self.marks = Marks()
         self.done = 0
         self._changes: list[tuple[int, Change]] = []
-        # Whether a step went wrong half-way, so that the state is not that of a moment.
+        # Whether a step failed half-done, so that the state is not that of a moment.
         self._broken = False
         self._often, self._cost, self._begun = _OFTEN, 0.0, time.perf_counter()
         self._moments = [self._moment()]

@@ -15,7 +15,7 @@ from armwright.program.vm.process import Activation, Process
 
 
 def sampled(machine: Machine, ticks: int) -> Machine:
-    """Return a machine to look at, as things are at a tick; the machine itself stays as it is.
+    """Return a machine for inspection, as things are at a tick; the machine itself stays as it is.
 
     Between the steps of a program its frame table says where an arm was last known to be. What one sees is where
     its sensors say that it is.
@@ -39,7 +39,7 @@ def sampled(machine: Machine, ticks: int) -> Machine:
 
 
 def process_of(machine: Machine, path: Path) -> Process | None:
-    """Return a process by its place among the branches; None where it has ended or not begun."""
+    """Return a process by its position among the branches; None where it has ended or not begun."""
     return next((process for process in machine.state.processes if process.path == path), None)
 
 

@@ -31,7 +31,7 @@ class Statements:
     """The statements of a program."""
 
     def __init__(self, code: Code) -> None:
-        """Look at every instruction once."""
+        """Check every instruction once."""
         self._code = code
         self._begins = [index for index, step in enumerate(code.instructions) if step.begins]
         self._procedures = sorted((procedure.start, name) for name, procedure in code.procedures.items())

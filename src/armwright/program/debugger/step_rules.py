@@ -17,7 +17,7 @@ _ANY_DEPTH = 1 << 60
 
 @attrs.define(kw_only=True)
 class Step:
-    """A step under way.
+    """A step running.
 
     Attributes:
         kind: how far it goes.

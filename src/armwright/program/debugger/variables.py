@@ -46,7 +46,7 @@ class Shown:
 
 
 def scopes(machine: Machine, process: Process, frame: Frame) -> list[Shown]:
-    """Return what there is to look at from one level of a stack.
+    """Return what there is to see from one level of a stack.
 
     Args:
         machine: as it is seen now.
@@ -74,7 +74,7 @@ def frames(machine: Machine) -> list[str]:
 
 
 def variable(machine: Machine, slot: str, *, name: str = "") -> Shown:
-    """Return a variable, an element, an array or the hand of an arm.
+    """Return a variable, an element, an array or the gripper of an arm.
 
     Args:
         machine: as it is seen now.
@@ -172,7 +172,7 @@ def _columns(machine: Machine, X: Array) -> list[Shown]:
 
 
 def _matrix(machine: Machine, X: Array) -> str:
-    """Return a place or a step as the program would write it."""
+    """Return a pose or a step as the program would write it."""
     numbers = _numbers(machine, X)
     return "(" + ", ".join(",".join(numbers[index : index + 3]) for index in range(0, 12, 3)) + ")"
 

@@ -1,6 +1,6 @@
-"""What the statements do to the frames, along all ways through a program: values, affixments, arms; no numbers.
+"""What the statements do to the frames, along all paths through a program: values, affixments, arms; no numbers.
 
-An error is said only where it is certain that a run that comes to the statement fails. Where ways meet, what they
+An error is said only where it is certain that a run that comes to the statement fails. Where paths meet, what they
 agree on stays known; a loop is followed twice: once as at its first pass, and once knowing nothing of what it changes.
 """
 
@@ -31,7 +31,7 @@ class Flow:
     """What the translator wants to know of statements, by where they start.
 
     Attributes:
-        arms: the arm that a MOVE moves or a GRASP closes, where it is the same on every way there.
+        arms: the arm that a MOVE moves or a GRASP closes, where it is the same on every path there.
         implied: MOVEs that always hang the grasped frame on its arm first.
     """
 

@@ -63,7 +63,7 @@ class Calling:
             self._leave(procedure, activation)
 
     def pass_over(self, key: str) -> None:
-        """Take note that a procedure is called in ways that are not followed."""
+        """Take note that a procedure is called without being followed."""
         self._passed_over.add(key)
 
     def others(self) -> None:
@@ -128,7 +128,7 @@ class Calling:
         return Activation(scope=state.symbols.scope(procedure.node.name.key), bindings=bindings)
 
     def _bound(self, argument: tree.Expression, kind: VariableType | None, own: str, span: Span) -> str | None:
-        """Return where a parameter is kept: where its argument is, or in a place of its own."""
+        """Return where a parameter is kept: where its argument is, or in storage of its own."""
         state = self._state
         if kind is None:
             return None

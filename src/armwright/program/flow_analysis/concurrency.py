@@ -13,7 +13,7 @@ from armwright.program.semantics.expression_types import written
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
 
-# Places shown in one message.
+# Locations shown in one message.
 _MOST_PLACES = 3
 
 

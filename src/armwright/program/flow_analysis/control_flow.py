@@ -17,24 +17,24 @@ from armwright.program.syntax import tree
 
 # Loops inside one another of which the first pass is followed by itself.
 _DEEPEST_LOOPS = 3
-# Branches beside which one looks at each other one.
+# Branches beside which one checks each other one.
 _MOST_BRANCHES = 30
-# Ways of one IF that are joined name by name where they meet.
+# Paths of one IF that are joined name by name where they meet.
 _MOST_WAYS = 100
 
 
 def event(state: FlowState, node: tree.Signal | tree.Wait) -> None:
-    """Look at the indices of an event."""
+    """Check the indices of an event."""
     need_indices(state, node.event)
 
 
 def pause(state: FlowState, node: tree.Pause) -> None:
-    """Look at the time of a PAUSE."""
+    """Check the time of a PAUSE."""
     need(state, node.duration)
 
 
 def if_(context: Context, node: tree.If) -> None:
-    """Follow each way of an IF, and go on with what holds on all of them."""
+    """Follow each path of an IF, and go on with what holds on all of them."""
     state = context.state
     need(state, node.condition)
     if state.first:

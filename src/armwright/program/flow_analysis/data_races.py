@@ -12,7 +12,7 @@ from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
 
-# Branches beside one another of which one looks at each, and pairs of writes, signals and waits that are compared.
+# Branches beside one another of which one checks each, and pairs of writes, signals and waits that are compared.
 _MOST_BRANCHES, _MOST_PAIRS = 30, 1000
 # An event of which nobody knows which it is.
 _ANY = "?"
@@ -129,7 +129,7 @@ def _branches(
     symbols: Symbols,
     others: Sequence[tuple[Scope, tuple[tree.Statement, ...]]],
 ) -> None:
-    """Look at the branches of one COBEGIN; ``others`` may be at work beside it."""
+    """Check the branches of one COBEGIN; ``others`` may be at work beside it."""
     branches = [_branch(_walk((part.body,), scope, symbols), scope) for part in fork.branches]
     outside = [
         _branch((step for step in _walk(body, own, symbols) if not _is_inside(step.node.span, fork.span)), own)

@@ -1,4 +1,4 @@
-"""What has no value where it needs one, certainly or on some of the ways that lead there."""
+"""What has no value where it needs one, certainly or on some of the paths that lead there."""
 
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.state import FlowState
@@ -19,7 +19,7 @@ def need(state: FlowState, *nodes: tree.Expression | None) -> None:
         elif isinstance(node, tree.Matrix):
             waiting += [item for item in reversed(node.items) if not isinstance(item, tree.Number)]
         elif isinstance(node, tree.Binary):
-            # AND and OR look at the right side only where it matters.
+            # AND and OR check the right side only where it matters.
             waiting += [node.left] if node.operation in ("AND", "OR") else [node.right, node.left]
         elif isinstance(node, tree.Index):
             need(state, *node.indices)
@@ -75,7 +75,7 @@ def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
 
 
 def _uncertain(state: FlowState, node: tree.Name | tree.Index, name: str, parting: Divergence) -> None:
-    """Warn of a variable that has a value on one way here and none on the other.
+    """Warn of a variable that has a value on one path here and none on the other.
 
     Where the use depends on a condition too, nothing is said: that may be the one on which it has the value.
     """

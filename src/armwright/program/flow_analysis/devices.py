@@ -15,7 +15,8 @@ from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import written
 from armwright.program.syntax import tree
 
-# ---- the hand ------------------------------------------------------------------------------------------------------
+# ---- the gripper
+# ------------------------------------------------------------------------------------------------------
 
 
 def open_(state: FlowState, node: tree.Open) -> None:
@@ -50,7 +51,7 @@ def grasp(state: FlowState, node: tree.Grasp) -> None:
 
 
 def _closed_on_arrival(state: FlowState, arm: str) -> None:
-    """Point at a hand that came to its object without room for it between the fingers."""
+    """Point at a gripper that came to its object without room for it between the fingers."""
     hand = state.table.hands[arm]
     opened_late = hand.arrived_open is None and hand.opened is not None
     never_opened = hand.arrived_open is False and hand.opened is None

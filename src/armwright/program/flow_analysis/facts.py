@@ -5,7 +5,7 @@ import attrs
 from armwright.program.flow_analysis.lattice import same
 from armwright.program.language.source import Span
 
-# Where a hand stands, or what it holds, when nobody knows.
+# Where a gripper stands, or what it holds, when nobody knows.
 UNKNOWN = "?"
 # Names that wipe where all hands are and what their fingers do, and what they hold.
 HANDS, GRIPS = "(hands)", "(grips)"
@@ -18,7 +18,7 @@ class Link:
     Attributes:
         parent: the frame above; None when nobody knows whether there is one.
         span: the AFFIX that made it; None where the cell did.
-        rigid: whether the frame above comes along when this one is given another place.
+        rigid: whether the frame above comes along when this one is given another pose.
     """
 
     parent: str | None
@@ -37,7 +37,7 @@ class Assignment:
 
 @attrs.frozen
 class Divergence:
-    """What gives a variable its value on one way and not on the other.
+    """What gives a variable its value on one path and not on the other.
 
     Attributes:
         span: its head.
@@ -59,11 +59,11 @@ class GripperState:
     Attributes:
         open: whether the fingers are open; None at the start of a program.
         doubtful: whether nobody knows what the program did to the fingers.
-        at: the frame at which the hand stands.
+        at: the frame at which the gripper stands.
         arrival: the MOVE of the arm itself that brought it there.
         arrived_open: whether the fingers were open then.
         opened: the OPEN since then.
-        left: the frame that the fingers let go while it hung on the arm, and the OPEN that did it.
+        left: the frame that the fingers release while it hung on the arm, and the OPEN that did it.
     """
 
     open: bool | None = None
@@ -77,7 +77,7 @@ class GripperState:
 
 @attrs.frozen
 class Grip:
-    """What a hand holds: the frame at which the fingers closed, and the GRASP that closed them."""
+    """What a gripper holds: the frame at which the fingers closed, and the GRASP that closed them."""
 
     frame: str
     span: Span | None = None
@@ -89,7 +89,7 @@ ANY_GRIP = Grip(UNKNOWN)
 
 
 def joined_links(link: Link | None, other: Link | None) -> Link | None:
-    """Return what holds of an affixment where two ways meet."""
+    """Return what holds of an affixment where two paths meet."""
     if link == other:
         return link
     if link is None or other is None or (link.parent, link.rigid) != (other.parent, other.rigid):
@@ -98,7 +98,7 @@ def joined_links(link: Link | None, other: Link | None) -> Link | None:
 
 
 def joined_hands(link: GripperState, other: GripperState) -> GripperState:
-    """Return what holds of a hand where two ways meet."""
+    """Return what holds of a gripper where two paths meet."""
     if link == other:
         return link
     return GripperState(
@@ -109,7 +109,7 @@ def joined_hands(link: GripperState, other: GripperState) -> GripperState:
 
 
 def joined_grips(link: Grip | None, other: Grip | None) -> Grip | None:
-    """Return what holds of what a hand holds where two ways meet."""
+    """Return what holds of what a gripper holds where two paths meet."""
     if link is None or other is None or link.frame != other.frame:
         return link if link == other else ANY_GRIP
     return link

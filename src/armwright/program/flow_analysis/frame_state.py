@@ -26,7 +26,7 @@ from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import STATION, WORLD, KnownCell
 
-# Frames that hang on one another, up to which a place is worked out.
+# Frames that hang on one another, up to which a pose is worked out.
 _LONGEST_WAY = 50
 
 
@@ -48,7 +48,7 @@ class FrameState:
             facts, default=None, unknown=ANY_LINK, joined=joined_links, watch=self._watch
         )
         self.valued = FactTable(facts, default=False, unknown=True, joined=either)
-        # Of what may have a value, whether it has one on every way here, or where the ways have parted.
+        # Of what may have a value, whether it has one on every path here, or where the paths have parted.
         self.sure: FactTable[Divergence | bool] = FactTable(
             facts, default=False, unknown=True, joined=self._joined_sure
         )
@@ -84,12 +84,12 @@ class FrameState:
         """Whether hanging ``child`` on ``parent`` certainly closes a ring."""
         if is_any(child):
             return False
-        # What nothing hangs on can be hung anywhere: no long way up for the common case.
+        # What nothing hangs on can be hung anywhere: no long path up for the common case.
         return child == parent or (self._children.get(child, 0) > 0 and child in self.above(parent))
 
     def carrier(self, name: str) -> str | None:
         """Return the arm that a frame hangs on, directly or through others; None if there is none."""
-        # The way up may be long: it is not gone where it leads nowhere.
+        # The path up may be long: it is not gone where it leads nowhere.
         return next((above for above in self.above(name) if is_arm(above)), None) if self._carried else None
 
     def unknown(self, name: str) -> bool:
@@ -106,7 +106,7 @@ class FrameState:
         return True
 
     def leader(self, name: str) -> str | None:
-        """Return the frame that is given another place when ``name`` is; None when one cannot know."""
+        """Return the frame that is given another pose when ``name`` is; None when one cannot know."""
         while self._rigid:
             link = self.links[name]
             if link is None or not (link.rigid or link.parent is None):
@@ -124,7 +124,7 @@ class FrameState:
         return next((arm for arm, frame in grips.items() if frame == name), None)
 
     def where(self, name: str) -> Pose | None:
-        """Return where a frame stands in WORLD; None where that is not certain, or up a long way."""
+        """Return where a frame stands in WORLD; None where that is not certain, or up a long path."""
         pose: Pose | None = HERE
         for _ in range(_LONGEST_WAY):
             if name == WORLD or pose is None:
@@ -145,7 +145,7 @@ class FrameState:
         return None if there is None or here is None else after(inverse(here), there)
 
     def is_sure(self, name: str) -> "Divergence | bool":
-        """Return whether what may have a value has one on every way here; if not, where the ways parted."""
+        """Return whether what may have a value has one on every path here; if not, where the paths parted."""
         return self.sure[name]
 
     # ---- changing --------------------------------------------------------------------------------------------------
@@ -192,7 +192,7 @@ class FrameState:
         self._steps.put(name, None if above is None else after(inverse(above), pose))
 
     def assign(self, name: str, span: Span) -> None:
-        """Give a frame a value, and thereby another place."""
+        """Give a frame a value, and thereby another pose."""
         self._assignments += 1
         self._order += 1
         if is_any(name):
@@ -222,7 +222,7 @@ class FrameState:
                 self._hold(arm, grip, self._left(grip.frame, name))
 
     def arrive(self, arm: str, frame: str | None, mover: Span | None) -> None:
-        """Move a hand and all that it carries.
+        """Move a gripper and all that it carries.
 
         Args:
             arm: the arm.
@@ -235,7 +235,7 @@ class FrameState:
             gone = UNKNOWN if frame == UNKNOWN else None
             self._hold(arm, grip, {True: grip.frame, False: gone, None: UNKNOWN}[self._on(grip.frame, arm)])
         if mover and frame not in (None, UNKNOWN) and (along := self._on(frame, arm)) is not False:
-            # The goal has gone along: the hand stands only at what it stood at before and has taken with it.
+            # The goal has gone along: the gripper stands only at what it stood at before and has taken with it.
             frame, mover = (self._taken(hand.at, arm) if along else UNKNOWN), None
         elif frame not in (None, UNKNOWN) and not self._steady(frame):
             frame = UNKNOWN
@@ -272,7 +272,7 @@ class FrameState:
         self.lose()
 
     def forget_hand(self, arm: str | None, *, grasps: bool) -> None:
-        """Give up what is known of a hand.
+        """Give up what is known of a gripper.
 
         Args:
             arm: the arm; None when it may be any.
@@ -287,7 +287,7 @@ class FrameState:
         self.lose()
 
     def shift(self, name: str) -> None:
-        """Take note that a frame may have been given another place; what it hangs on stays known."""
+        """Take note that a frame may have been given another pose; what it hangs on stays known."""
         if is_any(name):
             self._facts.wipe(name)
         else:
@@ -305,7 +305,7 @@ class FrameState:
                 self._hold(arm, grip, UNKNOWN)
 
     def drop(self, name: str, *, array: bool = False) -> None:
-        """Take a frame, or an array of them, away: what hung on it keeps its place."""
+        """Take a frame, or an array of them, away: what hung on it keeps its pose."""
         if array or self._children.get(name, 0):
             for child, link in self.links.items():
                 parent = link.parent if link else None
@@ -320,18 +320,18 @@ class FrameState:
         return next((each for each in (first, other) if isinstance(each, Divergence)), self.parting or True)
 
     def _hold(self, arm: str, grip: Grip, frame: str | None) -> None:
-        """Let a hand hold something else than before, or nothing, or nobody knows what."""
+        """Let a gripper hold something else than before, or nothing, or nobody knows what."""
         if frame != grip.frame:
             self.grips.put(arm, attrs.evolve(grip, frame=frame) if frame is not None else None)
 
     def _taken(self, frame: str | None, arm: str) -> str | None:
-        """Return where a hand stands that stood at ``at`` and has taken along what hangs on it."""
+        """Return where a gripper stands that stood at ``at`` and has taken along what hangs on it."""
         if frame is None or frame == UNKNOWN:
             return frame
         return {True: frame, False: None, None: UNKNOWN}[self._on(frame, arm)]
 
     def _left(self, grasped: str | None, moved: str) -> str | None:
-        """Return where a hand stands, or what it holds, after ``moved`` was put elsewhere."""
+        """Return where a gripper stands, or what it holds, after ``moved`` was put elsewhere."""
         if grasped is None or grasped == UNKNOWN:
             return grasped
         return {True: None, False: grasped, None: UNKNOWN}[self._on(grasped, moved)]

@@ -39,7 +39,7 @@ def assign(state: FlowState, node: tree.Assign) -> None:
 
 
 def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) -> None:
-    """Give a frame another place; say that nothing can, where it hangs rigidly on what no value moves."""
+    """Give a frame another pose; say that nothing can, where it hangs rigidly on what no value moves."""
     if is_arm(frame) or frame == WORLD:
         return
     leader = frame if is_any(frame) else state.table.leader(frame)
@@ -140,7 +140,7 @@ def _ring(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
 
 
 def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
-    """Point at a parent that was moved after the child got its place, but before it hung there."""
+    """Point at a parent that was moved after the child got its pose, but before it hung there."""
     above, below = state.table.assigned[parent], state.table.assigned[child]
     if above is None or below is None or not above.moved or above.order < below.order:
         return

@@ -1,4 +1,4 @@
-"""What is certain at one moment of a program: facts that can be forgotten, taken back, and joined where ways meet."""
+"""What is certain at one moment of a program: facts that can be forgotten, taken back, and joined where paths meet."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import reduce
@@ -26,7 +26,7 @@ class Uncertainty:
         arms: whether it may be any arm.
         everything: whether it may be anything.
         excepted: names of which neither is true.
-        places: whether frames may be given other places through what hangs on them rigidly.
+        places: whether frames may be given other poses through what hangs on them rigidly.
         aliases: whether a name that is covered may be another name of something else.
     """
 
@@ -47,7 +47,7 @@ class Uncertainty:
 
 @attrs.frozen
 class Outcome:
-    """How a way through a part of a program ended: what it changed, and which names it forgot when."""
+    """How a path through a part of a program ended: what it changed, and which names it forgot when."""
 
     changed: Mapping[tuple["FactTable[Any]", str], Any]
     wipes: Mapping[str, int]
@@ -79,7 +79,7 @@ class Facts:
         """Whether a name may be another name of something else."""
         return any(value.aliases and value.covers(name) for value in self.shaky)
 
-    # ---- ways that part and meet -----------------------------------------------------------------------------------
+    # ---- paths that part and meet -----------------------------------------------------------------------------------
 
     def mark(self) -> int:
         """Return what to go back to later."""
@@ -106,10 +106,10 @@ class Facts:
                 self.wipes[key] = old
 
     def join(self, outcomes: Sequence[Outcome], *, together: bool = False) -> None:
-        """Go on where ways meet that parted here.
+        """Go on where paths meet that parted here.
 
         Args:
-            outcomes: of the ways; at least one.
+            outcomes: of the paths; at least one.
             together: whether all of them were gone, side by side, and not one of them.
         """
         joined: list[tuple[FactTable[Any], str, Any]] = []
@@ -148,7 +148,7 @@ class FactTable(Generic[V]):
             facts: all books.
             default: what holds of names that nothing was written of.
             unknown: what is written where one cannot know.
-            joined: gives what holds where two ways meet.
+            joined: gives what holds where two paths meet.
             group: a name that, wiped, wipes the whole book.
             watch: told with 1 of each value that is written and with -1 of each that is overwritten.
         """
@@ -204,10 +204,10 @@ class FactTable(Generic[V]):
 
 
 def same(value: V | None, other: V | None) -> V | None:
-    """Return what both ways agree on; None where they differ."""
+    """Return what both paths agree on; None where they differ."""
     return value if value == other else None
 
 
 def either(value: bool, other: bool) -> bool:  # noqa: FBT001 - two values of one kind
-    """Whether something may be so on one of two ways."""
+    """Whether something may be so on one of two paths."""
     return value or other

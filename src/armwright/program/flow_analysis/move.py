@@ -18,7 +18,7 @@ from armwright.program.syntax import tree
 
 
 def move(context: Context, node: tree.Move) -> None:
-    """Follow a MOVE; what its actions do may happen or not, while the arm is on its way."""
+    """Follow a MOVE; what its actions do may happen or not, while the arm moves."""
     state = context.state
     arm = _begin(state, node)
     guards = [clause for clause in node.clauses if isinstance(clause, tree.On)]
@@ -42,7 +42,7 @@ def move(context: Context, node: tree.Move) -> None:
 
 
 def _begin(state: FlowState, node: tree.Move) -> str | None:
-    """Look at what a MOVE needs to begin; return the arm, None where it is unknown."""
+    """Check what a MOVE needs to begin; return the arm, None where it is unknown."""
     state.mention(node.moved)
     need_indices(state, node.moved)
     moved = state.frame(node.moved)
@@ -76,7 +76,7 @@ def _end(state: FlowState, node: tree.Move, arm: str | None, *, halted: bool) ->
         state: the state.
         node: the MOVE.
         arm: as ``_begin`` gave it.
-        halted: whether an action may have ended the motion on the way.
+        halted: whether an action may have ended the motion meanwhile.
     """
     moved = state.frame(node.moved)
     if arm is None or moved is None:
@@ -91,13 +91,13 @@ def _end(state: FlowState, node: tree.Move, arm: str | None, *, halted: bool) ->
         goal = state.frame(node.goal)
         frame = UNKNOWN if halted or (goal is not None and is_any(goal)) else goal
         if goal is None and not isinstance(node.goal, tree.Binary | tree.Matrix | tree.Function):
-            # Something was reported of the goal, or it is given to a procedure in a way that is not followed.
+            # Something was reported of the goal, or it is given to a procedure that is not followed.
             frame = UNKNOWN
     state.table.arrive(arm, frame, node.span if moved == arm else None)
 
 
 def _left_hanging(state: FlowState, node: tree.Move, arm: str) -> None:
-    """Warn of a frame that the fingers have let go, and that follows the arm all the same."""
+    """Warn of a frame that the fingers have released, and that follows the arm all the same."""
     released = state.table.hands[arm].left
     if released is None:
         return

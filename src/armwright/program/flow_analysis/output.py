@@ -9,7 +9,7 @@ from armwright.program.syntax import tree
 
 
 def print_(state: FlowState, node: tree.Print) -> None:
-    """Look at what one PRINT needs."""
+    """Check what one PRINT needs."""
     need(state, *(item for item in node.items if not isinstance(item, tree.String)))
 
 

@@ -1,4 +1,4 @@
-"""Lengths that cannot be meant: places in another unit than the program counts in, hands far from what they take."""
+"""Lengths that cannot be meant: poses in another unit than the program counts in, hands far from what they take."""
 
 import math
 from collections.abc import Iterator
@@ -11,16 +11,16 @@ from armwright.program.language.units import convert
 from armwright.program.syntax import tree
 
 _UNITS = {"M": "metres", "MM": "millimetres", "CM": "centimetres", "IN": "inches"}
-# A place, or a step, this many times longer than an arm reaches is out of every robot's world.
+# A pose, or a step, this many times longer than an arm reaches is out of every robot's world.
 _FAR = 50.0
-# A place nearer to WORLD than this part of the reach that would be one in metres was typed in metres.
+# A pose nearer to WORLD than this part of the reach that would be one in metres was typed in metres.
 _NEAR, _LEAST, _MOST = 0.02, 0.05, 3.0
 # No hand holds what is so far from it [m].
 _AWAY = 0.2
 
 
 def placed(state: FlowState, frame: str, value: tree.Expression) -> None:
-    """Warn of a frame that is given a place that cannot be meant, so near to WORLD."""
+    """Warn of a frame that is given a pose that cannot be meant, so near to WORLD."""
     reach = state.cell.reach if state.cell else None
     pose = None if is_any(frame) else state.table.where(frame)
     units = state.symbols.units
@@ -38,7 +38,7 @@ def placed(state: FlowState, frame: str, value: tree.Expression) -> None:
 
 
 def lengths(state: FlowState, *nodes: tree.Expression | None) -> None:
-    """Warn of places and steps that lead out of every robot's world."""
+    """Warn of poses and steps that lead out of every robot's world."""
     reach = state.cell.reach if state.cell else None
     units = state.symbols.units
     if reach is None:
@@ -91,7 +91,7 @@ def _length(metres: float) -> str:
 
 
 def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
-    """Warn of a frame that is hung on a hand which has closed at quite another place."""
+    """Warn of a frame that is hung on a gripper which has closed at quite another pose."""
     table = state.table
     if not is_arm(arm) or is_any(child) or table.grips[arm] is None:
         return

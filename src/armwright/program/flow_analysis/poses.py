@@ -1,6 +1,6 @@
 """Where frames stand and how long steps are, as far as the text of a program says so.
 
-A place is twelve numbers, columns n, o, a, p, in metres.
+A pose is twelve numbers, columns n, o, a, p, in metres.
 """
 
 import math
@@ -22,7 +22,7 @@ _NUMBERS = 12
 
 
 def after(first: Pose, step: Pose) -> Pose:
-    """Return the place at a step from another."""
+    """Return the pose at a step from another."""
     turned = [
         sum(first[3 * k + row] * step[3 * column + k] for k in range(3)) for column in range(4) for row in range(3)
     ]
@@ -37,7 +37,7 @@ def inverse(pose: Pose) -> Pose:
 
 
 def certain(state: "FlowState", node: tree.Expression) -> Pose | None:
-    """Return the place or step that an expression gives; None where that is not certain."""
+    """Return the pose or step that an expression gives; None where that is not certain."""
     if isinstance(node, tree.Binary):
         return _product(state, node)
     if isinstance(node, tree.Matrix):
@@ -87,7 +87,7 @@ def _function(state: "FlowState", node: tree.Function) -> Pose | None:
 
 
 def _turn(axis: int, angle: float) -> Pose:
-    """Return the turn about an axis by an angle [rad]."""
+    """Return the rotation about an axis by an angle [rad]."""
     pose = list(HERE)
     u, other = (axis + 1) % 3, (axis + 2) % 3
     pose[3 * u + u] = pose[3 * other + other] = math.cos(angle)

@@ -1,4 +1,4 @@
-"""What a part of a program may change, whichever way it goes: frames, values, arms.
+"""What a part of a program may change, on any path through it: frames, values, arms.
 
 Names are those of the text: a parameter or variable of a procedure stands with its procedure, ``FETCH.PART``.
 """
@@ -25,12 +25,12 @@ class SideEffects:
     """What may be changed.
 
     Attributes:
-        placed: frames that get another place by a value, by AFFIX ... AT or from the camera.
+        placed: frames that get another pose by a value, by AFFIX ... AT or from the camera.
         hung: frames that AFFIX or UNFIX hangs elsewhere.
         moved: frames that MOVE moves; an AFFIX may be implied.
         values: numbers and steps.
-        arms: used in any way; ``*`` for an arm that is not named.
-        grasps: whether a hand may close on something.
+        arms: used at all; ``*`` for an arm that is not named.
+        grasps: whether a gripper may close on something.
         everything: whether it may be anything.
         halts: whether HALT may end it.
         retries: whether RETRY may run a TRY part around it again.
@@ -101,7 +101,7 @@ class Writing:
     """What each statement of a program may change, found out once."""
 
     def __init__(self, program: tree.Program, symbols: Symbols) -> None:
-        """Look at the procedures."""
+        """Check the procedures."""
         self._symbols = symbols
         self._known: dict[int, SideEffects] = {}
         self._procedures: dict[str, SideEffects] = {}

@@ -45,7 +45,7 @@ class Use:
     Attributes:
         span: the statement.
         moves: whether it moves the arm.
-        hung: where the frame was hung on the arm that the statement moves in place of it.
+        hung: where the frame was hung on the arm that the statement moves instead of it.
     """
 
     span: Span
@@ -79,9 +79,9 @@ class FlowState:
 
     Attributes:
         first: whether this is the first pass of a loop that has others: what is not certain to run is passed over.
-        over: whether HALT has ended the way that is being followed.
+        over: whether HALT has ended the path that is being followed.
         ended: the HALT or RETRY that did.
-        conditions: in how many parts that may not be done the place lies that is being followed.
+        conditions: in how many parts that may not be done the statement lies that is being followed.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class FlowState:
 
     @property
     def arms(self) -> dict[int, str]:
-        """The arms of MOVEs and GRASPs that are the same on every way through them, by where they start."""
+        """The arms of MOVEs and GRASPs that are the same on every path through them, by where they start."""
         return {start: arm for start, arm in self._arms.items() if arm is not None}
 
     @property
@@ -133,7 +133,7 @@ class FlowState:
         return frozenset(start for start, always in self._implied.items() if always)
 
     def record(self, statement: tree.Move | tree.Grasp, arm: str | None, *, implied: bool = False) -> None:
-        """Take note of the arm of a statement on this way through it; None where it is unknown."""
+        """Take note of the arm of a statement on this path through it; None where it is unknown."""
         if not self.first:
             start = statement.span.start
             self._arms[start] = arm if self._arms.get(start, arm) == arm else None
@@ -228,10 +228,10 @@ class FlowState:
         value = 0.0 if known is None else known[0]
         return int(value) if value.is_integer() and 1 <= value <= size else None
 
-    # ---- what is said of the way ------------------------------------------------------------------------------------
+    # ---- what is said of the path ------------------------------------------------------------------------------------
 
     def unreached(self, span: Span) -> None:
-        """Point at a statement that no way leads to."""
+        """Point at a statement that no path leads to."""
         if self.ended is None:
             return
         self.say(
@@ -255,7 +255,7 @@ class FlowState:
                 self.look_up(arm, node.span)
 
     def use(self, arm: str, span: Span, *, moves: bool = False, hung: tuple[Label, ...] = ()) -> None:
-        """Take note that an arm is set to work; ``hung`` tells why it is this one."""
+        """Take note that an arm is set to work; ``hung`` states why it is this one."""
         self.last.put(LAST, arm)
         for branch in self.branches:
             site = self.calls[branch.depth].span if len(self.calls) > branch.depth else span
@@ -277,13 +277,13 @@ class FlowState:
     # ---- forgetting ------------------------------------------------------------------------------------------------
 
     def parting(self, span: Span, says: str, advice: str) -> Divergence:
-        """Return what parts the ways here; see ``Divergence``."""
+        """Return what parts the paths here; see ``Divergence``."""
         return Divergence(span, self.conditions, says, advice)
 
     def forget_undone(self, writes: SideEffects, parting: Divergence | None = None) -> None:
         """Give up what a part of the program may change that is perhaps not done to its end.
 
-        What had no value before may have one then, or none: there the ways part.
+        What had no value before may have one then, or none: there the paths part.
         """
         names = writes.values | writes.placed | writes.hung
         lacking = [name for name in self.kept(names) if not is_any(name) and not self.table.valued[name]]
@@ -362,7 +362,7 @@ class FlowState:
         notes: tuple[str, ...] = (),
         helps: tuple[str, ...] = (),
     ) -> None:
-        """Say something once of each place; of a place in a procedure, with the calls that lead there."""
+        """Say something once of each statement; of one in a procedure, with the calls that lead there."""
         if (code, span) in self._said:
             return
         self._said.add((code, span))

@@ -1,4 +1,4 @@
-"""How a program is laid out: a walk over its tree tells which words begin a row, and how far each is indented."""
+"""How a program is laid out: a walk over its tree states which words begin a row, and how far each is indented."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from armwright.program.syntax.lexer import TokenKind
 LEVEL, GOES_ON, CLAUSE = 2, 4, 5
 _DECLARED = 4
 
-# What has rows of its own, and so no place within a row.
+# What has rows of its own, and so no pose within a row.
 _LARGE = (tree.Block, tree.If, tree.While, tree.For, tree.Repeat, tree.Cobegin, tree.Try, tree.Lock, tree.Move)
 _NOTHING_BEFORE = frozenset((",", ")", "]", "."))
 
@@ -90,8 +90,8 @@ class _Layout:
     """One walk over a tree.
 
     Attributes:
-        rows: by the place of the first word of each.
-        clauses: by the place of the first word of each clause of a MOVE, whether it is the first.
+        rows: by the pose of the first word of each.
+        clauses: by the pose of the first word of each clause of a MOVE, whether it is the first.
     """
 
     def __init__(self, pieces: Sequence[Piece], width: int) -> None:
@@ -117,7 +117,7 @@ class _Layout:
         return row
 
     def _before(self, start: int) -> Piece:
-        """Return the piece in front of the one at a place."""
+        """Return the piece in front of the one at a pose."""
         return self._pieces[self._at[start] - 1]
 
     def program(self, node: tree.Program) -> None:
@@ -214,7 +214,7 @@ class _Layout:
                 self._block(block, column)
 
     def _is_small(self, start: int, block: tree.Block, column: int) -> bool:
-        """Whether a clause that begins at a place and ends with a block fits into a row, and holds nothing large."""
+        """Whether a clause that begins at a pose and ends with a block fits into a row, and holds nothing large."""
         pieces = self._pieces[self._at[start] : self._at[block.end.start] + 1]
         if any(isinstance(statement, _LARGE) for statement in block.statements) or any(
             piece.comments for piece in pieces[1:]

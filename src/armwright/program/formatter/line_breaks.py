@@ -1,4 +1,4 @@
-"""From rows to lines: comments in their places, and rows that are too long broken where it hurts least."""
+"""From rows to lines: comments in their poses, and rows that are too long broken where it hurts least."""
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
@@ -15,7 +15,7 @@ def lines_of(rows: Iterable[Row], width: int) -> list[str]:
 
     Args:
         rows: in order, the last being its end.
-        width: how long a line may be, if there is a place where it can end; comments may stand out.
+        width: how long a line may be, if there is a pose where it can end; comments may stand out.
     """
     page = _Page(width)
     for row in rows:

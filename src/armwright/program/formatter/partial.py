@@ -27,7 +27,7 @@ def formatted_around(source: Source, *, std: Standard = Standard.RLO_2, width: i
         width: how long a line may be [characters].
 
     Raises:
-        UnformattableError: nothing of it can be laid out; the text tells what is wrong first.
+        UnformattableError: nothing of it can be laid out; the text states what is wrong first.
     """
     try:
         return formatted(source, std=std, width=width)

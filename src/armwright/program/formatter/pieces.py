@@ -54,7 +54,7 @@ class Piece:
         text: as it shall be written.
         word: the text of a keyword or sign; empty for names, numbers, texts and comments.
         kind: of the token; None for a comment.
-        start: its place in the text as it was.
+        start: its pose in the text as it was.
         breaks: how many lines end between what is in front of it and itself.
         comments: what stands in front of it.
         blank: whether a blank comes in front of it.
@@ -142,11 +142,11 @@ class _Gaps:
         self._far = len(text) + 1
 
     def is_plain(self, stop: int) -> bool:
-        """Whether no comment stands between here and a place."""
+        """Whether no comment stands between here and a pose."""
         return self._next >= len(self._comments) or self._comments[self._next].start >= stop
 
     def read(self, stop: int) -> tuple[list[Comment], int]:
-        """Return the comments up to a place, and how many lines end behind the last."""
+        """Return the comments up to a pose, and how many lines end behind the last."""
         pieces_ = []
         while not self.is_plain(stop):
             span = self._comments[self._next]

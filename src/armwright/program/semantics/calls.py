@@ -102,7 +102,7 @@ class Calls:
 
 
 def _look(names: Names, argument: tree.Expression) -> None:
-    """Look at an argument of which nothing is known: an array may be whole."""
+    """Check an argument of which nothing is known: an array may be whole."""
     if isinstance(argument, tree.Name):
         names.type(argument)
     else:

@@ -28,7 +28,7 @@ def check(
     std: Standard = Standard.RLO_2,
     read_import: ReadImport | None = None,
 ) -> tuple[Symbols, list[Diagnostic], tuple[Imported, ...]]:
-    """Look at names, types, clauses and values.
+    """Check names, types, clauses and values.
 
     Args:
         program: as the parser gave it, errors of syntax included.

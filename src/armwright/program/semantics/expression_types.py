@@ -5,7 +5,7 @@ import enum
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.syntax import tree
 
-# A longer expression is not repeated in a message; its place is marked anyway.
+# A longer expression is not repeated in a message; its pose is marked anyway.
 _LONGEST_SHOWN = 32
 # In advice it is repeated up to here.
 _LONGEST_WRITTEN = 100

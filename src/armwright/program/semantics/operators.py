@@ -1,4 +1,4 @@
-"""What the operations make of numbers, conditions, places and steps."""
+"""What the operations make of numbers, conditions, poses and steps."""
 
 from collections.abc import Mapping
 

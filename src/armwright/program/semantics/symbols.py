@@ -39,7 +39,7 @@ class Symbols:
 
     Attributes:
         types: what each declared, predeclared or imported name stands for; None where that was reported as wrong.
-        declared: where each was declared; predeclared and imported names have no such place.
+        declared: where each was declared; predeclared and imported names have no such pose.
         procedures: by name.
         poisoned: names of which something has been said, so that they give no second message.
         units: what bare numbers count.
@@ -86,7 +86,7 @@ class Scope:
         return local.types[key] if local is not None and key in local.types else self.symbols.types.get(key)
 
     def declared(self, key: str) -> tree.Name | None:
-        """Return where a name was declared; None where it has no such place."""
+        """Return where a name was declared; None where it has no such pose."""
         local = self.procedure
         table = local.declared if local is not None and key in local.types else self.symbols.declared
         return table.get(key)

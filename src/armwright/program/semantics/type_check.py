@@ -1,4 +1,4 @@
-"""The kinds of expressions: what each one is, and whether that is what its place needs."""
+"""The kinds of expressions: what each one is, and whether that is what its pose needs."""
 
 import math
 from collections.abc import Callable
@@ -63,7 +63,7 @@ def need(
     notes: tuple[str, ...] = (),
     helps: Callable[[ExpressionType], str] | None = None,
 ) -> bool:
-    """Say that an expression is not what its place needs; of a plain name nothing more is asked then.
+    """Say that an expression is not what its pose needs; of a plain name nothing more is asked then.
 
     Args:
         names: what is known, and for what is found.

@@ -41,7 +41,7 @@ def part(tokens: Tokens, wants: str, where: str, *ends: str) -> tree.Expression:
     Args:
         tokens: at the expression.
         wants: what is expected, in words.
-        where: the place in words.
+        where: the pose in words.
         ends: the words that may stand behind it.
 
     Raises:

@@ -11,10 +11,10 @@ class Expected:
         words: of the language, the likeliest first.
         operand: the value or name that is looked for, in the words of messages, and where; None where none is.
         starts: whether a statement or a part of the program starts here.
-        recovering: whether the place lies in the second part of a TRY.
-        given: the words of the clauses that a MOVE has in front of the place.
+        recovering: whether the pose lies in the second part of a TRY.
+        given: the words of the clauses that a MOVE has in front of the pose.
         target: the key of the variable that gets the value; empty where none does.
-        procedure: the key of the procedure around the place; empty in the program itself.
+        procedure: the key of the procedure around the pose; empty in the program itself.
     """
 
     words: list[str] = attrs.field(factory=list)

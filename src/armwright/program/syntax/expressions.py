@@ -42,7 +42,7 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
     Args:
         tokens: at its first token.
         wants: what is expected, in words.
-        where: the place in words, such as ``after TO``.
+        where: the pose in words, such as ``after TO``.
         lowest: how strongly its operations must hold together.
 
     Raises:
@@ -81,7 +81,7 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
 
 
 def _foreign(tokens: Tokens) -> bool:
-    """Put the sign that was meant in the place of one of another language."""
+    """Put the sign that was meant in the pose of one of another language."""
     token = tokens.now
     meant = FOREIGN[token.key]
     blank = " " if meant.isalpha() else ""
@@ -255,7 +255,7 @@ def listed(
         tokens: at the opening parenthesis.
         item: how to read one.
         wants: what one is, in words.
-        where: the place in words, such as ``after VIA``.
+        where: the pose in words, such as ``after VIA``.
         opening: what opens the list.
         empty: whether nothing is needed between them.
 

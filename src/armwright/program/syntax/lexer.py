@@ -96,7 +96,7 @@ _WITH_UNIT = re.compile(rf"({_DIGITS}){_UNIT}", re.VERBOSE)
 # Where a text that is not closed may have been meant to end.
 _AFTER_TEXT = re.compile(r"[ \t]*\)?[ \t]*;?[ \t]*\Z")
 
-# Characters of other keyboards that stand for one of the language; each takes one place, like the one it stands for.
+# Characters of other keyboards that stand for one of the language; each takes one pose, like the one it stands for.
 # Those of `"` and `}` are none: they may stand in a text or a comment without ending it.
 LOOK_ALIKES = {0xFF01 + i: chr(0x21 + i) for i in range(94) if chr(0x21 + i) not in '"}'} | {
     ord(other): meant
@@ -365,7 +365,7 @@ def _is_number(word: str) -> bool:
 
 
 def _stray(character: str, spans: list[Span], count: int) -> Diagnostic:
-    """Say once what a character is that does not belong to the language, and in how many places it stands."""
+    """Say once what a character is that does not belong to the language, and in how many poses it stands."""
     meant = LOOK_ALIKES.get(ord(character))
     shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
     more = f"it stands in {count} places" if count > 1 else ""

@@ -106,7 +106,7 @@ def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
 
 
 def _meant(tokens: Tokens, token: Token) -> bool:
-    """Put the clause word that a misspelt one was meant to be in its place; whether there is one."""
+    """Put the clause word that a misspelt one was meant to be in its pose; whether there is one."""
     near = closest(token.text, tokens.words.clauses)
     tokens.found.say(
         "E108",

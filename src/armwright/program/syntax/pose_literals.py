@@ -1,4 +1,4 @@
-"""Twelve numbers as a place: whether they are one, and what was probably meant where they are not."""
+"""Twelve numbers as a pose: whether they are one, and what was probably meant where they are not."""
 
 import math
 from collections.abc import Sequence

@@ -28,7 +28,7 @@ def joined(
         declared: names of variables that were declared before this text.
 
     Returns:
-        The tokens with one in the place of each pair, and what was found.
+        The tokens with one in the pose of each pair, and what was found.
     """
     pairs = [
         index for index in range(1, len(tokens)) if tokens[index].kind is _NUMBER and _is_pair(source, tokens, index)

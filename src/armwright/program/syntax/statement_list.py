@@ -109,7 +109,7 @@ def _misspelt_end(tokens: Tokens) -> bool:
 
 
 def misspelt(tokens: Tokens, near: str) -> None:
-    """Say that a word is misspelt, and put the one that was meant in its place."""
+    """Say that a word is misspelt, and put the one that was meant in its pose."""
     token = tokens.now
     helps = (f"did you mean `{near}`?",)
     tokens.found.say("E105", f"unknown statement `{token.text}`", token.span, "not a statement", helps=helps)
@@ -246,7 +246,7 @@ def salvaged(tokens: Tokens, read: Callable[[Tokens], _Read]) -> _Read | None:
 
 
 def close(tokens: Tokens, key: str, opening: Token) -> Span | None:
-    """Read the word that ends what ``opening`` opened; None when it is missing, which is said once for one place."""
+    """Read the word that ends what ``opening`` opened; None when it is missing, which is said once for one pose."""
     token = tokens.now
     if tokens.sees(key):
         point = tokens.ahead()

@@ -30,7 +30,7 @@ class TooDeepError(LostError):
 
 
 class Tokens:
-    """The tokens of a program, the place the parser has come to, and what it has found.
+    """The tokens of a program, the pose the parser has come to, and what it has found.
 
     Attributes:
         source: the text.
@@ -43,17 +43,17 @@ class Tokens:
         at: how many tokens have been read.
         now: the token to be read next.
         before: the token read last; the first one where none has been read.
-        depth: how deep the place lies in statements, parentheses and operations.
+        depth: how deep the pose lies in statements, parentheses and operations.
         statement_depth: how deep the statement lies that was begun last.
         height: how deep the expression is that was read last.
-        waiting: the words that the open statements around the place wait for, the innermost last.
+        waiting: the words that the open statements around the pose wait for, the innermost last.
         deep: where the outermost statement was last found to be too deep; -1 if it was not.
         late: headers that stand behind BEGIN.
         declared: the names declared so far.
         procedures: the names of the procedures read so far.
         missed: the words whose absence has been reported.
-        in_procedure: the key of the procedure that the place lies in; empty outside of all.
-        recovering: how many TRYs the place lies in the second part of.
+        in_procedure: the key of the procedure that the pose lies in; empty outside of all.
+        recovering: how many TRYs the pose lies in the second part of.
         target: the key of the variable that the statement gives a value; empty where it gives none.
         asked: what the expression is for that is being read, in the words of messages, and where.
         expected: what may stand at the end of the text, where somebody asks for that.
@@ -136,7 +136,7 @@ class Tokens:
         return token.key in keys and (token.kind is _SYMBOL or token.kind is _KEYWORD)
 
     def sees_word(self, *keys: str) -> bool:
-        """Whether the next token is a name that reads so: a word with a meaning in this place only."""
+        """Whether the next token is a name that reads so: a word with a meaning in this pose only."""
         return self.now.kind is _NAME and self.now.key in keys
 
     def accept(self, *keys: str) -> Token | None:
@@ -179,7 +179,7 @@ class Tokens:
         return True
 
     def replace(self, key: str) -> None:
-        """Put the keyword that was meant in the place of the next token, which has been reported."""
+        """Put the keyword that was meant in the pose of the next token, which has been reported."""
         token = self.now
         self.now = Token(_KEYWORD, token.text, key, token.start, token.end, damaged=True)
         self.tokens[self.at] = self.now
@@ -199,17 +199,17 @@ class Tokens:
         return self._next_begin if self._next_begin < self._last else -1
 
     def more_ends(self) -> bool:
-        """Whether more ENDs follow than the statements around this place and those further on wait for."""
+        """Whether more ENDs follow than the statements around this pose and those further on wait for."""
         if self._to_close is None:
             steps = [(token.key == "END") - (token.key in ("BEGIN", "TRY")) for token in reversed(self.tokens)]
             self._to_close = list(accumulate(steps))[::-1]
         waiting = sum("END" in words or "RECOVER" in words for words in self.waiting)
         return self._to_close[self.at] > waiting
 
-    # ---- places
+    # ---- poses
 
     def gap(self) -> Span:
-        """Return the place right behind the token read last, where a missing thing belongs."""
+        """Return the pose right behind the token read last, where a missing thing belongs."""
         end = self.before.end if self.at else self.now.start
         return Span(end, end)
 
@@ -257,12 +257,12 @@ class Tokens:
 
     @property
     def silent(self) -> bool:
-        """Whether something has been said about this place already."""
+        """Whether something has been said about this pose already."""
         broken_text = self.before.damaged and self.before.kind is TokenKind.STRING
         return self.now.damaged or self._silent == self.at or broken_text
 
     def hush(self) -> None:
-        """Take this place for one about which something has been said."""
+        """Take this pose for one about which something has been said."""
         self._silent = self.at
 
     def say_once(
@@ -277,7 +277,7 @@ class Tokens:
         helps: tuple[str, ...] = (),
         fixes: tuple[Fix, ...] = (),
     ) -> None:
-        """Add an error, unless something has been said about this place; the arguments are those of ``Diagnostic``."""
+        """Add an error, unless something has been said about this pose; the arguments are those of ``Diagnostic``."""
         if not self.silent:
             self.found.say(code, message, span, label, secondary=secondary, notes=notes, helps=helps, fixes=fixes)
         self._silent = self.at
@@ -288,7 +288,7 @@ class Tokens:
         Raises:
             LostError: always.
         """
-        # At the end of the text there is nothing to mark; the gap before it is the place.
+        # At the end of the text there is nothing to mark; the gap before it is the pose.
         span = self.gap() if self.done else self.now.span
         self.say_once(code, message, span, label, helps=helps)
         raise LostError
@@ -300,7 +300,7 @@ class Tokens:
 
         Args:
             key: what is missing.
-            what: the place in words.
+            what: the pose in words.
             code: of the diagnostic.
             helps: of the diagnostic.
             alone: whether nothing else is missing, so that putting it in is a cure.
@@ -315,7 +315,7 @@ class Tokens:
 
         Args:
             key: a keyword or symbol.
-            where: the place in words, such as ``after the name``.
+            where: the pose in words, such as ``after the name``.
             statement: whether statements follow.
 
         Raises:

@@ -1,4 +1,4 @@
-"""Arms that are stopped on their way: within their limits, along their paths, and what they press on meanwhile."""
+"""Arms that are stopped on their path: within their limits, along their paths, and what they press on meanwhile."""
 
 import math
 from collections.abc import Sequence
@@ -27,9 +27,9 @@ _SLOWEST = 1.0
 
 
 def stop(machine: Machine, process: Process, span: Span) -> int:
-    """Stop the arm of a process in a controlled way; return when it is at rest [ticks].
+    """Stop the arm of a process under control; return when it is at rest [ticks].
 
-    The frame table holds the place where it comes to rest from now on. An arm that is being stopped already is left to
+    The frame table holds the pose where it comes to rest from now on. An arm that is being stopped already is left to
     it.
     """
     motion, period = process.motion, machine.cell.period
@@ -78,20 +78,20 @@ def _begin(machine: Machine, motion: Motion, trajectory: Trajectory) -> Push:
 
 
 def send(machine: Machine, motion: Motion, trajectory: Trajectory) -> Push:
-    """Let the arm of a motion follow a trajectory in place of what it does now; return what will push on its hand."""
+    """Let the arm of a motion follow a trajectory instead of what it does now; return what will push on its hand."""
     machine.hardware.begin(motion.arm, trajectory, machine.now, motion.tip)
     return _pushed(machine, motion.arm)
 
 
 def _pushed(machine: Machine, arm: str) -> Push:
-    """Look at what pushes on the hand of an arm from now on, and remember it."""
+    """Check what pushes on the gripper of an arm from now on, and remember it."""
     push = Push(machine.now, machine.hardware.wrenches(arm, machine.now))
     machine.state.pushes[arm].append(push)
     return push
 
 
 def pushed_otherwise(machine: Machine, arm: str, records: Sequence[int]) -> None:
-    """Work out anew what the motors of an arm give from now on: what it pressed with may have been let go.
+    """Work out anew what the motors of an arm give from now on: what it pressed with may have been released.
 
     Args:
         machine: that runs the program.
@@ -150,7 +150,7 @@ def too_deep(machine: Machine, process: Process, motion: Motion) -> NoReturn:
     motion.alarm = None
     end = stop(machine, process, motion.span)
     note_contact(machine, motion, end)
-    # On its way to rest it may come deeper; that is said now.
+    # On its path to rest it may come deeper; that is said now.
     motion.alarm = None
     allowed = machine.cell.contact.deepest
     least = _least_depth(machine, motion)

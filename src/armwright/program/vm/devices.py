@@ -33,7 +33,7 @@ def _gripper(machine: Machine, process: Process, step: Instruction) -> None:
     time = machine.hardware.fingers(arm, closed=closed, width=metres)
     pushed_otherwise(machine, arm, [motion.record for motion in motions if motion.record >= 0])
     for motion in motions:
-        # What is let go does not press any more.
+        # What is released does not press any more.
         look_out(machine, motion)
     text = f"{arm} {step.op}" + (f" TO {width:g}" if width is not None else "")
     machine.take_time(

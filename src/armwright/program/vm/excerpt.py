@@ -30,7 +30,7 @@ class Excerpt(NamedTuple, Generic[T]):
         return Excerpt([*map(show, self.first)], [*map(show, self.last)], self.left_out)
 
     def joined(self, *others: T) -> list[T]:
-        """Return the items, with ``rest`` in place of those that are left out."""
+        """Return the items, with ``rest`` instead of those that are left out."""
         return [*self.first, *(others if self.left_out else ()), *self.last]
 
 

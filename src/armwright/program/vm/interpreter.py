@@ -128,7 +128,7 @@ def _advance(machine: Machine, process: Process) -> None:
         last = machine.limits.time / machine.cell.period + _ON_A_TICK
         machine.state.ticks, machine.state.idle = process.due, 0
         if machine.state.ticks > last:
-            # The clock stops there, and arms that are on their way have come as far as that.
+            # The clock stops there, and moving arms have come as far as that.
             machine.state.ticks = max(0, math.floor(last))
             under_way = process.pending or process.motion or machine.code.instructions[process.at]
             text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"

@@ -78,7 +78,7 @@ class Limits:
 
 
 class Machine:
-    """A program on its way in a cell."""
+    """A program that runs in a cell."""
 
     def __init__(
         self,
@@ -183,7 +183,7 @@ class Machine:
         return float(value)
 
     def pose(self, process: Process, operand: Operand, step: Instruction) -> Array:
-        """Return the value of an operand that is a place or a step."""
+        """Return the value of an operand that is a pose or a step."""
         value = self.read(process, operand, step)
         assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
         return value
@@ -225,7 +225,7 @@ class Machine:
         return self.code.spelled(name)
 
     def place(self, process: Process, name: str, X: Array, span: Span) -> None:
-        """Give a frame another place.
+        """Give a frame another pose.
 
         Raises:
             RunError: it cannot be placed.
@@ -247,7 +247,7 @@ class Machine:
         self.grow(self.state.tree.place(arm, self.state.tree.world(base_name(arm)) @ X_BH), arm, span)
 
     def look(self, process: Process, name: str) -> None:
-        """Let the frame table know where a frame is now, if an arm that is on its way carries it."""
+        """Let the frame table know where a frame is now, if a moving arm carries it."""
         if name not in self.state.tree or not any(process.motion for process in self.state.processes):
             return
         arm = next((ancestor for ancestor in (name, *self.state.tree.ancestors(name)) if is_arm(ancestor)), None)
@@ -260,7 +260,7 @@ class Machine:
             self.state.tree = self.state.tree.place(arm, self.state.tree.world(base_name(arm)) @ X_BH)
 
     def grow(self, tree: FrameTree, name: str, span: Span) -> None:
-        """Take another frame tree, in which ``name`` got its place or its parent."""
+        """Take another frame tree, in which ``name`` got its pose or its parent."""
         self.state.tree = tree
         self.state.written[name] = span
         if len(self.state.trees) > 1 and self.state.trees[-1][0] == self.now:

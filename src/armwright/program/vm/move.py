@@ -28,9 +28,9 @@ from armwright.program.vm.process import Activation, EarlyEnd, Guard, Motion, Pr
 from armwright.program.vm.recording import Run, RunStage, efforts, peaks_of
 from armwright.spatial.poses import inverse
 
-# A place this many times farther than the arm reaches was probably typed in another unit.
+# A pose this many times farther than the arm reaches was probably typed in another unit.
 _OTHER_UNIT = 50.0
-# A hand that closed on a frame still stands at it when both are so near [m], and entries of rotations.
+# A gripper that closed on a frame still stands at it when both are so near [m], and entries of rotations.
 _SAME_PLACE = 1e-6
 # Planning a MOVE takes as long as so many steps of other kinds, whether it can be made or not.
 _STEPS_OF_A_MOVE = 1000
@@ -100,7 +100,7 @@ def go_on(machine: Machine, process: Process) -> None:
 
 
 def halt(machine: Machine, process: Process, step: Instruction) -> None:
-    """End the motion from inside an action: the arm stops in a controlled way, and the MOVE is over."""
+    """End the motion from inside an action: the arm stops under control, and the MOVE is over."""
     motion, action = process.motion, process.stack.pop()
     assert action.kind == "action"  # noqa: S101 - procedures that it called have been left
     release(machine, process, action.locks)
@@ -293,7 +293,7 @@ def _fail_move(
 
 
 def _other_unit(machine: Machine, process: Process, goal: Goal, arm: str) -> tuple[str, ...]:
-    """Say what lengths are counted in, where a place so far off can only be meant in another unit."""
+    """Say what lengths are counted in, where a pose so far off can only be meant in another unit."""
     X_BW = inverse(machine.state.tree.world(base_name(arm)))
     away = np.linalg.norm((X_BW @ _pose(machine, process, goal))[:3, 3])
     if away <= _OTHER_UNIT * machine.cell.arms[arm].arm.reach:
@@ -302,7 +302,7 @@ def _other_unit(machine: Machine, process: Process, goal: Goal, arm: str) -> tup
     return (f"`{goal.label}` is {away:.4g} m away: lengths in this program are {unit}",)
 
 
-# ---- on the way ----------------------------------------------------------------------------------------------------
+# ---- meanwhile ----------------------------------------------------------------------------------------------------
 
 
 def _start(machine: Machine, process: Process, motion: Motion) -> None:

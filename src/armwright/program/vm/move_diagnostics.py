@@ -1,4 +1,4 @@
-"""What stops a motion, and how it goes round, in the words of the program: places, causes, prices."""
+"""Obstacles of motions and their detours, in the words of the program: poses, causes, costs."""
 
 from collections.abc import Sequence
 

@@ -81,7 +81,7 @@ def _goal(machine: Machine, process: Process, operand: Operand, step: Instructio
 
 
 def _told_apart(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
-    """Return the goals with a label of its own for each, also where a program names two places alike."""
+    """Return the goals with a label of its own for each, also where a program names two poses alike."""
     operands: dict[str, Operand] = {}
     for several in goals.values():
         for index, goal in enumerate(several):

@@ -1,4 +1,4 @@
-"""What the operations on values do: numbers, truth values, places and steps."""
+"""What the operations on values do: numbers, truth values, poses and steps."""
 
 import math
 import operator
@@ -21,7 +21,7 @@ _ROUNDING = 1e-12
 
 
 class ValueFault(Exception):  # noqa: N818 - it never leaves the interpreter
-    """An operation has no value; the code of the diagnostic, its message and the word at the place."""
+    """An operation has no value; the code of the diagnostic, its message and the word at the location."""
 
     def __init__(self, code: str, message: str, label: str) -> None:
         """Keep what to say."""
@@ -46,7 +46,7 @@ def _number(value: float) -> float:
 
 
 def _near(X: Array) -> Array:
-    """Return a place or a step whose lengths are numbers of a robot."""
+    """Return a pose or a step whose lengths are numbers of a robot."""
     _number(float(np.abs(X[:3, 3]).max()))
     return X
 
@@ -55,7 +55,7 @@ def _turn(axis: int) -> Callable[[float, UnitSystem], Array]:
     first, second = (axis + 1) % 3, (axis + 2) % 3
 
     def turn(angle: float, units: UnitSystem) -> Array:
-        # Whole quarter turns are exact: 90 degrees leave no 6e-17 in a program's places.
+        # Whole quarter turns are exact: 90 degrees leave no 6e-17 in a program's poses.
         quarters = angle / (math.pi / 2 / units.radians)
         exact = {0: (1.0, 0.0), 1: (0.0, 1.0), 2: (-1.0, 0.0), 3: (0.0, -1.0)}
         is_quarter = quarters == round(quarters)
@@ -77,7 +77,7 @@ def _shift(x: float, y: float, z: float, units: UnitSystem) -> Array:
 def _distance(p: Array, q: Array) -> float:
     """Return how far two points are apart [m]: nothing, where rounding alone may have put them apart.
 
-    Where a hand stands is worked out through joints and frames some metres long, each of which rounds.
+    Where a gripper stands is worked out through joints and frames some metres long, each of which rounds.
     """
     apart = float(np.linalg.norm(p - q))
     scale = max(1.0, float(np.abs(p).max()), float(np.abs(q).max()))
@@ -85,7 +85,7 @@ def _distance(p: Array, q: Array) -> float:
 
 
 def matrix(numbers: Sequence[float], units: UnitSystem) -> Array:
-    """Return twelve numbers as a place, the rotation made exact where it nearly is one.
+    """Return twelve numbers as a pose, the rotation made exact where it nearly is one.
 
     Raises:
         ValueFault: the first nine are no rotation.

@@ -34,7 +34,7 @@ class Element:
     name: str
 
 
-# Numbers, truth values, places and steps (4, 4), elements.
+# Numbers, truth values, poses and steps (4, 4), elements.
 Value: TypeAlias = float | bool | Array | Element
 
 
@@ -96,13 +96,13 @@ class Activation:
 
 @attrs.define
 class Guard:
-    """``ON condition DO action`` of a motion under way.
+    """``ON condition DO action`` of a motion running.
 
     Attributes:
         condition: first instruction of the condition.
         truth: the value in passing that it leaves.
         action: first instruction of the action.
-        looks: whether the condition looks at places, and not only at forces and numbers.
+        looks: whether the condition checks poses, and not only at forces and numbers.
         done: whether the action has been begun.
     """
 
@@ -122,12 +122,12 @@ class EarlyEnd(enum.StrEnum):
 
 @attrs.define
 class Motion:
-    """A MOVE under way.
+    """A MOVE running.
 
     Attributes:
         arm: the arm that moves.
         moved: the frame that shall come to the goal; the arm itself or what hangs on it.
-        tip: (4, 4) that frame seen from the hand.
+        tip: (4, 4) that frame seen from the gripper.
         span: the statement.
         goal: the frame to come to, or the expression of it.
         implied: whether what is moved hangs on the arm only since this MOVE.
@@ -139,7 +139,7 @@ class Motion:
         since: when the present stage began [ticks].
         until: when it will end [ticks].
         guards: to be looked at on every tick.
-        hands: (k, 4, 4) poses of the hand in the world on the ticks of the present stage, for guards that look.
+        hands: (k, 4, 4) poses of the gripper in the world on the ticks of the present stage, for guards that look.
         record: number of the present stage among those recorded.
         rest: when the arm is at rest [ticks], once it is being stopped; None before.
         alarm: when the arm presses deeper than the cell allows [ticks], if it goes on as it does; None if it does not.
@@ -218,7 +218,7 @@ class Pending:
         since: when it began.
         span: the statement.
         arm: the arm that does it, or None.
-        place: a frame that gets a place then, and the place.
+        place: a frame that gets a pose then, and the pose.
         data: further facts for the events.
     """
 
@@ -236,7 +236,7 @@ class Process:
     """One thread of a program.
 
     Attributes:
-        path: its place among the branches of the text: ``()`` for the program, ``(1,)`` for the second branch.
+        path: its position among the branches of the text: ``()`` for the program, ``(1,)`` for the second branch.
         priority: served first when larger.
         at: the next instruction.
         wake: when it goes on [ticks].
@@ -244,7 +244,7 @@ class Process:
         parent: the process that began it.
         waiting: why it does not go on; None when only the clock holds it.
         unmet: the event or the locks that it has not got yet, also while it is about to look again.
-        motion: the MOVE under way.
+        motion: the MOVE running.
         pending: what takes effect at ``wake``.
         last_arm: named or moved last.
         locks: the variables it has locked, in the order of taking.

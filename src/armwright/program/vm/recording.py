@@ -1,4 +1,4 @@
-"""What a run leaves: every effect with its place in the program, every stage, every servo tick of every arm."""
+"""What a run leaves: every effect with its location in the program, every stage, every servo tick of every arm."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -85,10 +85,11 @@ class RunStage:
         stage: as it was planned, with what was found about its path.
         motion: of the joints as it was run: all of the plan, or as far as it came before it was stopped, and its stop.
             A stop keeps to the path of the plan, so the path deviation of the plan holds for it too.
-        length: of the way that the hand went [m].
-        peak_effort: (n,) largest efforts on the servo ticks of that motion, with what pushes on the hand [N m] or [N].
+        length: of the path that the gripper went [m].
+        peak_effort: (n,) largest efforts on the servo ticks of that motion, with what pushes on the gripper [N m] or
+            [N].
         peak_time: (n,) when, since it began [s].
-        stopped: whether it was stopped on its way.
+        stopped: whether it was stopped on its path.
     """
 
     t0: float
@@ -158,7 +159,7 @@ class Stream:
         q: (N, n) joint positions [rad] or [m].
         qd: (N, n) speeds.
         qdd: (N, n) accelerations; at a tick where they jump, those just after it.
-        tau: (N, n) efforts by inverse dynamics, drives and what pushes on the hand included [N m] or [N].
+        tau: (N, n) efforts by inverse dynamics, drives and what pushes on the gripper included [N m] or [N].
     """
 
     arm: str
@@ -198,7 +199,7 @@ class Recording:
         streams: one per arm.
         trees: the frame tree at the start and after each change, with the time of the change [s]; of very many
             changes the last in every two-thousandth of the run.
-        postures: by arm, the posture (n,) at the end.
+        postures: by arm, the configuration (n,) at the end.
         failure: why it did not come to its end; None where it did.
     """
 
@@ -260,7 +261,7 @@ def stream(
 
     Args:
         name: of the arm in the cell.
-        cell_arm: its model, and its posture at the start.
+        cell_arm: its model, and its configuration at the start.
         runs: in order; the arm rests between.
         pushes: in order; each counts until the next.
         duration: of the whole run [s].
@@ -299,7 +300,7 @@ def efforts(arm: Arm, trajectory: Trajectory, period: float, push: Push, ticks: 
         arm: that follows it.
         trajectory: on whole servo periods.
         period: of the servo [s].
-        push: what pushes on the hand from the start of it on.
+        push: what pushes on the gripper from the start of it on.
         ticks: how far; to its end when left out.
     """
     ticks = round(trajectory.duration / period) if ticks is None else ticks

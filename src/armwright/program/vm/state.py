@@ -16,7 +16,7 @@ from armwright.program.vm.recording import Effect, Push, Run, RunStage
 
 @attrs.define
 class Hand:
-    """The fingers of an arm: at which frame the hand arrived last, and what they closed on."""
+    """The fingers of an arm: at which frame the gripper arrived last, and what they closed on."""
 
     at: str | None = None
     holds: str | None = None
@@ -32,7 +32,7 @@ class MachineState:
     """All that changes while a program runs: one value that can be copied, so that a run can be gone back in.
 
     Attributes:
-        types: what each variable holds, those of procedures on their way included.
+        types: what each variable holds, those of running procedures included.
         tree: where frames are, and what they hang on.
         values: of variables that are no frames.
         events: how often each was signalled and not yet waited for.
@@ -44,7 +44,7 @@ class MachineState:
         activations: procedures called so far.
         begun: what takes time and was begun so far.
         over: whether the program has ended.
-        written: where each frame last got its place or its parent.
+        written: where each frame last got its pose or its parent.
         effects: what happened.
         stages: of motions begun so far.
         runs: trajectories of each arm.
@@ -123,7 +123,7 @@ class MachineState:
         )
 
     def _all_processes(self) -> dict[int, Process]:
-        """Return every process that is known in some way, by its id."""
+        """Return every process that is known, by its id."""
         processes: dict[int, Process] = {}
         waiting = [self.program, *self.processes, *self.locks.values()]
         waiting += [process for owners in self.owners.values() for process in owners]

@@ -11,10 +11,10 @@ _ROUNDING = 1e-12
 
 
 def shown(value: Value, units: UnitSystem) -> str:
-    """Return a value for people: numbers to six digits, places with lengths in the units of the program.
+    """Return a value for people: numbers to six digits, poses with lengths in the units of the program.
 
     Args:
-        value: a number, a truth value, a place or a step.
+        value: a number, a truth value, a pose or a step.
         units: of the program.
     """
     if isinstance(value, bool):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @attrs.frozen
 class Directly:
-    """The shortest way for the joints."""
+    """The shortest path for the joints."""
 
     span: Span
 

@@ -26,7 +26,7 @@ def walk(node: object) -> Iterator[object]:
 def dump(node: object) -> Iterator[str]:
     """Return a tree as lines of text, two blanks per level, leaves on the line of their parent.
 
-    A sum of ten thousand terms is that deep: beyond a hundred levels the blanks stay as they are, and a number tells
+    A sum of ten thousand terms is that deep: beyond a hundred levels the blanks stay as they are, and a number states
     the level.
     """
     waiting: list[tuple[object, int, str]] = [(node, 0, "")]
