@@ -8,7 +8,7 @@ import subprocess
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from armwright.cli.app import main
@@ -19,7 +19,11 @@ _FOR_DEVELOPERS = (DeprecationWarning, PendingDeprecationWarning, ImportWarning,
 
 
 def armwright(
-    *arguments: str | Path, columns: int = 80, cwd: Path | None = None, fed: str = ""
+    *arguments: str | Path,
+    columns: int = 80,
+    cwd: Path | None = None,
+    fed: str | bytes = "",
+    environment: Mapping[str, str] | None = None,
 ) -> subprocess.CompletedProcess[str]:
     """Call it within this process, as in a terminal of that width that nobody watches: no interpreter has to start.
 
@@ -28,10 +32,11 @@ def armwright(
         columns: of the terminal.
         cwd: the folder in which it is called.
         fed: its standard input.
+        environment: variables to set for it.
     """
     command = [str(argument) for argument in arguments]
     output, errors = (io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", "") for _ in range(2))
-    with _as_started(["armwright", *command], columns, cwd), _streams(fed, output, errors):
+    with _as_started(["armwright", *command], columns, cwd, environment or {}), _streams(fed, output, errors):
         status = _status()
     return subprocess.CompletedProcess(command, status, _text(output), _text(errors))
 
@@ -79,12 +84,12 @@ def _status() -> int:
 
 
 @contextlib.contextmanager
-def _as_started(argv: list[str], columns: int, cwd: Path | None) -> Iterator[None]:
+def _as_started(argv: list[str], columns: int, cwd: Path | None, environment: Mapping[str, str]) -> Iterator[None]:
     """Let this process look like one that has just started, and put everything back afterwards."""
     before = sys.argv, dict(os.environ), Path.cwd(), warnings.showwarning
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     sys.argv = argv
-    os.environ |= {"COLUMNS": str(columns), "NO_COLOR": "1"}
+    os.environ |= {"COLUMNS": str(columns), "NO_COLOR": "1", **environment}
     os.chdir(cwd or before[2])
     inputs.forget()
     try:
@@ -103,9 +108,10 @@ def _as_started(argv: list[str], columns: int, cwd: Path | None) -> Iterator[Non
 
 
 @contextlib.contextmanager
-def _streams(fed: str, output: io.TextIOWrapper, errors: io.TextIOWrapper) -> Iterator[None]:
+def _streams(fed: str | bytes, output: io.TextIOWrapper, errors: io.TextIOWrapper) -> Iterator[None]:
     before = sys.stdin, sys.stdout, sys.stderr
-    sys.stdin, sys.stdout, sys.stderr = io.TextIOWrapper(io.BytesIO(fed.encode()), "utf-8"), output, errors
+    typed = io.BytesIO(fed.encode() if isinstance(fed, str) else fed)
+    sys.stdin, sys.stdout, sys.stderr = io.TextIOWrapper(typed, "utf-8"), output, errors
     try:
         yield
     finally:

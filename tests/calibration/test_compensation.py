@@ -33,7 +33,7 @@ def test_places(rng: np.random.Generator) -> None:
     """Sent to compensated positions, the true arm is where it should be but for the noise; sent as said, it is not."""
     chain, errors = bent(rng)
     q = configurations(rng, chain.arm, 120)
-    found = calibrate_nongeometric(chain.arm, readings(q, seen(chain, q, errors, NOISE, rng)))
+    found = calibrate_nongeometric(chain.arm, readings(q, seen(chain, q, errors, NOISE, rng)), folds=3)
     near = configurations(rng, chain.arm, 10)
     goals = chain_of(chain.arm).forward(near).position
 

@@ -107,7 +107,7 @@ def test_as_many_as_asked_for() -> None:
     assert len(plan_poses(load_arm("ntu-3r"), 450).q) == 450
 
 
-@pytest.mark.share(0.04)
+@pytest.mark.share(0.02)
 @pytest.mark.parametrize(
     ("name", "fewest"), [("puma560", 10), ("puma560-seed", 10), ("ur5", 12), ("stanford", 10), ("ntu-3r", 8)]
 )

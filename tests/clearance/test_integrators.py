@@ -118,7 +118,7 @@ def test_located_impacts_in_parted_steps() -> None:
     settings = Settings(sample=path.duration / 20, located=True)
     runs = [
         simulate(prepare(linkage, start, attrs.evolve(settings, step=path.duration / n)), clearances)
-        for n in (25760, 103040)
+        for n in (12880, 51520)
     ]
 
     np.testing.assert_allclose(runs[0].error, runs[1].error, rtol=0, atol=1e-9)

@@ -31,15 +31,7 @@ def offered(*words: str, cwd: Path | None = None) -> list[str]:
         "COMP_WORDS": " ".join(["armwright", *words]),
         "COMP_CWORD": str(len(words)),
     }
-    done = subprocess.run(
-        [sys.executable, "-m", "armwright"],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=cwd,
-        env={**os.environ, **asked},
-        timeout=120,
-    )
+    done = armwright(cwd=cwd, environment=asked)
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout.split()
 

@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -77,23 +78,23 @@ def test_error_of_a_file_as_json() -> None:
     }
 
 
-def _fails(error: str, *, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-    """Call a command in which something arises."""
-    program = (
-        "import sys, armwright.cli.app as app, armwright.arm.load as load\n"
-        f"def broken(): raise {error}\n"
-        "load.arm_names = broken\n"
-        "sys.argv = ['armwright', 'arms']\n"
-        "app.main()\n"
-    )
-    return subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120, env=environment
-    )
+@pytest.fixture
+def fails(monkeypatch: pytest.MonkeyPatch) -> Callable[[Exception], subprocess.CompletedProcess[str]]:
+    """Return what calls a command in which an error arises."""
+
+    def called(error: Exception) -> subprocess.CompletedProcess[str]:
+        def broken() -> None:
+            raise error
+
+        monkeypatch.setattr("armwright.arm.load.arm_names", broken)
+        return armwright("arms")
+
+    return called
 
 
-def test_our_fault() -> None:
+def test_our_fault(fails: Callable[[Exception], subprocess.CompletedProcess[str]]) -> None:
     """What nobody foresaw ends with 70 and one sentence with the place and what to do, without a traceback."""
-    done = _fails("KeyError('q')")
+    done = fails(KeyError("q"))
 
     assert (done.returncode, done.stdout) == (ExitStatus.INTERNAL_ERROR, "")
     assert done.stderr.startswith("armwright: a defect of armwright, not of its inputs: KeyError: 'q' (in broken,")
@@ -104,18 +105,30 @@ def test_our_fault() -> None:
 @pytest.mark.parametrize(
     ("error", "status", "message"),
     [
-        ("EOFError('cut off')", 70, "EOFError: cut off"),
-        ("MemoryError()", 3, "this needs more memory than is available"),
-        ("OSError(28, 'No space left on device')", 4, "cannot write the output: No space left on device"),
-        ("PermissionError(13, 'Permission denied', 'a')", 4, "cannot read or write 'a': Permission denied"),
+        (EOFError("cut off"), 70, "EOFError: cut off"),
+        (MemoryError(), 3, "this needs more memory than is available"),
+        (PermissionError(13, "Permission denied", "a"), 4, "cannot read or write 'a': Permission denied"),
     ],
 )
-def test_errors_of_others(error: str, status: int, message: str) -> None:
+def test_errors_of_others(
+    fails: Callable[[Exception], subprocess.CompletedProcess[str]], error: Exception, status: int, message: str
+) -> None:
     """Errors of Python and of the machine end in one line, too."""
-    done = _fails(error)
+    done = fails(error)
 
     assert (done.returncode, len(done.stderr.splitlines())) == (status, 1)
     assert message in done.stderr
+
+
+def test_output_without_room() -> None:
+    """A standard output that takes no more is an error of the output."""
+    program = "import armwright.cli.app as app, sys; sys.argv = ['armwright', 'arms']; app.main()"
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", program], stdout=full, stderr=subprocess.PIPE, text=True, check=False, timeout=120
+        )
+
+    assert (done.returncode, done.stderr) == (4, "armwright: cannot write the output: No space left on device\n")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -175,8 +188,7 @@ def test_status_of_a_statement_that_cannot_be_done() -> None:
     """A statement without errors that cannot be done is no error of the text."""
     cell = Path(__file__).parents[2] / "examples" / "stanford_cell.toml"
     typed = "VAR far : FRAME ;\nfar = (1,0,0,0,-1,0,0,0,-1,9,0,0.2) ;\nMOVE ARM_1 TO far ;\n"
-    call = [sys.executable, "-m", "armwright", "repl", "--json", "--cell", str(cell)]
-    done = subprocess.run(call, input=typed, capture_output=True, text=True, check=False, timeout=120)
+    done = armwright("repl", "--json", "--cell", cell, fed=typed)
 
     assert done.returncode == ExitStatus.INFEASIBLE, done
     assert [json.loads(line)["exit_status"] for line in done.stdout.splitlines()] == [0, 0, 3]

@@ -1,7 +1,6 @@
 """The command ``armwright fmt``, as a user calls it."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +9,7 @@ import pytest
 
 from armwright.cli.source_files import read_source, write_back
 from armwright.errors import OutputError
-from cli_calls import fed_to
+from cli_calls import armwright, fed_to
 
 WRITTEN = "begin open arm-1 ; { now } grasp end.\n"
 LAID_OUT = "BEGIN\n  OPEN ARM_1 ;  { now }\n  GRASP\nEND.\n"
@@ -18,17 +17,9 @@ LAID_OUT = "BEGIN\n  OPEN ARM_1 ;  { now }\n  GRASP\nEND.\n"
 
 def fmt(
     *arguments: str | Path, typed: str | bytes = "", folder: Path | None = None
-) -> subprocess.CompletedProcess[bytes]:
+) -> subprocess.CompletedProcess[str]:
     """Call the command where nobody watches."""
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", "fmt", *map(str, arguments)],
-        capture_output=True,
-        input=typed.encode() if isinstance(typed, str) else typed,
-        check=False,
-        cwd=folder,
-        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "PYTHONUTF8": "1"},
-        timeout=300,
-    )
+    return armwright("fmt", *arguments, columns=100, cwd=folder, fed=typed)
 
 
 @pytest.fixture
@@ -44,8 +35,8 @@ def test_in_place(written: Path) -> None:
     first, second = fmt(written), fmt(written)
 
     assert written.read_text() == LAID_OUT
-    assert (first.returncode, first.stdout.decode()) == (0, f"formatted: {written}\n")
-    assert (second.returncode, second.stdout.decode()) == (0, f"unchanged: {written}\n")
+    assert (first.returncode, first.stdout) == (0, f"formatted: {written}\n")
+    assert (second.returncode, second.stdout) == (0, f"unchanged: {written}\n")
     assert [path.name for path in written.parent.iterdir()] == ["arm.rlo"]
 
 
@@ -64,7 +55,7 @@ def test_ends_of_lines(written: Path, mark: bytes, end: bytes) -> None:
 def test_check(written: Path) -> None:
     """With --check nothing is written, and the exit status tells whether something would have been."""
     result = fmt(written, "--check")
-    assert (result.returncode, result.stdout.decode()) == (5, f"would change: {written}\n")
+    assert (result.returncode, result.stdout) == (5, f"would change: {written}\n")
     assert written.read_text() == WRITTEN
 
     written.write_text(LAID_OUT)
@@ -76,7 +67,7 @@ def test_diff(written: Path) -> None:
     result = fmt(written, "--diff")
 
     assert result.returncode == 0
-    assert result.stdout.decode().splitlines() == [
+    assert result.stdout.splitlines() == [
         f"--- {written}",
         f"+++ {written} (changed)",
         "@@ -1,2 +1,5 @@",
@@ -91,7 +82,7 @@ def test_stdout_and_numbers(written: Path) -> None:
     """With --stdout the program is printed; lines are numbered if wanted."""
     result = fmt(written, "--stdout", "--numbers", "100")
 
-    assert result.stdout.decode().splitlines() == [
+    assert result.stdout.splitlines() == [
         "100  BEGIN",
         "200    OPEN ARM_1 ;  { now }",
         "300    GRASP",
@@ -102,7 +93,7 @@ def test_stdout_and_numbers(written: Path) -> None:
 
 def test_standard_input() -> None:
     """``-`` reads what is typed and prints it."""
-    assert fmt("-", typed=WRITTEN).stdout.decode() == LAID_OUT
+    assert fmt("-", typed=WRITTEN).stdout == LAID_OUT
     assert fmt("-", "--check", typed=WRITTEN).returncode == 5
     assert fmt("-", "--check", typed=LAID_OUT).returncode == 0
 
@@ -140,7 +131,7 @@ def test_standard_input_that_is_no_text() -> None:
 
     assert result.returncode == 4
     reason = "not UTF-8 text: byte 0xff has no meaning; save it as UTF-8"
-    assert result.stderr.decode() == f"armwright: standard input:2: {reason}\n"
+    assert result.stderr == f"armwright: standard input:2: {reason}\n"
 
 
 def test_wrong_program(written: Path) -> None:
@@ -150,7 +141,7 @@ def test_wrong_program(written: Path) -> None:
     result = fmt(wrong, missing, written)
 
     assert result.returncode == 4
-    first, second = result.stderr.decode().splitlines()
+    first, second = result.stderr.splitlines()
     assert first == f"armwright: {wrong}:2:6: cannot be laid out: missing `;` between two statements (E104)"
     assert second.startswith(f"armwright: {missing}: no such file")
     assert wrong.read_text() == "begin\ngrasp grasp\nend."
@@ -173,8 +164,8 @@ def test_old_standard(written: Path) -> None:
     """What is a name in RLO-83 is one only with --std=83."""
     written.write_text("var on : frame; begin read visions(ON) end.")
 
-    assert b"E107" in fmt(written).stderr
-    assert fmt(written, "--std", "83", "--stdout").stdout.decode().splitlines()[2] == "  READ VISIONS (on)"
+    assert "E107" in fmt(written).stderr
+    assert fmt(written, "--std", "83", "--stdout").stdout.splitlines()[2] == "  READ VISIONS (on)"
 
 
 def test_json(written: Path) -> None:
@@ -195,4 +186,4 @@ def test_help() -> None:
     result = fmt("--help")
 
     assert result.returncode == 0
-    assert "armwright fmt examples/peg.rlo --diff" in result.stdout.decode()
+    assert "armwright fmt examples/peg.rlo --diff" in result.stdout

@@ -5,7 +5,6 @@ import os
 import shutil
 import stat
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
@@ -18,11 +17,16 @@ import typer.main
 from armwright.cli.app import app
 from armwright.errors import ExitStatus
 from armwright.files.store import cache_folder
+from fork_server import fork_server
 from samples import Sample
 
 HERE = Path(__file__).parents[1]
 EXAMPLES = HERE.parent / "examples"
 Q = "10,-60,80,40,50,60"
+# What most commands need.
+LOADED = ("armwright.cli.app", "armwright.arm.load", "armwright.program.api", "armwright.cell.reader",
+          "armwright.program.vm.interpreter", "armwright.report.files", "armwright.motion.moves",
+          "armwright.clearance.reader", "armwright.compiled.arm", "rich.markdown")  # fmt: skip
 # By the words that call it: arguments with which a command does something small.
 CALLS: dict[str, list[str]] = {
     "": ["arms", "--json"],
@@ -152,33 +156,20 @@ def call(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Call]:
     # Whose home is another folder finds what is compiled all the same.
     cache = {"ARMWRIGHT_CACHE": str(cache_folder() or base / "cache")}
     settings = {**cache, "COLUMNS": "120", "NO_COLOR": "1", "OPENBLAS_NUM_THREADS": "1"}
-    server = subprocess.Popen(
-        [sys.executable, str(HERE / "cli_server.py")],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, **settings},
-    )
     folder = base / "around" / "here"
+    with fork_server(LOADED, {**os.environ, **settings}) as server:
 
-    def made(case: Case) -> dict[str, Any]:
-        # What is written into `..` goes too.
-        shutil.rmtree(folder.parent, ignore_errors=True)
-        folder.mkdir(parents=True)
-        _fill(folder)
-        assert server.stdin is not None
-        assert server.stdout is not None
-        with other_end(folder / "pipe", read=case.parameter == "output") if case.has_pipe else nullcontext():
-            server.stdin.write(json.dumps({"arguments": case.arguments, "folder": str(folder)}) + "\n")
-            server.stdin.flush()
-            answer = json.loads(server.stdout.readline())
-        answer["left"] = [path.name for path in folder.parent.rglob(".armwright-*")]
-        return answer
+        def made(case: Case) -> dict[str, Any]:
+            # What is written into `..` goes too.
+            shutil.rmtree(folder.parent, ignore_errors=True)
+            folder.mkdir(parents=True)
+            _fill(folder)
+            with other_end(folder / "pipe", read=case.parameter == "output") if case.has_pipe else nullcontext():
+                answer = server.call(folder, base, arguments=case.arguments)
+            answer["left"] = [path.name for path in folder.parent.rglob(".armwright-*")]
+            return answer
 
-    yield made
-    server.stdin.close()  # type: ignore[union-attr]
-    server.wait(60)
-    server.stdout.close()  # type: ignore[union-attr]
+        yield made
 
 
 def _fill(folder: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from armwright.cli.terminal import CleanStream, bound_widths, cleaned, console
+from cli_calls import armwright
 
 # Red letters, a title, the bell, a C1 escape, text from right to left, a letter without width, back to the beginning.
 HOSTILE = "\x1b[31m\x1b]0;owned\x07\x9b2J\u202eevil\u200b\r\x7f\U000e0041"
@@ -19,17 +20,9 @@ ARM = Path(__file__).resolve().parents[2] / "src" / "armwright" / "arm" / "catal
 CELL = Path(__file__).resolve().parents[2] / "examples" / "puma_cell.toml"
 
 
-def called(*arguments: str, cwd: Path, typed: str | None = None) -> bytes:
+def called(*arguments: str, cwd: Path, typed: str = "") -> str:
     """Return all that a command puts out."""
-    done = subprocess.run(
-        [sys.executable, "-m", "armwright", *arguments],
-        capture_output=True,
-        check=False,
-        cwd=cwd,
-        input=None if typed is None else typed.encode(),
-        env={**os.environ, "PYTHONIOENCODING": "utf-8"},
-        timeout=120,
-    )
+    done = armwright(*arguments, cwd=cwd, fed=typed)
     return done.stdout + done.stderr
 
 
@@ -90,7 +83,7 @@ CALLS: list[tuple[str, ...]] = [
 @pytest.mark.parametrize("arguments", CALLS, ids=lambda call: " ".join(call[:2]).encode("ascii", "ignore").decode())
 def test_commands(arguments: tuple[str, ...], folder: Path) -> None:
     """Whatever a hostile name is given for, what is said of it holds letters alone."""
-    said = called(*arguments, cwd=folder).decode()
+    said = called(*arguments, cwd=folder)
 
     # What these print may be read by another program: a listing of code shows the texts of the program as they are.
     allowed = hidden(HOSTILE) if arguments[0] == "code" else set()
@@ -103,14 +96,14 @@ def test_commands(arguments: tuple[str, ...], folder: Path) -> None:
 def test_conversations(folder: Path) -> None:
     """Neither does the interactive language, nor the debugger."""
     typed = f'PRINT "{HOSTILE}" ;\n:load {HOSTILE}\n{HOSTILE}\n'
-    said = called("repl", "--cell", str(CELL), cwd=folder, typed=typed).decode()
+    said = called("repl", "--cell", str(CELL), cwd=folder, typed=typed)
     assert "evil" in said
     assert not hidden(said), said
-    for line in called("repl", "--json", "--cell", str(CELL), cwd=folder, typed=typed).decode().splitlines():
+    for line in called("repl", "--json", "--cell", str(CELL), cwd=folder, typed=typed).splitlines():
         assert not hidden(line)
         json.loads(line)
     typed = f"list\nnext\nnext\nprint {HOSTILE}\nbreak {HOSTILE}\n{HOSTILE}\ncontinue\nquit\n"
-    assert not hidden(called("debug", "print.rlo", "--cell", str(CELL), cwd=folder, typed=typed).decode())
+    assert not hidden(called("debug", "print.rlo", "--cell", str(CELL), cwd=folder, typed=typed))
 
 
 def test_a_terminal(folder: Path) -> None:

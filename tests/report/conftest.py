@@ -238,17 +238,26 @@ def bench() -> RunPage:
 class Visit:
     """An opened page, and everything it complained about or asked the network for."""
 
-    def __init__(self, browser: Any, file: Path, data: RunPage, **context: Any) -> None:
+    def __init__(self, page: Any, file: Path, data: RunPage) -> None:
         file.write_text(run_page(data), encoding="utf-8")
         self.complaints: list[str] = []
         self.requests: list[str] = []
-        self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 800}, **context})
-        self.page = self.context.new_page()
-        self.page.on("console", lambda message: self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page = page
+        self._heard = {
+            "console": lambda message: self.complaints.append(message.text),
+            "pageerror": lambda error: self.complaints.append(str(error)),
+            "request": lambda request: self.requests.append(request.url),
+        }
+        for event, hear in self._heard.items():
+            page.on(event, hear)
         self.url = file.as_uri()
-        self.page.goto(self.url)
+        page.goto(self.url)
+
+    def leave(self) -> None:
+        """Hear nothing more of the page, and go elsewhere."""
+        for event, hear in self._heard.items():
+            self.page.remove_listener(event, hear)
+        self.page.goto("about:blank")
 
     def state(self) -> dict[str, Any]:
         """Ask the page where it stands."""
@@ -273,14 +282,34 @@ class Visit:
         return str(self.page.evaluate("document.getElementById('view').toDataURL()"))
 
 
+WINDOW = {"width": 1280, "height": 800}
+
+
+@pytest.fixture(scope="module")
+def window(browser) -> Iterator[Any]:
+    """Open a window in which the pages of a module are visited one after the other."""
+    context = browser.new_context(viewport=WINDOW)
+    yield context.new_page()
+    context.close()
+
+
 @pytest.fixture
-def visit(browser, tmp_path) -> Iterator[Any]:
+def visit(browser, window, tmp_path) -> Iterator[Any]:
+    """Return what opens a page: the first of a test in the window of the module, others in windows of their own."""
     visits: list[Visit] = []
+    contexts: list[Any] = []
 
     def open_page(data: RunPage, **context: Any) -> Visit:
-        visits.append(Visit(browser, tmp_path / f"run{len(visits)}.html", data, **context))
+        page = window
+        if visits or context:
+            contexts.append(browser.new_context(**{"viewport": WINDOW, **context}))
+            page = contexts[-1].new_page()
+        visits.append(Visit(page, tmp_path / f"run{len(visits)}.html", data))
         return visits[-1]
 
     yield open_page
     for each in visits:
-        each.context.close()
+        each.leave()
+    window.set_viewport_size(WINDOW)
+    for context in contexts:
+        context.close()

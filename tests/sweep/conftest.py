@@ -10,6 +10,15 @@ import pytest
 from armwright.sweep.designs import Design, full_factorial
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _frozen() -> Iterator[None]:
+    """What was there before is not gone through by every collection, which would take half a second each."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
+
+
 @pytest.fixture(autouse=True)
 def _collected() -> Iterator[None]:
     """Whatever a test left to the collector is collected behind it, not in the midst of the next one."""

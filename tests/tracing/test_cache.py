@@ -3,13 +3,12 @@
 import math
 import os
 import pickle
-import resource
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import pytest
 
 import armwright
 from armwright.files.store import Store
+from fork_server import ForkServer, fork_server
 from samples import Sample
 
 SOURCES = str(Path(armwright.__file__).parents[1])
@@ -33,35 +33,55 @@ print(repr(float(kernel(np.array([0.5]))[0])), len(kernel.single.stats.cache_hit
 """
 
 
-def starting(cache: Path | None, **more: Any) -> subprocess.Popen[str]:
+def _environment(cache: Path | None) -> dict[str, str]:
     environment = {name: os.environ[name] for name in ("PATH", "TMPDIR") if name in os.environ}
     environment |= {"PYTHONPATH": SOURCES, "PYTHONDONTWRITEBYTECODE": "1"}
-    if cache is not None:
-        environment["ARMWRIGHT_CACHE"] = str(cache)
+    return environment if cache is None else environment | {"ARMWRIGHT_CACHE": str(cache)}
+
+
+def starting(cache: Path) -> subprocess.Popen[str]:
+    """Start a process of its own."""
     return subprocess.Popen(
         [sys.executable, "-c", _START],
-        env=environment | more.pop("env", {}),
+        env=_environment(cache),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        **more,
     )
 
 
-def start(cache: Path | None, **more: Any) -> str:
-    """How often one start, without a word on the error output, found what was compiled before: "0" or "1"."""
-    said, complained = starting(cache, **more).communicate(timeout=300)
-    assert complained == ""
-    value, hits = said.split()
-    assert value == VALUE
-    return hits
+@pytest.fixture(scope="module")
+def server() -> Iterator[ForkServer]:
+    """A process that has loaded the compiler, and compiled nothing."""
+    with fork_server(
+        ["numpy", "armwright.tracing.emit", "armwright.tracing.kernel", "numba"], _environment(None)
+    ) as server:
+        yield server
+
+
+@pytest.fixture
+def start(server: ForkServer, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+    """Return what starts a process without a word on the error output.
+
+    It returns how often that found what was compiled before: "0" or "1".
+    """
+    scratch = tmp_path_factory.mktemp("scratch")
+
+    def started(cache: Path, *, cwd: Path = scratch, **more: Any) -> str:
+        answer = server.call(cwd, scratch, code=_START, environment=_environment(cache), **more)
+        assert (answer["status"], answer["err"]) == (0, "")
+        value, hits = answer["out"].split()
+        assert value == VALUE
+        return str(hits)
+
+    return started
 
 
 def entries(cache: Path) -> list[Path]:
     return [path for path in (cache / "compiled").iterdir() if path.suffix != ".lock"]
 
 
-def test_second_start_compiles_nothing(tmp_path: Path) -> None:
+def test_second_start_compiles_nothing(tmp_path: Path, start: Callable[..., str]) -> None:
     """Another process finds the compiled kernel on the disk: one file, for the user alone, and no source."""
     assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
 
@@ -97,7 +117,9 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
 @pytest.mark.drawn(0.34)
-def test_damage_is_mended_without_a_word(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
+def test_damage_is_mended_without_a_word(
+    tmp_path: Path, damage: Callable[[bytes], bytes], start: Callable[..., str]
+) -> None:
     """After any damage the kernel is compiled again, and the start after that finds it."""
     start(tmp_path)
     (entry,) = entries(tmp_path)
@@ -106,7 +128,7 @@ def test_damage_is_mended_without_a_word(tmp_path: Path, damage: Callable[[bytes
     assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
 
 
-def test_sound_bytes_that_are_no_function(tmp_path: Path) -> None:
+def test_sound_bytes_that_are_no_function(tmp_path: Path, start: Callable[..., str]) -> None:
     """An entry that is whole, but of a Numba that wrote otherwise, is made anew too."""
     start(tmp_path)
     (entry,) = entries(tmp_path)
@@ -120,7 +142,7 @@ class _Poison:
         return os.mkdir, ("PWNED",)
 
 
-def test_poison_is_not_loaded(tmp_path: Path) -> None:
+def test_poison_is_not_loaded(tmp_path: Path, start: Callable[..., str]) -> None:
     """Code that somebody put in the place of an entry does not run: neither a pickle nor a source nor a bytecode."""
     cache = tmp_path / "cache"
     start(cache)
@@ -137,19 +159,15 @@ def test_poison_is_not_loaded(tmp_path: Path) -> None:
     assert not (tmp_path / "PWNED").exists()
 
 
-def test_files_may_not_grow(tmp_path: Path) -> None:
+def test_files_may_not_grow(tmp_path: Path, start: Callable[..., str]) -> None:
     """Where files may not grow, as with ulimit -f 4, the kernel is compiled for the process alone, and kept later."""
-
-    def small() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
-
-    assert start(tmp_path, preexec_fn=small) == "0"
+    assert start(tmp_path, file_size=4096) == "0"
     assert entries(tmp_path) == []
     assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
 
 
 @pytest.mark.share(0.034)
-def test_killed_while_compiling(tmp_path: Path, sample: Sample) -> None:
+def test_killed_while_compiling(tmp_path: Path, sample: Sample, start: Callable[..., str]) -> None:
     """Whenever a process is killed, the next one finds a whole entry or none."""
     killed = 0
     for rng in sample.cases(30):
@@ -164,7 +182,7 @@ def test_killed_while_compiling(tmp_path: Path, sample: Sample) -> None:
     sample.record("processes killed while they compiled: later starts that failed", killed, 0)
 
 
-def test_a_file_for_a_cache(tmp_path: Path) -> None:
+def test_a_file_for_a_cache(tmp_path: Path, start: Callable[..., str]) -> None:
     """Where the cache folder is a file, the kernel is compiled for the process alone."""
     (tmp_path / "file").write_text("in the way")
 

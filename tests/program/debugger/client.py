@@ -1,5 +1,6 @@
 """An editor's side of the Debug Adapter Protocol, with time limits, for tests."""
 
+import contextlib
 import json
 import os
 import queue
@@ -9,8 +10,10 @@ import threading
 import time
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
+from armwright.cli.debug import load, save
+from armwright.program.debugger.dap_server import serve
 from program.running import CORPUS
 
 # A request that is not answered by then never is [s].
@@ -18,20 +21,41 @@ PATIENCE = 300.0
 
 
 class Client:
-    """``armwright debug`` in a process of its own, and what it has said."""
+    """An editor connected to a debug adapter, and what it has said.
 
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "armwright", "debug"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env={**os.environ, "NO_COLOR": "1"},
-        )
+    The adapter runs in a thread of this process, with what ``armwright debug`` reads programs and writes results with;
+    ``process=True`` starts that command in a process of its own.
+    """
+
+    def __init__(self, *, process: bool = False) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._other_threads = set(threading.enumerate())
+        if process:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "armwright", "debug"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env={**os.environ, "NO_COLOR": "1"},
+            )
+            assert self._process.stdin is not None
+            assert self._process.stdout is not None
+            self._requests, self._answers = self._process.stdin, self._process.stdout
+        else:
+            (read_requests, write_requests), (read_answers, write_answers) = os.pipe(), os.pipe()
+            self._requests, self._answers = os.fdopen(write_requests, "wb"), os.fdopen(read_answers, "rb")
+            streams = os.fdopen(read_requests, "rb", buffering=0), os.fdopen(write_answers, "wb")
+            self._streams = streams
+            threading.Thread(target=self._serve, args=streams, daemon=True).start()
         self._sent = 0
         self._incoming: queue.Queue[dict[str, Any]] = queue.Queue()
         self.events: list[dict[str, Any]] = []
         threading.Thread(target=self._listen, daemon=True).start()
+
+    @staticmethod
+    def _serve(incoming: BinaryIO, outgoing: BinaryIO) -> None:
+        with outgoing:
+            serve(incoming, outgoing, load, save)
 
     def __enter__(self) -> Self:
         return self
@@ -39,37 +63,36 @@ class Client:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._process.kill()
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
-            assert pipe is not None
-            pipe.close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            assert self._process.stderr is not None
+            self._process.stderr.close()
+        with contextlib.suppress(BrokenPipeError):
+            self._requests.close()
+        # At the end of the requests the adapter ends, and with the answers what listens to them.
+        for thread in set(threading.enumerate()) - self._other_threads:
+            thread.join(PATIENCE)
+        self._answers.close()
+        if self._process is None:
+            self._streams[0].close()
 
     def _listen(self) -> None:
-        stream = self._process.stdout
-        assert stream is not None
-        while True:
-            line = stream.readline()
-            if not line:
-                return
+        while line := self._answers.readline():
             length = int(line.split(b":")[1])
-            assert stream.readline() == b"\r\n"
-            self._incoming.put(json.loads(stream.read(length)))
+            assert self._answers.readline() == b"\r\n"
+            self._incoming.put(json.loads(self._answers.read(length)))
 
     # ---- sending ---------------------------------------------------------------------------------------------------
 
     def raw(self, data: bytes) -> None:
         """Send what may be no message at all."""
-        stream = self._process.stdin
-        assert stream is not None
-        stream.write(data)
-        stream.flush()
+        self._requests.write(data)
+        self._requests.flush()
 
     def hang_up(self) -> None:
         """Close the stream of requests."""
-        stream = self._process.stdin
-        assert stream is not None
-        stream.close()
+        self._requests.close()
 
     def send(self, command: str, **arguments: Any) -> int:
         """Send a request without waiting; return its number."""
@@ -115,14 +138,15 @@ class Client:
         raise AssertionError(f"no event {event}: {self.events}")
 
     def status(self) -> int:
-        """Return the exit status of the debugger, which is about to end."""
+        """Return the exit status of the process, which is about to end."""
+        assert self._process is not None
         return self._process.wait(timeout=PATIENCE)
 
     def errors(self) -> str:
-        """Return what it wrote to its error output, once it has ended."""
-        stream = self._process.stderr
-        assert stream is not None
-        return stream.read().decode()
+        """Return what the process wrote to its error output, once it has ended."""
+        assert self._process is not None
+        assert self._process.stderr is not None
+        return self._process.stderr.read().decode()
 
     # ---- what editors do -------------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""The debug adapter as an editor meets it: a process of its own, requests, answers and events."""
+"""The debug adapter as an editor meets it: requests, answers and events."""
 
 import json
 import os
@@ -17,8 +17,15 @@ P02, P08 = CORPUS / "p02.rlo", CORPUS / "p08.rlo"
 
 @pytest.fixture
 def client() -> Iterator[Client]:
-    """Start the debugger, and end it whatever happens."""
+    """Connect to an adapter, and end it whatever happens."""
     with Client() as client:
+        yield client
+
+
+@pytest.fixture
+def process() -> Iterator[Client]:
+    """Start ``armwright debug`` in a process of its own, and end it whatever happens."""
+    with Client(process=True) as client:
         yield client
 
 
@@ -34,42 +41,42 @@ def written(tmp_path: Path) -> Any:
     return write
 
 
-def test_a_whole_session(client: Client) -> None:
+def test_a_whole_session(process: Client) -> None:
     """Breakpoint, steps, frames as variables, a step back, a watched frame, and on to the end."""
-    client.launch(P02, lines=(10,))
-    stop = client.wait("stopped")
-    assert (stop["reason"], client.line()) == ("breakpoint", 10)
-    assert client.scope("Frames")["apf1"]["value"] == "no value yet"
+    process.launch(P02, lines=(10,))
+    stop = process.wait("stopped")
+    assert (stop["reason"], process.line()) == ("breakpoint", 10)
+    assert process.scope("Frames")["apf1"]["value"] == "no value yet"
 
-    assert client.step("next")["reason"] == "step"
-    frames = client.scope("Frames")
+    assert process.step("next")["reason"] == "step"
+    frames = process.scope("Frames")
     assert frames["apf1"]["value"] == "(1,0,0, 0,-1,0, 0,0,-1, 0.4,0.15,0.15)"
-    parts = client.inside(frames["apf1"])
+    parts = process.inside(frames["apf1"])
     assert (parts["parent"]["value"], parts["p"]["value"]) == ("obj1", "(0.4, 0.15, 0.15)")
-    assert client.inside(client.scope("Arms")["ARM_1"])["joint 4"]["value"].endswith(" deg")
+    assert process.inside(process.scope("Arms")["ARM_1"])["joint 4"]["value"].endswith(" deg")
 
-    assert client.step("stepBack")["reason"] == "step"
-    assert client.line() == 10
-    assert client.scope("Frames")["apf1"]["value"] == "no value yet"
+    assert process.step("stepBack")["reason"] == "step"
+    assert process.line() == 10
+    assert process.scope("Frames")["apf1"]["value"] == "no value yet"
 
-    client.step("next")
-    client.step("next")
-    info = client.ask("dataBreakpointInfo", name="apf1")
+    process.step("next")
+    process.step("next")
+    info = process.ask("dataBreakpointInfo", name="apf1")
     assert info["accessTypes"] == ["write"]
-    (bound,) = client.ask("setDataBreakpoints", breakpoints=[{"dataId": info["dataId"]}])["breakpoints"]
+    (bound,) = process.ask("setDataBreakpoints", breakpoints=[{"dataId": info["dataId"]}])["breakpoints"]
     assert bound["verified"]
-    stop = client.step("continue")
+    stop = process.step("continue")
     assert stop["reason"] == "data breakpoint"
     assert stop["hitBreakpointIds"] == [bound["id"]]
     assert stop["text"] == "apf1 begins to move with ARM_1"
-    assert client.line() == 14
+    assert process.line() == 14
 
-    client.ask("continue", threadId=1)
-    assert client.wait("exited")["exitCode"] == 0
-    client.wait("terminated")
-    client.ask("disconnect")
-    assert client.status() == 0
-    assert client.errors() == ""
+    process.ask("continue", threadId=1)
+    assert process.wait("exited")["exitCode"] == 0
+    process.wait("terminated")
+    process.ask("disconnect")
+    assert process.status() == 0
+    assert process.errors() == ""
 
 
 def test_what_it_can(client: Client) -> None:
@@ -191,13 +198,13 @@ def test_pause_of_an_endless_loop(client: Client, written: Any) -> None:
     assert client.wait("exited")["exitCode"] == 0
 
 
-def test_disconnect_while_it_runs(client: Client, written: Any) -> None:
+def test_disconnect_while_it_runs(process: Client, written: Any) -> None:
     """An editor can leave a program that never ends, and the process ends."""
-    client.launch(written("VAR n : SCALAR ;\nBEGIN\n  n = 0 ;\n  WHILE n = 0 DO\n    n = 0\nEND.\n"))
-    client.ask("disconnect")
+    process.launch(written("VAR n : SCALAR ;\nBEGIN\n  n = 0 ;\n  WHILE n = 0 DO\n    n = 0\nEND.\n"))
+    process.ask("disconnect")
 
-    assert client.status() == 0
-    assert client.errors() == ""
+    assert process.status() == 0
+    assert process.errors() == ""
 
 
 def test_terminate_and_restart(client: Client, written: Any) -> None:
@@ -463,11 +470,11 @@ def test_requests_in_pieces(client: Client) -> None:
     assert client.answer(1)["success"]
 
 
-def test_the_editor_goes(client: Client) -> None:
+def test_the_editor_goes(process: Client) -> None:
     """When the editor's end of the stream is closed the debugger ends."""
-    client.launch(P02, stopOnEntry=True)
-    client.wait("stopped")
-    client.hang_up()
+    process.launch(P02, stopOnEntry=True)
+    process.wait("stopped")
+    process.hang_up()
 
-    assert client.status() == 0
-    assert client.errors() == ""
+    assert process.status() == 0
+    assert process.errors() == ""

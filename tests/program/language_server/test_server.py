@@ -1,19 +1,27 @@
-"""The language server, as an editor that starts ``armwright lsp`` and talks to it over standard input and output."""
+"""The language server, as an editor talks to it."""
 
 import asyncio
 import json
+import logging
+import socket
 import subprocess
 import sys
+import threading
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
+from typing import BinaryIO, cast
 
 import pytest
 import pytest_lsp
 from lsprotocol import types as lsp
+from pygls.client import JsonRPCClient
 from pygls.exceptions import JsonRpcException
+from pygls.io_ import run_async
 from pytest_lsp import ClientServerConfig, LanguageClient, client_capabilities
 
+from armwright.program.language_server.message_limits import Incoming
 from armwright.program.language_server.semantic_tokens import KINDS, MODIFIERS
+from armwright.program.language_server.server import make_server
 
 CELL = """
 name = "bench"
@@ -151,7 +159,34 @@ class Editor:
         return applied(self.text, found.changes[self.uri])
 
 
-@pytest_lsp.fixture(config=ClientServerConfig(server_command=[sys.executable, "-m", "armwright", "lsp"]))
+class InThisProcess(ClientServerConfig):
+    """A server in a thread of this process, connected by a pair of sockets: starting one takes no time."""
+
+    async def start(self, devtools: str | None = None) -> JsonRPCClient:
+        """Start the server and return a client that is connected to it."""
+        del devtools
+        client = self.client_factory()
+        ours, theirs = socket.socketpair()
+        threading.Thread(target=self._serve, args=(theirs,), daemon=True).start()
+        reader, writer = await asyncio.open_connection(sock=ours)
+        client.protocol.set_writer(writer)
+        conversation = run_async(
+            stop_event=client._stop_event,
+            reader=reader,
+            protocol=client.protocol,
+            logger=logging.getLogger(__name__),
+            error_handler=client.report_server_error,
+        )
+        client._async_tasks.append(asyncio.create_task(conversation))
+        return client
+
+    @staticmethod
+    def _serve(connection: socket.socket) -> None:
+        with connection, connection.makefile("rb") as incoming, connection.makefile("wb") as outgoing:
+            make_server().start_io(cast("BinaryIO", Incoming(incoming)), outgoing)
+
+
+@pytest_lsp.fixture(config=InThisProcess(server_command=[]))
 async def client(lsp_client: LanguageClient, tmp_path: Path) -> AsyncIterator[None]:
     """Greet the server from a folder with a cell; say goodbye at the end."""
     (tmp_path / "bench.toml").write_text(CELL)
@@ -553,18 +588,21 @@ async def test_whole_new_text(editor: Editor) -> None:
     assert await editor.open(PROGRAM.replace("END.", "END")) != []
 
 
-@pytest.mark.parametrize("asked", [None, {"textDocument": 5}, {"textDocument": {"uri": "file:///x"}}])
-def test_questions_that_make_no_sense(asked: object) -> None:
+def test_questions_that_make_no_sense() -> None:
     """A question that cannot be read is refused: whoever asked does not wait for an answer for ever."""
-    question = {"jsonrpc": "2.0", "id": 7, "method": lsp.TEXT_DOCUMENT_HOVER, "params": asked}
-    body = json.dumps(question).encode()
-    end = json.dumps({"jsonrpc": "2.0", "method": lsp.EXIT}).encode()
-    messages = b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(one), one) for one in (body, end))
+    asked = [None, {"textDocument": 5}, {"textDocument": {"uri": "file:///x"}}]
+    talk = [{"id": i, "method": lsp.TEXT_DOCUMENT_HOVER, "params": one} for i, one in enumerate(asked)]
+    bodies = [json.dumps({"jsonrpc": "2.0", **one}).encode() for one in (*talk, {"method": lsp.EXIT})]
+    messages = b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(one), one) for one in bodies)
     command = [sys.executable, "-m", "armwright", "lsp"]
-    said = subprocess.run(command, input=messages, capture_output=True, check=False, timeout=300).stdout
+    said = subprocess.run(command, input=messages, capture_output=True, check=False, timeout=300).stdout.decode()
 
-    answer, _ = json.JSONDecoder().raw_decode(said.decode().partition("\r\n\r\n")[2])
-    assert (answer["id"], answer["error"]["code"]) == (7, -32602)
+    answers = [json.JSONDecoder().raw_decode(part)[0] for part in said.split("\r\n\r\n")[1:]]
+    assert [(one["id"], one["error"]["code"]) for one in answers if "id" in one] == [
+        (0, -32602),
+        (1, -32602),
+        (2, -32602),
+    ]
 
 
 def test_the_end_of_a_session() -> None:
