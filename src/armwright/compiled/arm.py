@@ -161,12 +161,7 @@ class CompiledArm:
 
     @_kernel_method
     def inverse_branches(
-        self,
-        pose: ArrayLike,
-        near: ArrayLike,
-        *,
-        threads: int | None = None,
-        out: tuple[Array, Flags] | None = None,
+        self, pose: ArrayLike, near: ArrayLike, *, threads: int | None = None, out: tuple[Array, Flags] | None = None
     ) -> tuple[Array, Flags]:
         """Return all eight IK branches of poses, unjudged, as ``kinematics.inverse`` does for a closed form.
 

@@ -21,13 +21,7 @@ NEGLIGIBLE = 1e-12
 
 
 def forward_dynamics(
-    arm: Arm,
-    q: ArrayLike,
-    qd: ArrayLike,
-    tau: ArrayLike,
-    *,
-    wrench: ArrayLike | None = None,
-    drives: bool = True,
+    arm: Arm, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, *, wrench: ArrayLike | None = None, drives: bool = True
 ) -> Array:
     """Return the joint accelerations that efforts cause, by the articulated-body algorithm.
 
@@ -66,13 +60,7 @@ def forward_dynamics(
 
 
 def toacc(
-    arm: Arm,
-    q: ArrayLike,
-    qd: ArrayLike,
-    tau: ArrayLike,
-    *,
-    wrench: ArrayLike | None = None,
-    drives: bool = True,
+    arm: Arm, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, *, wrench: ArrayLike | None = None, drives: bool = True
 ) -> Array:
     """Return the joint accelerations that efforts cause, by n + 1 calls of Newton-Euler and a system of equations.
 

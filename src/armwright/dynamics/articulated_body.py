@@ -17,18 +17,7 @@ from armwright.dynamics.bodies import body_of
 from armwright.dynamics.newton_euler import base_frame_acceleration, tool_reaction
 from armwright.kinematics.forward_kinematics import link_transform
 from armwright.tracing.scalar import Scalar, reciprocal
-from armwright.tracing.vectors import (
-    Matrix,
-    Vector,
-    add,
-    apply,
-    congruence,
-    cross,
-    dot,
-    product,
-    scale,
-    transpose,
-)
+from armwright.tracing.vectors import Matrix, Vector, add, apply, congruence, cross, dot, product, scale, transpose
 
 _Transform: TypeAlias = tuple[Matrix, Vector]
 

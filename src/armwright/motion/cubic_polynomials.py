@@ -24,11 +24,7 @@ def hermite(q_last: Scalar, m_last: Scalar, q: Scalar, m: Scalar, h: Scalar) -> 
 
 
 def cubic(
-    q_start: ArrayLike,
-    q_goal: ArrayLike,
-    duration: float,
-    start: ArrayLike | None = None,
-    end: ArrayLike | None = None,
+    q_start: ArrayLike, q_goal: ArrayLike, duration: float, start: ArrayLike | None = None, end: ArrayLike | None = None
 ) -> Trajectory:
     """Return the cubic from one configuration to another; at rest at both ends, unless rates are given.
 

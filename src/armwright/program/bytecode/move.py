@@ -4,12 +4,7 @@ from collections.abc import Callable, Mapping
 
 from armwright.program.bytecode.context import Context, Generate
 from armwright.program.bytecode.emitter import LATER
-from armwright.program.bytecode.instructions import (
-    Form,
-    Op,
-    Operand,
-    stages_text,
-)
+from armwright.program.bytecode.instructions import Form, Op, Operand, stages_text
 from armwright.program.syntax import tree
 
 # In the order of the listing: the way, the points on it, the speed.

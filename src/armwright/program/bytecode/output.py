@@ -3,10 +3,7 @@
 from collections.abc import Mapping
 
 from armwright.program.bytecode.context import Context, Generate
-from armwright.program.bytecode.instructions import (
-    Op,
-    Text,
-)
+from armwright.program.bytecode.instructions import Op, Text
 from armwright.program.syntax import tree
 
 

@@ -17,13 +17,7 @@ from armwright.program.semantics.cell_symbols import KnownCell
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
-STEPS: Mapping[type, Step] = {
-    **frames.STEPS,
-    **devices.STEPS,
-    **move.STEPS,
-    **control_flow.STEPS,
-    **output.STEPS,
-}
+STEPS: Mapping[type, Step] = {**frames.STEPS, **devices.STEPS, **move.STEPS, **control_flow.STEPS, **output.STEPS}
 
 
 @attrs.frozen(kw_only=True)

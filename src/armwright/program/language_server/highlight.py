@@ -6,18 +6,7 @@ from collections.abc import Collection, Iterable, Iterator
 from typing import ClassVar
 
 from pygments.lexer import RegexLexer, default, include
-from pygments.token import (
-    Comment,
-    Error,
-    Keyword,
-    Name,
-    Number,
-    Operator,
-    Punctuation,
-    String,
-    Whitespace,
-    _TokenType,
-)
+from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace, _TokenType
 
 from armwright.program.language.source import Source
 from armwright.program.language.units import UNITS

@@ -22,15 +22,7 @@ from armwright.program.language.words import Standard
 from armwright.program.repl.declarations import Heading, NotNowError, merged
 from armwright.program.repl.input import Entry, moved, read
 from armwright.program.repl.session_text import program_text, title
-from armwright.program.repl.snapshots import (
-    bring,
-    forget,
-    fresh,
-    go_through,
-    new_warnings,
-    rename,
-    with_code,
-)
+from armwright.program.repl.snapshots import bring, forget, fresh, go_through, new_warnings, rename, with_code
 from armwright.program.repl.undo_report import SILENT, taken_back
 from armwright.program.semantics import check
 from armwright.program.semantics.cell_symbols import Imported, ReadImport, known_cell

@@ -88,12 +88,7 @@ def _type(names: Names, written: tree.TypeName) -> VariableType | None:
         count *= size
     if count > MOST_ELEMENTS:
         span = written.sizes[0].span.to(written.sizes[-1].span)
-        names.found.say(
-            "E222",
-            f"an array of {count} elements is too large",
-            span,
-            f"more than {MOST_ELEMENTS}",
-        )
+        names.found.say("E222", f"an array of {count} elements is too large", span, f"more than {MOST_ELEMENTS}")
         return None
     return VariableType(VariableKind(written.key), known)
 

@@ -66,13 +66,7 @@ def _refuse(names: Names, node: tree.Binary, left: ExpressionType, right: Expres
     _say(names, node, message, label, _advice(node, left, right))
 
 
-def _say(
-    names: Names,
-    node: tree.Unary | tree.Binary,
-    message: str,
-    label: str,
-    help_: str,
-) -> None:
+def _say(names: Names, node: tree.Unary | tree.Binary, message: str, label: str, help_: str) -> None:
     """Speak of an operation, unless the same was said of the same variables."""
     operands = (node.operand,) if isinstance(node, tree.Unary) else (node.left, node.right)
     variables = [operand.key for operand in operands if isinstance(operand, tree.Name)]

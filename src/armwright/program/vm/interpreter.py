@@ -140,13 +140,7 @@ def _advance(machine: Machine, process: Process) -> None:
         if pending.place is not None:
             machine.place(process, *pending.place, pending.span)
         machine.effect(
-            process,
-            pending.kind,
-            pending.text,
-            pending.span,
-            since=pending.since,
-            arm=pending.arm,
-            data=pending.data,
+            process, pending.kind, pending.text, pending.span, since=pending.since, arm=pending.arm, data=pending.data
         )
         return
     if process.follows is not None:

@@ -20,14 +20,7 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.vm.process import Element, Pending, Process, Start, Value
-from armwright.program.vm.recording import (
-    Effect,
-    EffectKind,
-    Recording,
-    in_order,
-    stream,
-    thinned,
-)
+from armwright.program.vm.recording import Effect, EffectKind, Recording, in_order, stream, thinned
 from armwright.program.vm.state import MachineState
 from armwright.program.vm.value_text import shown
 from armwright.spatial.poses import from_noap, to_noap
@@ -49,11 +42,7 @@ class RunError(ArmwrightError, RuntimeError):
     """
 
     def __init__(
-        self,
-        diagnostic: Diagnostic,
-        tree: FrameTree,
-        time: float,
-        recording: Callable[[], Recording] | None = None,
+        self, diagnostic: Diagnostic, tree: FrameTree, time: float, recording: Callable[[], Recording] | None = None
     ) -> None:
         """Keep the circumstances; the text is the diagnostic's message."""
         self.diagnostic, self.tree, self.time, self.recording = diagnostic, tree, time, recording

@@ -33,20 +33,9 @@ from armwright.program.syntax.tree.move import (
     Via,
 )
 from armwright.program.syntax.tree.output import Print
-from armwright.program.syntax.tree.program import (
-    Declaration,
-    Header,
-    Import,
-    Procedure,
-    Program,
-    TypeName,
-    Units,
-)
+from armwright.program.syntax.tree.program import Declaration, Header, Import, Procedure, Program, TypeName, Units
 from armwright.program.syntax.tree.statements import Statement
-from armwright.program.syntax.tree.traversal import (
-    dump,
-    walk,
-)
+from armwright.program.syntax.tree.traversal import dump, walk
 from armwright.program.syntax.tree.values import (
     ArmName,
     Binary,
