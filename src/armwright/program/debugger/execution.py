@@ -208,11 +208,7 @@ class Execution:
             if self._raised == done or "uncaught" not in self.catches:
                 self.ticks = max(self.ticks, machine.state.ticks)
                 return Stop(
-                    reason="failed",
-                    path=path,
-                    text=str(error),
-                    diagnostic=error.diagnostic,
-                    recording=error.recording,
+                    reason="failed", path=path, text=str(error), diagnostic=error.diagnostic, recording=error.recording
                 )
             return self._before_error(
                 done, path, Stop(reason="exception", text=str(error), diagnostic=error.diagnostic)

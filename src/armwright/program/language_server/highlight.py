@@ -91,12 +91,7 @@ class RloLexer(RegexLexer):
             (r"[;,:.()\[\]]", Punctuation),
         ],
         "sensor": [include("blank"), (_any_of(SENSORS), Keyword.Pseudo, "#pop"), default("#pop")],
-        "units": [
-            include("blank"),
-            (_any_of(UNITS), Keyword.Type),
-            (r",", Punctuation),
-            default("#pop"),
-        ],
+        "units": [include("blank"), (_any_of(UNITS), Keyword.Type), (r",", Punctuation), default("#pop")],
         "unit": [(_any_of(UNITS), Keyword.Type, "#pop")],
         "procedure": [
             include("blank"),

@@ -38,12 +38,7 @@ def with_code(machine: Machine, code: Code, limits: Limits) -> Machine:
         if kind == VariableType(VariableKind.FRAME):
             state.tree = state.tree.declare(name)
     state.program = Process(
-        path=(),
-        priority=0.0,
-        at=0,
-        wake=state.ticks,
-        stack=[Activation(kind="main")],
-        last_arm=state.program.last_arm,
+        path=(), priority=0.0, at=0, wake=state.ticks, stack=[Activation(kind="main")], last_arm=state.program.last_arm
     )
     state.processes = [state.program]
     until = attrs.evolve(limits, time=machine.now + limits.time)

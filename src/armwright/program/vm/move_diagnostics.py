@@ -108,10 +108,7 @@ def detour_warning(run: RunStage) -> Diagnostic | None:
         message=f"{run.arm} leaves the straight line to `{run.to[-1]}`, {_METHODS[detour.method]}: {detour.price}",
         span=run.span,
         label=f"stopped {obstacle.fraction * 100:.0f} % of the path; begun at {run.t0:.3f} s",
-        notes=(
-            f"it is stopped {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",
-            _lead(detour, run.arm),
-        ),
+        notes=(f"it is stopped {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}", _lead(detour, run.arm)),
     )
 
 

@@ -249,13 +249,7 @@ def thinned(trees: Sequence[tuple[float, FrameTree]], gap: float) -> list[tuple[
 
 
 def stream(
-    name: str,
-    cell_arm: CellArm,
-    runs: Sequence[Run],
-    pushes: Sequence[Push],
-    *,
-    duration: float,
-    period: float,
+    name: str, cell_arm: CellArm, runs: Sequence[Run], pushes: Sequence[Push], *, duration: float, period: float
 ) -> Stream:
     """Sample what an arm does at every servo tick.
 
