@@ -1,7 +1,6 @@
 """Arms that are stopped on their path: within their limits, along their paths, and what they press on meanwhile."""
 
 import math
-from collections.abc import Sequence
 from typing import NoReturn
 
 import attrs
@@ -90,13 +89,13 @@ def _pushed(machine: Machine, arm: str) -> Push:
     return push
 
 
-def pushed_otherwise(machine: Machine, arm: str, records: Sequence[int]) -> None:
+def pushed_otherwise(machine: Machine, arm: str, record: int | None) -> None:
     """Work out anew what the motors of an arm give from now on: what it pressed with may have been released.
 
     Args:
         machine: that runs the program.
         arm: its name.
-        records: numbers of the stages that it is on.
+        record: number of the stage that it is on; None where it is on none.
     """
     if not any(push.wrenches.any() for push in machine.state.pushes[arm]):
         return
@@ -109,7 +108,7 @@ def pushed_otherwise(machine: Machine, arm: str, records: Sequence[int]) -> None
     tau[:done] = last.tau[:done]
     machine.state.runs[arm][-1] = attrs.evolve(last, tau=tau)
     peak, when = peaks_of(tau, period)
-    for record in records:
+    if record is not None:
         machine.state.stages[record] = attrs.evolve(machine.state.stages[record], peak_effort=peak, peak_time=when)
 
 
@@ -157,10 +156,8 @@ def too_deep(machine: Machine, process: Process, motion: Motion) -> NoReturn:
     notes = [f"the arm is stopped within its limits, and has pressed {_deep(motion.pressed)} then"]
     helps = ["stop sooner: at a smaller force, or at a lower speed"]
     if least is not None and least > allowed:
-        notes.append(
-            f"at this speed that cannot be avoided: stopped from the first contact on, it presses {least * 1e3:.3g} mm "
-            "deep"
-        )
+        text = "at this speed that cannot be avoided: stopped from the first contact on, it presses"
+        notes.append(f"{text} {least * 1e3:.3g} mm deep")
         helps = _slower(motion, allowed / least)
     elif least is not None:
         notes.append(f"stopped from the first contact on, it would press {least * 1e3:.3g} mm deep")

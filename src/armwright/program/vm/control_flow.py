@@ -64,26 +64,18 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
             if not by_value and machine.names_variable(process, operand):
                 bindings[key] = machine.name(process, operand)
                 continue
-            if not by_value:
-                machine.grow(machine.state.tree.place(slot, machine.pose(process, operand, step)), slot, step.span)
-            elif kind.kind is VariableKind.SCALAR:
+            if kind.kind is VariableKind.SCALAR and by_value:
                 machine.state.values[slot] = machine.number(process, operand, step)
-            else:
+            elif by_value:
                 machine.state.values[slot] = machine.pose(process, operand, step)
+            else:
+                machine.grow(machine.state.tree.place(slot, machine.pose(process, operand, step)), slot, step.span)
         bindings[key] = slot
         machine.state.types[slot] = kind
         own.append(slot)
-    process.stack.append(
-        Activation(
-            kind="procedure",
-            name=name,
-            bindings=bindings,
-            back=process.at,
-            called=step.span,
-            own=tuple(own),
-            locks=len(process.locks),
-        )
-    )
+    inside = Activation(kind="procedure", name=name, bindings=bindings, back=process.at, called=step.span)
+    inside.own, inside.locks = tuple(own), len(process.locks)
+    process.stack.append(inside)
     process.at = procedure.start
 
 
@@ -166,9 +158,8 @@ def end(machine: Machine, process: Process) -> None:
     release(machine, process, 0)
     process.done = True
     process.motion = process.pending = None
-    if (
-        process in machine.state.processes
-    ):  # not where the branch after it could not begin: then its COBEGIN let none go
+    # Where the branch after it could not begin, its COBEGIN has let none go.
+    if process in machine.state.processes:
         machine.state.processes.remove(process)
 
 
@@ -229,9 +220,7 @@ def rest(machine: Machine, span: Span) -> list[str]:
     """
     for process in machine.state.processes:
         give_up(machine, process)
-    machine.state.ticks = max(
-        [machine.state.ticks, *(_still(machine, process, span) for process in machine.state.processes)]
-    )
+    machine.state.ticks = max(_still(machine, process, span) for process in machine.state.processes)
     not_at_rest = sorted(machine.hardware.running())
     for device in not_at_rest:
         machine.hardware.operate(device, on=False)
@@ -243,25 +232,15 @@ def _still(machine: Machine, process: Process, span: Span) -> int:
     """Give up the motion of a process, if it makes one; return when its arm is at rest."""
     if process.motion is None:
         return machine.state.ticks
-    motion, end_of_motion = process.motion, stop(machine, process, span)
-    note_contact(machine, motion, end_of_motion)
+    motion, end = process.motion, stop(machine, process, span)
+    note_contact(machine, motion, end)
     words, contact = contact_of(motion)
-    process.motion = None
-    machine.effect(
-        process, "STOP", f"{motion.arm} stops{words}", span, until=end_of_motion, arm=motion.arm, data=contact
-    )
-    motion.ended = motion.ended or EarlyEnd.BRAKED
-    machine.effect(
-        process,
-        "MOVE",
-        motion.trace,
-        motion.span,
-        since=motion.begun,
-        until=end_of_motion,
-        arm=motion.arm,
-        data={**motion.data, **contact},
-    )
-    return end_of_motion
+    process.motion, arm = None, motion.arm
+    machine.effect(process, "STOP", f"{arm} stops{words}", span, until=end, arm=arm, data=contact)
+    motion.ended, since = motion.ended or EarlyEnd.BRAKED, motion.begun
+    data = {**motion.data, **contact}
+    machine.effect(process, "MOVE", motion.trace, motion.span, since=since, until=end, arm=arm, data=data)
+    return end
 
 
 def finish(machine: Machine, process: Process, span: Span, word: str) -> None:
@@ -295,10 +274,9 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
         if (attempt := _attempt(machine, process, span)) is not None:
             process.at = attempt.recovery
             release(machine, process, attempt.locks)
-            cause = (
-                f"{error.diagnostic.code} in line {machine.code.source.line(span.start)}: {error.diagnostic.message}"
-            )
-            machine.effect(process, "ERROR", cause, span, data={"code": error.diagnostic.code})
+            code, line = error.diagnostic.code, machine.code.source.line(span.start)
+            text = f"{code} in line {line}: {error.diagnostic.message}"
+            machine.effect(process, "ERROR", text, span, data={"code": code})
             return True
         if process.parent is None:
             machine.state.ticks = process.wake

@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from armwright.cell.hardware import DeviceError
 from armwright.program.bytecode.instructions import Instruction, Op
 from armwright.program.vm.contact import look_out, note_contact, pushed_otherwise
-from armwright.program.vm.machine import Handler, Machine
+from armwright.program.vm.machine import Handler, Machine, pose_data
 from armwright.program.vm.process import Pending, Process
-from armwright.spatial.poses import to_noap
+from armwright.program.vm.recording import TimedKind
 
 
 def _gripper(machine: Machine, process: Process, step: Instruction) -> None:
@@ -27,20 +25,18 @@ def _gripper(machine: Machine, process: Process, step: Instruction) -> None:
         raise machine.error(process, "E231", text, step.span, "expected 0 to 1 m")
     hand = machine.state.hands[arm]
     hand.holds = hand.at if closed else None
-    motions = [process.motion for process in machine.state.processes if process.motion and process.motion.arm == arm]
-    for motion in motions:
+    mover = machine.mover(arm)
+    motion = None if mover is None else mover.motion
+    if motion is not None:
         note_contact(machine, motion)
     time = machine.hardware.fingers(arm, closed=closed, width=metres)
-    pushed_otherwise(machine, arm, [motion.record for motion in motions if motion.record >= 0])
-    for motion in motions:
+    pushed_otherwise(machine, arm, None if motion is None or motion.record < 0 else motion.record)
+    if motion is not None:
         # What is released does not press any more.
         look_out(machine, motion)
     text = f"{arm} {step.op}" + (f" TO {width:g}" if width is not None else "")
-    machine.take_time(
-        process,
-        time,
-        Pending(kind="GRASP" if closed else "OPEN", text=text, since=machine.starts(), span=step.span, arm=arm),
-    )
+    kind: TimedKind = "GRASP" if closed else "OPEN"
+    machine.take_time(process, time, Pending(kind=kind, text=text, since=machine.starts(), span=step.span, arm=arm))
 
 
 def _operate(machine: Machine, process: Process, step: Instruction) -> None:
@@ -60,9 +56,8 @@ def _read_visions(machine: Machine, process: Process, step: Instruction) -> None
     except DeviceError as error:
         raise machine.error(process, "R601", str(error), step.span, "the camera is asked here") from None
     text = f"READ VISIONS {machine.spelled(name)}"
-    reading = (name, np.asarray(X_WF))
-    data: dict[str, object] = {"frame": name, "pose": to_noap(reading[1]).tolist()}
-    pending = Pending(kind="READ", text=text, since=machine.starts(), span=step.span, place=reading, data=data)
+    data, since = pose_data(name, X_WF), machine.starts()
+    pending = Pending(kind="READ", text=text, since=since, span=step.span, place=(name, X_WF), data=data)
     machine.take_time(process, time, pending)
 
 
@@ -70,7 +65,7 @@ def _read_system(machine: Machine, process: Process, step: Instruction) -> None:
     arm = machine.name(process, step.operands[0])
     machine.claim(process, arm, step.span)
     machine.set_hand(arm, step.span)
-    data: dict[str, object] = {"frame": arm, "pose": to_noap(machine.state.tree.world(arm)).tolist()}
+    data = pose_data(arm, machine.state.tree.world(arm))
     machine.effect(process, "READ", f"READ SYSTEM {arm}", step.span, arm=arm, data=data)
 
 

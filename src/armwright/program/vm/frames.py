@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 from armwright.cell.frames import WORLD
 from armwright.program.bytecode.instructions import Instruction, Op
-from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_arm
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.process import Process
@@ -27,33 +26,21 @@ def _affix(machine: Machine, process: Process, step: Instruction) -> None:
     if machine.state.tree.would_ring(child, parent):
         note = "frames form a tree; each hangs on one other and in the end on WORLD"
         label = f"{spelled(child)} cannot hang on {'itself' if child == parent else spelled(parent)}"
-        chain = [
-            ancestor
-            for ancestor in (parent, *machine.state.tree.ancestors(parent))
-            if ancestor != child and ancestor in machine.state.written
-        ]
-        hung = [Label(machine.state.written[frame], f"{spelled(frame)} got its place here") for frame in chain[:3]]
-        raise machine.error(
-            process, "E305", "this AFFIX would close a ring", step.span, label, secondary=hung, notes=[note]
-        )
+        chain = [frame for frame in (parent, *machine.state.tree.ancestors(parent)) if frame != child]
+        hung = [got for frame in chain for got in machine.origin(frame, f"{spelled(frame)} got its place here")][:3]
+        text = "this AFFIX would close a ring"
+        raise machine.error(process, "E305", text, step.span, label, secondary=hung, notes=[note])
     machine.grow(machine.state.tree.affix(child, parent, step_X, rigid=rigid), child, step.span)
-    machine.effect(
-        process,
-        "AFFIX",
-        f"AFFIX {spelled(child)} -> {spelled(parent)}",
-        step.span,
-        data={"child": child, "parent": parent, "rigidly": rigid},
-    )
+    data = {"child": child, "parent": parent, "rigidly": rigid}
+    machine.effect(process, "AFFIX", f"AFFIX {spelled(child)} -> {spelled(parent)}", step.span, data=data)
 
 
 def _unfix(machine: Machine, process: Process, step: Instruction) -> None:
     child = machine.name(process, step.operands[0])
     spelled = machine.spelled
     if is_arm(child) or child == WORLD:
-        text = f"`{spelled(child)}` cannot be unfixed"
-        raise machine.error(
-            process, "E308" if is_arm(child) else "E309", text, step.span, "hangs on nothing that could be cut"
-        )
+        code, text = "E308" if is_arm(child) else "E309", f"`{spelled(child)}` cannot be unfixed"
+        raise machine.error(process, code, text, step.span, "hangs on nothing that could be cut")
     machine.held(child, step, process)
     above = machine.state.tree.parent(child)
     if len(step.operands) > 1 and (parent := machine.name(process, step.operands[1])) != above:
@@ -61,7 +48,7 @@ def _unfix(machine: Machine, process: Process, step: Instruction) -> None:
         instead = f"write `UNFIX {spelled(child)} FROM {spelled(above or WORLD)}`" if hangs else "leave this UNFIX out"
         text = f"`{spelled(child)}` is not affixed to `{spelled(parent)}`"
         label = f"hangs on {spelled(above or WORLD)}"
-        where = [Label(machine.state.written[child], "here it got its place")] if child in machine.state.written else []
+        where = machine.origin(child, "here it got its place")
         raise machine.error(process, "E306", text, step.span, label, secondary=where, helps=[instead])
     machine.grow(machine.state.tree.unfix(child), child, step.span)
     machine.effect(process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data={"child": child, "parent": above})

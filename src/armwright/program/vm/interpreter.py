@@ -31,14 +31,8 @@ _FINAL = ("E504", "E506")
 # A time this part of a period before a tick is on it.
 _ON_A_TICK = 1e-6
 
-HANDLERS: Mapping[Op, Handler] = {
-    **expressions.HANDLERS,
-    **frames.HANDLERS,
-    **devices.HANDLERS,
-    **move.HANDLERS,
-    **control_flow.HANDLERS,
-    **output.HANDLERS,
-}
+_FAMILIES = (expressions, frames, devices, move, control_flow, output)
+HANDLERS: Mapping[Op, Handler] = {op: handler for family in _FAMILIES for op, handler in family.HANDLERS.items()}
 
 # Called now and then: the time on the clock [s], the line of the next statement.
 Progress = Callable[[float, int], None]
@@ -139,9 +133,8 @@ def _advance(machine: Machine, process: Process) -> None:
         process.pending = None
         if pending.place is not None:
             machine.place(process, *pending.place, pending.span)
-        machine.effect(
-            process, pending.kind, pending.text, pending.span, since=pending.since, arm=pending.arm, data=pending.data
-        )
+        span, since, arm = pending.span, pending.since, pending.arm
+        machine.effect(process, pending.kind, pending.text, span, since=since, arm=arm, data=pending.data)
         return
     if process.follows is not None:
         go_on(machine, process)
@@ -165,15 +158,15 @@ def _stopped(machine: Machine, error: RunError, process: Process, arm: str | Non
 
 def _failed(machine: Machine, failure: Failure, stopped: Sequence[str]) -> Recording:
     """Return all that happened up to a failure, and as the last thing the failure, with the devices it switched off."""
-    found, recording = failure.diagnostic, machine.recording()
-    line = machine.code.source.line(found.span.start)
-    text = f"{found.code} in line {line}: {found.message}{words_of(machine, stopped)}"
-    data = {"code": found.code, "failed_at": failure.time, "switched_off": list(stopped)}
+    fault, recording = failure.diagnostic, machine.recording()
+    line = machine.code.source.line(fault.span.start)
+    text = f"{fault.code} in line {line}: {fault.message}{words_of(machine, stopped)}"
+    data = {"code": fault.code, "failed_at": failure.time, "switched_off": list(stopped)}
     end = Effect(
         t0=failure.time,
         t1=machine.now,
         kind="ERROR",
-        span=found.span,
+        span=fault.span,
         text=text,
         process=failure.process,
         order=machine.starts().order,
@@ -189,15 +182,13 @@ def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
     For every straight line that was gone round, every VIA with stops because corners cannot be rounded, and every
     joint asked for too much effort.
     """
-    found = []
+    diagnostics = []
     for stage in recording.stages:
-        found += [warning for warning in (detour_warning(stage), stops_warning(stage)) if warning is not None]
+        diagnostics += [warning for warning in (detour_warning(stage), stops_warning(stage)) if warning is not None]
         arm = recording.cell.arms[stage.arm].arm
-        over = stage.peak_effort / arm.limit("effort")
-        if (over <= 1).all():
-            continue
-        found += [_effort_warning(stage, arm, joint) for joint in np.flatnonzero(over > 1).tolist()]
-    return tuple(found)
+        excessive = np.flatnonzero(stage.peak_effort / arm.limit("effort") > 1)
+        diagnostics += [_effort_warning(stage, arm, joint) for joint in excessive.tolist()]
+    return tuple(diagnostics)
 
 
 def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:

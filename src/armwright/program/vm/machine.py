@@ -191,13 +191,8 @@ class Machine:
             return
         assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
         self.place(process, name, value, step.span)
-        self.effect(
-            process,
-            "PLACE",
-            f"{self.spelled(name)} = {shown(value, self.code.units)}",
-            step.span,
-            data={"frame": name, "pose": to_noap(value).tolist()},
-        )
+        text, data = f"{self.spelled(name)} = {shown(value, self.code.units)}", pose_data(name, value)
+        self.effect(process, "PLACE", text, step.span, data=data)
 
     def has_place(self, name: str) -> bool:
         """Whether a frame stands somewhere."""
@@ -231,22 +226,34 @@ class Machine:
 
     def set_hand(self, arm: str, span: Span, *, at: int | None = None) -> None:
         """Let the frame table know where an arm is now, or will be at a later tick."""
-        q = self.hardware.configuration(arm, self.now if at is None else at * self.cell.period)
-        X_BH = forward(self.cell.arms[arm].arm, q)
-        self.grow(self.state.tree.place(arm, self.state.tree.world(base_name(arm)) @ X_BH), arm, span)
+        self.grow(self.state.tree.place(arm, self.gripper_pose(arm, at)), arm, span)
+
+    def gripper_pose(self, arm: str, tick: int | None = None) -> Array:
+        """Return the pose of the gripper of an arm in the world, now or at a later tick."""
+        q = self.hardware.configuration(arm, self.now if tick is None else tick * self.cell.period)
+        return self.state.tree.world(base_name(arm)) @ forward(self.cell.arms[arm].arm, q)
+
+    def carrier(self, name: str) -> str | None:
+        """Return the arm that a frame is or hangs on; None where it hangs on none."""
+        return next((frame for frame in (name, *self.state.tree.ancestors(name)) if is_arm(frame)), None)
+
+    def mover(self, arm: str) -> Process | None:
+        """Return the process that moves an arm; None where the arm is at rest."""
+        return next((one for one in self.state.processes if one.motion is not None and one.motion.arm == arm), None)
+
+    def origin(self, name: str, text: str) -> list[Label]:
+        """Return a text about the statement that gave a frame its pose or its parent; nothing where none did."""
+        return [Label(self.state.written[name], text)] if name in self.state.written else []
 
     def look(self, process: Process, name: str) -> None:
         """Let the frame table know where a frame is now, if a moving arm carries it."""
         if name not in self.state.tree or not any(process.motion for process in self.state.processes):
             return
-        arm = next((ancestor for ancestor in (name, *self.state.tree.ancestors(name)) if is_arm(ancestor)), None)
-        mover = next(
-            (process for process in self.state.processes if process.motion and process.motion.arm == arm), None
-        )
+        arm = self.carrier(name)
+        mover = None if arm is None else self.mover(arm)
         # A condition of a MOVE finds the arm of this MOVE where it is.
         if arm is not None and mover is not None and not (mover is process and process.now.kind == "condition"):
-            X_BH = forward(self.cell.arms[arm].arm, self.hardware.configuration(arm, self.now))
-            self.state.tree = self.state.tree.place(arm, self.state.tree.world(base_name(arm)) @ X_BH)
+            self.state.tree = self.state.tree.place(arm, self.gripper_pose(arm))
 
     def grow(self, tree: FrameTree, name: str, span: Span) -> None:
         """Take another frame tree, in which ``name`` got its pose or its parent."""
@@ -273,10 +280,8 @@ class Machine:
             RunError: the cell has no such arm, or it belongs to another branch.
         """
         if arm not in self.cell.arms:
-            known = ", ".join(sorted(self.cell.arms)) or "none"
-            raise self.error(
-                process, "E302", f"the cell has no arm {arm}", span, "no such arm", notes=[f"arms: {known}"]
-            )
+            note = f"arms: {', '.join(sorted(self.cell.arms)) or 'none'}"
+            raise self.error(process, "E302", f"the cell has no arm {arm}", span, "no such arm", notes=[note])
         process.last_arm = arm
         owners = self.state.owners.setdefault(arm, [])
         owners[:] = [owner for owner in owners if not owner.done]
@@ -295,8 +300,7 @@ class Machine:
             return []
         above = [moved, *self.state.tree.ancestors(moved)]
         name = above[above.index(arm) - 1]
-        text = f"{self.spelled(name)} was affixed to {arm} here"
-        return [Label(self.state.written[name], text)] if name in self.state.written else []
+        return self.origin(name, f"{self.spelled(name)} was affixed to {arm} here")
 
     def take_time(self, process: Process, seconds: float, pending: Pending) -> None:
         """Let the time of a statement go by before it takes effect."""
@@ -366,6 +370,11 @@ class Machine:
             helps=tuple(helps),
         )
         return RunError(diagnostic, self.state.tree, self.now)
+
+
+def pose_data(frame: str, X: Array) -> dict[str, object]:
+    """Return the facts of an effect that gives a frame a pose."""
+    return {"frame": frame, "pose": to_noap(X).tolist()}
 
 
 # Executes an instruction for a process.

@@ -11,7 +11,6 @@ from armwright.arrays import Array
 from armwright.cell.model import base_name
 from armwright.errors import IncapableArmError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.certificate import Certificate
 from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
 from armwright.motion.trajectory import Trajectory, hold, slowed_together, whole_ticks
 from armwright.program.bytecode.instructions import Instruction, MotionKind, Op, StagePlan, stages_of, stages_text
@@ -24,7 +23,7 @@ from armwright.program.vm.expressions import evaluate_instructions
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.move_diagnostics import CODES, detour_advice, stopped, where_and_why
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
-from armwright.program.vm.process import Activation, EarlyEnd, Guard, Motion, Process
+from armwright.program.vm.process import EarlyEnd, Guard, Motion, Process
 from armwright.program.vm.recording import Run, RunStage, efforts, peaks_of
 from armwright.spatial.poses import inverse
 
@@ -77,18 +76,8 @@ def go_on(machine: Machine, process: Process) -> None:
         if not guard.done and _holds(machine, process, motion, guard):
             guard.done = True
             machine.set_hand(motion.arm, motion.span)
-            now = process.now
-            process.stack.append(
-                Activation(
-                    kind="action",
-                    bindings=now.bindings,
-                    passing=now.passing,
-                    wrote=now.wrote,
-                    back=process.at,
-                    called=motion.span,
-                    locks=len(process.locks),
-                )
-            )
+            action = process.now.inner("action", back=process.at, called=motion.span, locks=len(process.locks))
+            process.stack.append(action)
             process.at = guard.action
             return
     if machine.state.ticks < motion.until:
@@ -152,32 +141,22 @@ def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction)
     if is_arm(moved):
         return moved, False
     machine.held(moved, begin, process)
-    above = machine.state.tree.ancestors(moved)
-    if (arm := next((name for name in above if is_arm(name)), None)) is not None:
+    if (arm := machine.carrier(moved)) is not None:
         return arm, False
     X_WM = machine.state.tree.world(moved)
     for name, hand in machine.state.hands.items():
         if hand.holds == moved and np.allclose(machine.state.tree.world(name), X_WM, rtol=0, atol=_SAME_PLACE):
             machine.grow(machine.state.tree.affix(moved, name), moved, begin.span)
             return name, True
-    return _not_carried(machine, process, moved, begin, above[0])
-
-
-def _not_carried(machine: Machine, process: Process, moved: str, begin: Instruction, above: str) -> NoReturn:
-    spelled = machine.spelled(moved)
-    where = (
-        [Label(machine.state.written[moved], f"{spelled} got its place here")] if moved in machine.state.written else []
-    )
+    spelled, likely = machine.spelled(moved), process.last_arm or min(machine.cell.arms, default="ARM_1")
     raise machine.error(
         process,
         "E301",
         f"`{spelled}` cannot be moved: it is not affixed to an arm",
         begin.span,
-        f"hangs on {machine.spelled(above)}, not on an arm",
-        secondary=where,
-        helps=[
-            f"grasp it and write `AFFIX {spelled} TO {process.last_arm or min(machine.cell.arms, default='ARM_1')}`"
-        ],
+        f"hangs on {machine.spelled(machine.state.tree.ancestors(moved)[0])}, not on an arm",
+        secondary=machine.origin(moved, f"{spelled} got its place here"),
+        helps=[f"grasp it and write `AFFIX {spelled} TO {likely}`"],
     )
 
 
@@ -187,7 +166,7 @@ def _one_at_a_time(machine: Machine, process: Process, arm: str, span: Span) -> 
     Raises:
         RunError: one is.
     """
-    other = next((process for process in machine.state.processes if process.motion and process.motion.arm == arm), None)
+    other = machine.mover(arm)
     if other is None or other.motion is None:
         return
     text = f"{arm} cannot begin a MOVE in {process.title} before that of {other.title} is over"
@@ -204,6 +183,7 @@ def _plan(
         TR-83-008, third paper: ARM-1' = Base^-1 f2 f1^-1, where f1 is the relation from the arm to it.
     """
     cell, cell_arm = machine.cell, machine.cell.arms[arm]
+    corner = cell.corner_room if machine.code.standard is Standard.RLO_2 else None
     plans = stages_of(request.form)
     X_BW = inverse(machine.state.tree.world(base_name(arm)))
     X_MH = inverse(machine.state.tree.relation(moved, arm))
@@ -212,9 +192,7 @@ def _plan(
             kind=legs.kind.value,
             poses=np.stack([X_BW @ _pose(machine, process, request.goals[label]) @ X_MH for label in legs.frames]),
             blend=request.blend,
-            corner=cell.corner_room
-            if legs.kind is MotionKind.SPLINE and machine.code.standard is Standard.RLO_2
-            else None,
+            corner=corner if legs.kind is MotionKind.SPLINE else None,
         )
         for legs in plans
     ]
@@ -224,11 +202,10 @@ def _plan(
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except IncapableArmError as error:
-        raise machine.error(
-            process, "E406", f"{arm} cannot make this MOVE at any speed: {error}", request.span, "asked for here"
-        ) from None
+        text = f"{arm} cannot make this MOVE at any speed: {error}"
+        raise machine.error(process, "E406", text, request.span, "asked for here") from None
     if request.duration is not None:
-        stages = _timed(machine, process, request, stages)
+        stages = _timed(machine, process, request, stages, request.duration)
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
 
 
@@ -236,10 +213,11 @@ def _pose(machine: Machine, process: Process, goal: Goal) -> Array:
     return machine.pose(process, goal.operand, goal.step)
 
 
-def _timed(machine: Machine, process: Process, request: MoveRequest, stages: Sequence[Stage]) -> list[Stage]:
+def _timed(
+    machine: Machine, process: Process, request: MoveRequest, stages: Sequence[Stage], asked_for: float
+) -> list[Stage]:
     """Return the stages slowed so that the whole MOVE takes as long as was asked for."""
-    asked_for, least = request.duration, sum(stage.trajectory.duration for stage in stages)
-    assert asked_for is not None  # noqa: S101 - asked for only then
+    least = sum(stage.trajectory.duration for stage in stages)
     if asked_for < least - machine.cell.period:
         text = f"this MOVE cannot be done in {asked_for:g} s"
         raise machine.error(process, "E405", text, request.span, f"it takes {least:.3f} s or more")
@@ -250,23 +228,16 @@ def _timed(machine: Machine, process: Process, request: MoveRequest, stages: Seq
     slow = slowed_together([stage.trajectory for stage in stages], asked_for, machine.cell.period)
     # What kept a stage slow does so no more where it is to take longer.
     longer = asked_for > least + machine.cell.period
-    return [
-        attrs.evolve(
-            stage,
-            trajectory=legs,
-            slowed="" if longer else stage.slowed,
-            certificate=_retimed(stage, legs, longer=longer),
-        )
-        for stage, legs in zip(stages, slow, strict=True)
-    ]
+    return [_retimed(stage, trajectory, longer=longer) for stage, trajectory in zip(stages, slow, strict=True)]
 
 
-def _retimed(stage: Stage, slow: Trajectory, *, longer: bool) -> Certificate | None:
-    """Return the certificate of a stage run as long as was asked for; no limit slows it where that is longer."""
-    if stage.certificate is None or not slow.duration:
-        return stage.certificate
-    certificate = stage.certificate.retimed(slow.duration / stage.trajectory.duration)
-    return attrs.evolve(certificate, factor=1.0, because=None) if longer else certificate
+def _retimed(stage: Stage, slow: Trajectory, *, longer: bool) -> Stage:
+    """Return a stage run as long as was asked for; no limit slows it where that is longer."""
+    certificate = stage.certificate
+    if certificate is not None and slow.duration:
+        certificate = certificate.retimed(slow.duration / stage.trajectory.duration)
+        certificate = attrs.evolve(certificate, factor=1.0, because=None) if longer else certificate
+    return attrs.evolve(stage, trajectory=slow, slowed="" if longer else stage.slowed, certificate=certificate)
 
 
 def _fail_move(
@@ -275,11 +246,8 @@ def _fail_move(
     label = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
     goal, kind = request.goals[label], stage.kind.value
     secondary = []
-    if (
-        machine.names_variable(process, goal.operand)
-        and (name := machine.name(process, goal.operand)) in machine.state.written
-    ):
-        secondary.append(Label(machine.state.written[name], f"`{label}` got its place here"))
+    if machine.names_variable(process, goal.operand):
+        secondary = machine.origin(machine.name(process, goal.operand), f"`{label}` got its place here")
     raise machine.error(
         process,
         CODES[obstacle.cause],
@@ -340,9 +308,8 @@ def _start(machine: Machine, process: Process, motion: Motion) -> None:
             peak_time=when,
         )
     )
-    machine.state.runs[motion.arm].append(
-        Run(t0=machine.now, trajectory=trajectory, duration=trajectory.duration, tau=tau)
-    )
+    run = Run(t0=machine.now, trajectory=trajectory, duration=trajectory.duration, tau=tau)
+    machine.state.runs[motion.arm].append(run)
     motion.since, motion.until = machine.state.ticks, machine.state.ticks + ticks
     if any(guard.looks for guard in motion.guards):
         times = np.arange(counted + 1) * period
@@ -357,7 +324,7 @@ def _holds(machine: Machine, process: Process, motion: Motion, guard: Guard) -> 
     if guard.looks and len(motion.hands):
         index = min(machine.state.ticks - motion.since, len(motion.hands) - 1)
         machine.state.tree = tree.place(motion.arm, motion.hands[index])
-    process.stack.append(Activation(kind="condition", bindings=now.bindings, passing=now.passing, wrote=now.wrote))
+    process.stack.append(now.inner("condition"))
     evaluate_instructions(machine, process, machine.code.instructions, guard.condition)
     process.stack.pop()
     machine.state.tree = tree

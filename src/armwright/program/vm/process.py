@@ -12,6 +12,7 @@ from armwright.cell.hardware import Press
 from armwright.motion.plan import Stage
 from armwright.motion.trajectory import Trajectory
 from armwright.program.language.source import Span
+from armwright.program.vm.recording import TimedKind
 
 
 @attrs.frozen
@@ -82,6 +83,10 @@ class Activation:
     called: Span | None = None
     own: tuple[str, ...] = ()
     locks: int = 0
+
+    def inner(self, kind: Literal["condition", "action"], **own: Any) -> "Activation":
+        """Return the activation of a condition or an action, which has the names of this one."""
+        return Activation(kind=kind, bindings=self.bindings, passing=self.passing, wrote=self.wrote, **own)
 
     def copy(self, shared: Callable[[dict[str, Any]], dict[str, Any]]) -> "Activation":
         """Return a copy; ``shared`` copies names, and the same names once."""
@@ -178,13 +183,8 @@ class Motion:
     @property
     def data(self) -> dict[str, object]:
         """Further facts for the events."""
-        facts: dict[str, object] = {
-            "moved": self.moved,
-            "goal": self.goal,
-            "speed": self.speed,
-            "implied_affix": self.implied,
-        }
-        return facts if self.ended is None else {**facts, self.ended.value: True}
+        ended = {} if self.ended is None else {self.ended.value: True}
+        return {"moved": self.moved, "goal": self.goal, "speed": self.speed, "implied_affix": self.implied, **ended}
 
     def copy(self) -> "Motion":
         """Return a copy; what never changes is shared."""
@@ -222,7 +222,7 @@ class Pending:
         data: further facts for the events.
     """
 
-    kind: Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
+    kind: TimedKind
     text: str
     since: Start
     span: Span

@@ -23,24 +23,10 @@ _ROWS_AT_ONCE = 16384
 # A time this part of a period behind a tick is on it.
 _ON_A_TICK = 1e-6
 
-EffectKind: TypeAlias = Literal[
-    "PLACE",
-    "AFFIX",
-    "UNFIX",
-    "OPEN",
-    "GRASP",
-    "OPERATE",
-    "READ",
-    "MOVE",
-    "STOP",
-    "SIGNAL",
-    "WAIT",
-    "PAUSE",
-    "LOCK",
-    "PRINT",
-    "ERROR",
-    "END",
-]
+# Of statements that take time, and take effect at its end.
+TimedKind: TypeAlias = Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
+_MotionKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "MOVE", "STOP"]
+EffectKind: TypeAlias = TimedKind | _MotionKind | Literal["SIGNAL", "WAIT", "LOCK", "PRINT", "ERROR", "END"]
 # Not of the trace: assignments, locks and the end of the text.
 _SILENT = ("PLACE", "LOCK", "END")
 
@@ -199,7 +185,7 @@ class Recording:
         streams: one per arm.
         trees: the frame tree at the start and after each change, with the time of the change [s]; of very many
             changes the last in every two-thousandth of the run.
-        postures: by arm, the configuration (n,) at the end.
+        configurations: by arm, the configuration (n,) at the end.
         failure: why it did not come to its end; None where it did.
     """
 

@@ -94,6 +94,12 @@ class MachineState:
             processes=[program],
         )
 
+    @property
+    def stuck(self) -> list[Process]:
+        """The processes that wait for an event or for locks, in the order of the text."""
+        waiting = (process for process in self.processes if process.waiting and process.waiting.what != "branches")
+        return sorted(waiting, key=lambda process: process.path)
+
     def copy(self) -> "MachineState":
         """Return the same state; what is done to one of them changes nothing in the other.
 

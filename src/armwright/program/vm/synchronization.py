@@ -86,17 +86,15 @@ def _locked_by(machine: Machine, name: str) -> set[Process]:
 
 def deadlock(machine: Machine) -> RunError:
     """Return the error of processes that all wait for one another."""
-    stuck = [process for process in machine.state.processes if process.waiting and process.waiting.what != "branches"]
-    stuck.sort(key=lambda one: one.path)
-    says = []
-    for one in stuck:
-        assert one.waiting is not None  # noqa: S101 - chosen so
-        names = ", ".join(map(machine.spelled, one.waiting.names))
-        what = f"waits for {names}" if one.waiting.what == "event" else f"waits for the lock of {names}"
-        locks = one.waiting.what == "locks"
-        holders = {holder for name in one.waiting.names if locks for holder in _locked_by(machine, name)} - {one}
-        locked = ", ".join(holder.title for holder in sorted(holders, key=lambda holder: holder.path))
-        says.append((one.waiting.span, f"{one.title} {what}{f', held by {locked}' if locked else ''}"))
-    (span, label), *others = says
-    text = f"{len(says)} processes wait for ever" if others else "the program waits for ever"
-    return machine.error(stuck[0], "E501", text, span, label, secondary=[Label(*other) for other in others])
+    texts = []
+    for process in (stuck := machine.state.stuck):
+        assert process.waiting is not None  # noqa: S101 - chosen so
+        names = ", ".join(map(machine.spelled, process.waiting.names))
+        locks = process.waiting.what == "locks"
+        holders = {holder for name in process.waiting.names if locks for holder in _locked_by(machine, name)}
+        locked = ", ".join(holder.title for holder in sorted(holders - {process}, key=lambda holder: holder.path))
+        text = f"{process.title} waits for {'the lock of ' if locks else ''}{names}"
+        texts.append(Label(process.waiting.span, f"{text}, held by {locked}" if locked else text))
+    first, *others = texts
+    text = f"{len(texts)} processes wait for ever" if others else "the program waits for ever"
+    return machine.error(stuck[0], "E501", text, first.span, first.text, secondary=others)
