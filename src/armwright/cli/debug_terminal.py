@@ -140,7 +140,7 @@ class Terminal:
         with self._interruptible():
             while True:
                 stop = debugger.work(_SLICE)
-                news = [effect for effect in debugger.news() if effect.kind not in {"PLACE", "LOCK"}]
+                news = [effect for effect in debugger.new_effects() if effect.kind not in {"PLACE", "LOCK"}]
                 for text in listed([f"{e.t1:9.3f} s  {e.text}" for e in news], ON_A_TERMINAL, _EVENT_LOG_HINT):
                     print(text)
                 if self._interrupted and debugger.running:
@@ -192,7 +192,7 @@ class Terminal:
             print(f"breakpoint {breakpoint_.number} in line {breakpoint_.start.line}")
 
     def _watch(self, name: str) -> None:
-        variable = self._debugger.evaluate(name, self._path).kept
+        variable = self._debugger.evaluate(name, self._path).slot
         watch = self._debugger.watch(variable or name)
         print(f"breakpoint {watch.number}: when {name} changes")
 
@@ -208,7 +208,7 @@ class Terminal:
 
     def _set(self, argument: str) -> None:
         name, _, text = argument.partition("=")
-        variable = self._debugger.evaluate(name.strip(), self._path).kept
+        variable = self._debugger.evaluate(name.strip(), self._path).slot
         if variable is None:
             print(f"cannot assign to `{name.strip()}`")
             return

@@ -7,7 +7,7 @@ from armwright.cell.simulator import Simulator
 from armwright.program.debugger.breakpoints import CountError
 from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
 from armwright.program.debugger.expressions import ExpressionError
-from armwright.program.debugger.variables import Shown
+from armwright.program.debugger.variables import Variable
 from armwright.program.language.words import Standard
 from armwright.program.vm.interpreter import Limits, interpret
 from program.running import cell_of, code_of, corpus_text, down
@@ -47,12 +47,12 @@ def lines(debugger: Debugger, command: Command, count: int) -> list[int]:
     return found
 
 
-def inside(shown: Shown) -> dict[str, Shown]:
+def inside(shown: Variable) -> dict[str, Variable]:
     assert shown.inside is not None
     return {one.name: one for one in shown.inside()}
 
 
-def scope(debugger: Debugger, name: str, path: tuple[int, ...] = (), level: int = 0) -> dict[str, Shown]:
+def scope(debugger: Debugger, name: str, path: tuple[int, ...] = (), level: int = 0) -> dict[str, Variable]:
     (one,) = (one for one in debugger.scopes(path, level) if one.name == name)
     return inside(one)
 
@@ -114,7 +114,7 @@ def test_whole_program_by_steps_is_the_same_run() -> None:
     debugger = load(text, "cell2")
     while not debugger.over:
         debugger.run("in")
-    recording = debugger.recording()
+    recording = debugger.machine.recording()
 
     assert recording.trace() == expected.trace()
     for one, other in zip(recording.streams, expected.streams, strict=True):
@@ -330,7 +330,7 @@ def test_log_points() -> None:
     debugger.break_at(5, log="{i} of 5, n = {n * 10}")
 
     assert debugger.run("continue").reason == "end"
-    assert [text for text, _ in debugger.said()] == [
+    assert [text for text, _ in debugger.log_messages()] == [
         f"{i} of 5, n = {10 * n}" for i, n in zip("12345", (0, 1, 3, 6, 10), strict=True)
     ]
 
@@ -492,7 +492,7 @@ def test_errors_with_a_recovery() -> None:
     quiet = load(text)
     assert quiet.run("continue").reason == "end"
     debugger = load(text)
-    debugger.catch(uncaught=True, caught=True)
+    debugger.execution.catches = frozenset({"uncaught", "caught"})
     stop = debugger.run("continue")
 
     assert (stop.reason, stop.caught, line(debugger)) == ("exception", True, 5)
@@ -579,7 +579,7 @@ def test_arrays() -> None:
     assert (slots.type, slots.elements) == ("ARRAY [2,3] OF FRAME", 6)
     assert list(inside(slots)) == ["[1,1]", "[1,2]", "[1,3]", "[2,1]", "[2,2]", "[2,3]"]
     assert inside(inside(slots)["[2,3]"])["p"].value == "(480, -80, 40)"
-    assert debugger.evaluate("slot[row, 1]").kept == "SLOT[1,1]"
+    assert debugger.evaluate("slot[row, 1]").slot == "SLOT[1,1]"
 
 
 def test_expressions() -> None:
@@ -633,7 +633,7 @@ def test_looking_changes_nothing() -> None:
                 if shown.inside is not None:
                     list(shown.inside())
         debugger.evaluate("ARM_1 * XYZ(0, 0, 1)")
-    recording = debugger.recording()
+    recording = debugger.machine.recording()
 
     assert recording.trace() == expected.trace()
     np.testing.assert_array_equal(recording.streams[0].q, expected.streams[0].q)

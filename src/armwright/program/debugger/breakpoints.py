@@ -78,62 +78,64 @@ class Watch:
 
     Attributes:
         number: its own, among the breakpoints.
-        kept: where the frame or variable is kept.
+        slot: where the frame or variable is kept.
         condition: that must be true; empty for none.
         hits: a condition on how often it has changed; empty for none.
         changes: how often it has changed since it is watched.
-        last: what it was when last looked at.
-        told: the motion that has been spoken of: process, beginning.
+        last: its value when it was last checked.
+        reported: the motion for which the run has stopped: process, beginning.
     """
 
     number: int
-    kept: str
+    slot: str
     condition: str = ""
     hits: str = ""
     changes: int = 0
     last: "Array | float | None" = None
-    told: tuple[Path, int] | None = None
+    reported: tuple[Path, int] | None = None
 
-    def look(self, view: Machine) -> str | None:
-        """Return what has changed since the last look, in words; None where nothing has."""
-        now = _value(view, self.kept)
+    def update(self, view: Machine) -> str | None:
+        """Return what has changed since the last check, in words; None where nothing has."""
+        now = _value(view, self.slot)
         before, self.last = self.last, now
-        process = mover(view, self.kept)
-        motion = None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
-        if self.told is not None:
+        motion = _motion(view, self.slot)
+        if self.reported is not None:
             # The motion goes on, or has just come to its end.
-            self.told = motion if motion == self.told else None
+            self.reported = motion if motion == self.reported else None
             return None
         if _same(before, now):
             return None
-        self.told = motion
+        self.reported = motion
         self.changes += 1
-        name = view.spelled(self.kept)
+        name = view.spelled(self.slot)
         if isinstance(now, float | int):
             return f"{name} = {now:g}" + ("" if before is None else f", was {before:g}")
         if now is None:
             return f"{name} has no value any more"
-        if process is not None and process.motion is not None:
-            return f"{name} begins to move with {process.motion.arm}"
+        if motion is not None:
+            return f"{name} begins to move with {view.carrier(self.slot)}"
         return f"{name} has moved" if before is not None else f"{name} has a value"
 
     def start(self, view: Machine, *, reported: bool) -> None:
-        """Take what is now for what was.
+        """Take the present value as the last.
 
         Args:
             view: the machine as it is seen now.
-            reported: whether of the motion that moves it now has been spoken.
+            reported: whether the run has stopped for the motion that moves it now.
         """
-        self.last = _value(view, self.kept)
-        process = mover(view, self.kept) if reported else None
-        self.told = None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
+        self.last = _value(view, self.slot)
+        self.reported = _motion(view, self.slot) if reported else None
 
-    def rides(self, view: Machine) -> bool:
-        """Whether an arm moves it, so that every tick has to be looked at."""
-        process = mover(view, self.kept)
-        if process is None or process.motion is None:
-            return False
-        return self.told != (process.path, process.motion.begun.tick)
+    def is_moved(self, view: Machine) -> bool:
+        """Whether an arm moves it, so that every tick has to be checked."""
+        motion = _motion(view, self.slot)
+        return motion is not None and motion != self.reported
+
+
+def _motion(view: Machine, slot: str) -> tuple[Path, int] | None:
+    """Return which motion of an arm moves a frame now: process, beginning; None where it is at rest."""
+    process = mover(view, slot)
+    return None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
 
 
 def _value(view: Machine, slot: str) -> "Array | float | None":

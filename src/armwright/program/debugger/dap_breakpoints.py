@@ -17,11 +17,11 @@ def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, A
         request.whole("line")
     if session.launch is not None and not _is_debugged(session, source):
         message = "this is not the program that is debugged"
-        return {"breakpoints": [{"id": session.number(), "verified": False, "message": message} for _ in requests]}
+        return {"breakpoints": [{"id": next(session.ids), "verified": False, "message": message} for _ in requests]}
     if session.debugger is not None:
-        session.debugger.clear(breakpoints=True)
-    session.wanted = [(session.number(), request) for request in requests]
-    return {"breakpoints": [session.bound(*request) for request in session.wanted]}
+        session.debugger.execution.breakpoints.clear()
+    session.breakpoints = [(next(session.ids), request) for request in requests]
+    return {"breakpoints": [session.set_breakpoint(*request) for request in session.breakpoints]}
 
 
 def _is_debugged(session: EditorSession, source: Arguments) -> bool:
@@ -43,23 +43,23 @@ def breakpoint_locations(session: EditorSession, arguments: Arguments) -> dict[s
     """Answer ``breakpointLocations``: where statements begin."""
     first = arguments.whole("line")
     offset = 1 - session.first_line
-    starts = session.live.places(first + offset, arguments.whole("endLine", first) + offset)
-    return {"breakpoints": [session.place(location.span) for location in starts]}
+    statements = session.live.execution.statements
+    starts = statements.between(first + offset, arguments.whole("endLine", first) + offset)
+    return {"breakpoints": [session.location(start.span) for start in starts]}
 
 
 def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``dataBreakpointInfo``: what of all that is shown can be watched."""
     name = arguments.text("name")
     debugger = session.standing
-    reference = arguments.whole("variablesReference", 0)
     try:
-        if reference:
-            shown = next((request for request in _inside(session, reference) if request.name == name), None)
-            slot = None if shown is None else shown.kept
+        if arguments.whole("variablesReference", 0):
+            variables, _, _ = session.variables(arguments)
+            slot = next((variable.slot for variable in variables if variable.name == name), None)
         else:
-            frame = arguments.whole("frameId", 0)
-            path, level = session.frames[frame - 1] if 0 < frame <= len(session.frames) else ((), 0)
-            slot = debugger.evaluate(name, path, level).kept
+            number = arguments.whole("frameId", 0)
+            path, level = session.frames[number - 1] if 0 < number <= len(session.frames) else ((), 0)
+            slot = debugger.evaluate(name, path, level).slot
     except ArmwrightError as error:
         return {"dataId": None, "description": str(error)}
     if slot is None or debugger.machine.type_of(slot).sizes:
@@ -68,23 +68,15 @@ def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[s
     return {"dataId": slot, "description": spelled, "accessTypes": ["write"], "canPersist": "'" not in slot}
 
 
-def _inside(session: EditorSession, reference: int) -> Any:
-    if not 0 < reference <= len(session.opened):
-        raise RequestError(f"there is nothing to open under {reference}")
-    inside = session.opened[reference - 1][0].inside
-    return () if inside is None else inside()
-
-
 def set_data_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setDataBreakpoints``: all frames and variables that are watched, instead of those before."""
     debugger = session.live
-    requests = [
-        (session.number(), part.text("dataId"), part.text("condition", ""), part.text("hitCondition", ""))
+    session.data_breakpoints = [
+        (next(session.ids), part.text("dataId"), part.text("condition", ""), part.text("hitCondition", ""))
         for part in arguments.parts("breakpoints")
     ]
-    debugger.clear(watches=True)
-    session.watched = requests
-    return {"breakpoints": [session.watch(*request) for request in requests]}
+    debugger.execution.watches.clear()
+    return {"breakpoints": [session.watch(*request) for request in session.data_breakpoints]}
 
 
 def set_exception_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
@@ -92,6 +84,7 @@ def set_exception_breakpoints(session: EditorSession, arguments: Arguments) -> d
     filters = arguments.given.get("filters", [])
     if not isinstance(filters, list):
         raise RequestError("filters: expected a list")
-    session.catches = frozenset(str(request) for request in filters)
-    session.catch()
+    session.catches = frozenset(map(str, filters))
+    if session.debugger is not None:
+        session.debugger.execution.catches = session.catches
     return {}

@@ -1,15 +1,13 @@
 """Requests about what a program that stands still looks like: stacks, variables, expressions."""
 
 import re
-from collections.abc import Sequence
-from itertools import islice
 from typing import Any
 
 from armwright.program.debugger.dap_messages import Arguments, RequestError
 from armwright.program.debugger.dap_session import EditorSession
 from armwright.program.debugger.expressions import names_at
 from armwright.program.debugger.history import Path
-from armwright.program.debugger.variables import Shown
+from armwright.program.debugger.variables import Elements, Variable
 from armwright.program.diagnostics.render import render
 from armwright.program.language.position_codec import UTF_16, PositionCodec
 from armwright.program.semantics.builtins import FUNCTIONS
@@ -43,34 +41,31 @@ def stack_trace(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     for level, frame in enumerate(frames):
         if first <= level < first + count:
             session.frames.append((path, level))
-            position = session.place(frame.span)
-            answers.append({"id": len(session.frames), "name": frame.title, "source": session.source(), **position})
+            location = session.location(frame.span)
+            answers.append({"id": len(session.frames), "name": frame.title, "source": session.source(), **location})
     return {"stackFrames": answers, "totalFrames": len(frames)}
 
 
 def scopes(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``scopes``: locals, variables, frames, arms, the run."""
     debugger = session.standing
+    arguments.whole("frameId")
     path, level = _frame(session, arguments)
     answers = []
-    for shown in debugger.scopes(path, level):
-        reference = _open(session, shown, path, level)
-        answers.append({"name": shown.name, "variablesReference": reference, "expensive": False})
+    for scope in debugger.scopes(path, level):
+        reference = _open(session, scope, path, level)
+        answers.append({"name": scope.name, "variablesReference": reference, "expensive": False})
     return {"scopes": answers}
 
 
 def variables(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``variables``: what is inside of something."""
     session.live  # noqa: B018 - there must be a program
-    reference = arguments.whole("variablesReference")
-    if not 0 < reference <= len(session.opened):
-        raise RequestError(f"there is nothing to open under {reference}")
-    shown, path, level = session.opened[reference - 1]
-    inside: Sequence[Shown] = () if shown.inside is None else shown.inside()
-    if arguments.text("filter", "") == ("named" if shown.elements else "indexed"):
-        inside = ()
+    group, path, level = session.variables(arguments)
+    if arguments.text("filter", "") == ("named" if isinstance(group, Elements) else "indexed"):
+        group = ()
     first, count = arguments.whole("start", 0), arguments.whole("count", 0) or _MOST_ELEMENTS
-    listed = islice(inside, first, first + count) if not shown.elements else inside[first : first + count]
+    listed = group[first : first + count]
     return {"variables": [{"name": variable.name, **_variable(session, variable, path, level)} for variable in listed]}
 
 
@@ -80,39 +75,35 @@ def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     In the console ``hit = 7`` gives a value, as it does in a program; for a comparison one writes ``(hit = 7)``.
     """
     debugger = session.standing
-    path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
+    path, level = _frame(session, arguments)
     text = arguments.text("expression").strip().rstrip(";")
     assignment = _ASSIGNMENT.fullmatch(text) if arguments.text("context", "") == "repl" else None
     if assignment is None:
-        shown = debugger.evaluate(text, path, level)
+        variable = debugger.evaluate(text, path, level)
     else:
-        slot = debugger.evaluate(assignment[1], path, level).kept
+        slot = debugger.evaluate(assignment[1], path, level).slot
         if slot is None:
             raise RequestError(f"`{assignment[1]}` cannot be given a value; for a comparison write `({text})`")
-        shown = debugger.assign(slot, assignment[2], path, level)
-    answer = _variable(session, shown, path, level)
+        variable = debugger.assign(slot, assignment[2], path, level)
+    answer = _variable(session, variable, path, level)
     return {"result": answer.pop("value"), **answer}
 
 
 def set_variable(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setVariable``: give what is shown another value."""
-    reference, name = arguments.whole("variablesReference"), arguments.text("name")
-    debugger = session.standing
-    if not 0 < reference <= len(session.opened):
-        raise RequestError(f"there is nothing to open under {reference}")
-    shown, path, level = session.opened[reference - 1]
-    inside: Sequence[Shown] = () if shown.inside is None else shown.inside()
-    variable = next((row for row in inside if row.name == name), None)
-    if variable is None or variable.kept is None:
+    name, debugger = arguments.text("name"), session.standing
+    group, path, level = session.variables(arguments)
+    slot = next((variable.slot for variable in group if variable.name == name), None)
+    if slot is None:
         raise RequestError(f"{name} cannot be given a value")
-    return _variable(session, debugger.assign(variable.kept, arguments.text("value"), path, level), path, level)
+    return _variable(session, debugger.assign(slot, arguments.text("value"), path, level), path, level)
 
 
 def set_expression(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setExpression``: the same for what an expression names."""
     debugger = session.standing
-    path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
-    slot = debugger.evaluate(arguments.text("expression"), path, level).kept
+    path, level = _frame(session, arguments)
+    slot = debugger.evaluate(arguments.text("expression"), path, level).slot
     if slot is None:
         raise RequestError("only variables, frames and elements can be given a value")
     return _variable(session, debugger.assign(slot, arguments.text("value"), path, level), path, level)
@@ -126,7 +117,7 @@ def completions(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     end = ruler.offset(arguments.whole("line", session.first_line) - session.first_line, column)
     match = _WORD.search(ruler.text[:end])
     typed = match[0] if match else ""
-    path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
+    path, level = _frame(session, arguments)
     procedure = debugger.stack(path)[level].procedure
     names = [debugger.code.spelled(name) for name in names_at(debugger.machine, procedure)]
     words = sorted({*names, *FUNCTIONS, *debugger.machine.cell.arms, "frames"}, key=str.upper)
@@ -160,25 +151,25 @@ def source(session: EditorSession, _: Arguments) -> dict[str, Any]:
 
 
 def _frame(session: EditorSession, arguments: Arguments) -> tuple[Path, int]:
+    """Return the process and the level of the stack frame of a request; without one those of the program."""
+    if "frameId" not in arguments:
+        return (), 0
     number = arguments.whole("frameId")
     if not 0 < number <= len(session.frames):
         raise RequestError(f"there is no stack frame {number}")
     return session.frames[number - 1]
 
 
-def _open(session: EditorSession, shown: Shown, path: Path, level: int) -> int:
-    """Return the number under which something can be opened; 0 where there is nothing in it."""
-    if shown.inside is None:
+def _open(session: EditorSession, variable: Variable, path: Path, level: int) -> int:
+    """Return the number under which a variable can be opened; 0 where there is nothing in it."""
+    if variable.inside is None:
         return 0
-    session.opened.append((shown, path, level))
+    session.opened.append((variable, path, level))
     return len(session.opened)
 
 
-def _variable(session: EditorSession, shown: Shown, path: Path, level: int) -> dict[str, Any]:
-    return {
-        "value": shown.value,
-        "type": shown.type,
-        "variablesReference": _open(session, shown, path, level),
-        **({"indexedVariables": shown.elements} if shown.elements else {}),
-        **({"evaluateName": shown.expression} if shown.expression else {}),
-    }
+def _variable(session: EditorSession, variable: Variable, path: Path, level: int) -> dict[str, Any]:
+    answer = {"value": variable.value, "type": variable.type}
+    optional = {"indexedVariables": variable.elements, "evaluateName": variable.expression}
+    reference = _open(session, variable, path, level)
+    return {**answer, "variablesReference": reference, **{key: value for key, value in optional.items() if value}}

@@ -78,12 +78,12 @@ class Adapter:
         threading.Thread(target=self._listen, args=(incoming,), daemon=True).start()
         try:
             while self._connected:
-                self._turn()
+                self._serve_next()
         except BrokenPipeError:
             # The editor has gone.
             return
 
-    def _turn(self) -> None:
+    def _serve_next(self) -> None:
         debugger = self._session.debugger
         running = debugger is not None and debugger.running
         try:
@@ -128,8 +128,8 @@ class Adapter:
             event()
 
     def _body(self, command: str, arguments: object) -> Mapping[str, Any] | None:
-        if command in _LOOKS:
-            return _LOOKS[command](self._session, Arguments(arguments))
+        if command in _INSPECTIONS:
+            return _INSPECTIONS[command](self._session, Arguments(arguments))
         if command in _STEPS:
             return self._step(command, Arguments(arguments))
         own: Mapping[str, Callable[[Arguments], Mapping[str, Any] | None]] = {
@@ -189,10 +189,10 @@ class Adapter:
         if not debugger.running:
             raise RequestError("the program is not running")
         stop = debugger.pause()
-        self._after.append(lambda: self._session.told(stop))
+        self._after.append(lambda: self._session.report(stop))
 
     def _terminate(self, _: Arguments) -> None:
-        self._after.append(self._session.give_up)
+        self._after.append(self._session.terminate)
 
     def _disconnect(self, _: Arguments) -> None:
         self._connected = False
@@ -225,7 +225,7 @@ def _unformatted(text: str) -> str:
 
 def _launched(arguments: Arguments) -> Launch:
     standard = str(arguments.given.get("std", Standard.RLO_2.value))
-    if standard not in {message.value for message in Standard}:
+    if standard not in set(Standard):
         raise RequestError(f"std: expected 2 or 83, got {standard!r}")
     return Launch(
         program=regular(Path(arguments.text("program"))),
@@ -248,7 +248,7 @@ _STEPS: Mapping[str, Command] = {
     "stepBack": "back",
     "reverseContinue": "reverse",
 }
-_LOOKS: Mapping[str, Callable[[EditorSession, Arguments], dict[str, Any]]] = {
+_INSPECTIONS: Mapping[str, Callable[[EditorSession, Arguments], dict[str, Any]]] = {
     "setBreakpoints": dap_breakpoints.set_breakpoints,
     "breakpointLocations": dap_breakpoints.breakpoint_locations,
     "dataBreakpointInfo": dap_breakpoints.data_breakpoint_info,

@@ -1,5 +1,6 @@
 """One debugging session of an editor: the program, the debugger, and what the editor has been told so far."""
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from armwright.program.debugger.dap_messages import Arguments, RequestError
 from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.debugger.history import Path as ProcessPath
 from armwright.program.debugger.stop_reason import Stop
-from armwright.program.debugger.variables import Shown
+from armwright.program.debugger.variables import Variable
 from armwright.program.diagnostics.render import render
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.position_codec import UTF_16, PositionCodec, columns
@@ -84,7 +85,7 @@ class LoadError(ArmwrightError, ValueError):
     exit_status = ExitStatus.PROGRAM_ERRORS
 
     def __init__(self, message: str, page: str, status: ExitStatus = ExitStatus.PROGRAM_ERRORS) -> None:
-        """Keep both texts, and with which status a command ends: that of errors in the program, unless said."""
+        """Keep both texts and the exit status."""
         super().__init__(message)
         self.page, self.status = page, status
 
@@ -103,14 +104,15 @@ class EditorSession:
         debugger: None until a program is launched.
         launch: what was asked for.
         loaded: what became of it.
-        configured: whether breakpoints have been told, so that the program may begin.
+        configured: whether breakpoints have been set, so that the program may begin.
         begun: whether it has.
-        ended: whether its end has been told.
-        wanted: the breakpoints that were asked for, with their numbers.
-        watched: what shall be watched: number, where it is kept, condition, count.
+        ended: whether its end has been reported.
+        breakpoints: the breakpoints that were requested, with their numbers.
+        data_breakpoints: what shall be watched: number, where it is kept, condition, count.
         catches: the errors to stop at, ``uncaught`` and ``caught``.
         frames: of the stacks that the editor has seen, process and level.
         opened: what the editor can open, with process and level.
+        ids: new numbers for breakpoints.
         numbers: of the breakpoints as the editor knows them, by those of the debugger.
     """
 
@@ -122,15 +124,15 @@ class EditorSession:
         self.loaded: Loaded | None = None
         self.configured = self.begun = self.ended = False
         self.first_line = self.first_column = 1
-        self.wanted: list[tuple[int, Arguments]] = []
-        self.watched: list[tuple[int, str, str, str]] = []
+        self.breakpoints: list[tuple[int, Arguments]] = []
+        self.data_breakpoints: list[tuple[int, str, str, str]] = []
         self.numbers: dict[int, int] = {}
         self.catches = frozenset({"uncaught"})
-        self._count = 0
+        self.ids = itertools.count(1)
         self._threads: dict[ProcessPath, int] = {(): 1}
         self._alive: set[int] = set()
         self.frames: list[tuple[ProcessPath, int]] = []
-        self.opened: list[tuple[Shown, ProcessPath, int]] = []
+        self.opened: list[tuple[Variable, ProcessPath, int]] = []
 
     # ---- the program -----------------------------------------------------------------------------------------------
 
@@ -144,15 +146,15 @@ class EditorSession:
         try:
             loaded = self._load(launch)
         except LoadError as error:
-            self.say(error.page, "stderr")
+            self.write(error.page, "stderr")
             raise
         self.launch, self.loaded = launch, loaded
         self.debugger = Debugger(loaded.code, loaded.cell)
         self.begun = self.ended = False
-        self.forget_places()
-        self.catch()
+        self.forget_references()
+        self.debugger.execution.catches = self.catches
         if loaded.diagnostics:
-            self.say(render(loaded.diagnostics, loaded.code.source), "console")
+            self.write(render(loaded.diagnostics, loaded.code.source), "console")
         self.bind()
 
     def begin(self) -> None:
@@ -161,16 +163,11 @@ class EditorSession:
             return
         self.begun = True
         if self.launch.no_debug:
-            self.debugger.clear(breakpoints=True, watches=True)
-            self.debugger.catch(uncaught=False, caught=False)
+            execution = self.debugger.execution
+            execution.breakpoints, execution.watches, execution.catches = [], [], frozenset()
         self.debugger.begin(stop_on_entry=self.launch.stop_on_entry and not self.launch.no_debug)
         self.send("thread", {"reason": "started", "threadId": 1})
         self._alive = {1}
-
-    def catch(self) -> None:
-        """Stop at the errors that were asked for."""
-        if self.debugger is not None:
-            self.debugger.catch(uncaught="uncaught" in self.catches, caught="caught" in self.catches)
 
     @property
     def live(self) -> Debugger:
@@ -202,34 +199,27 @@ class EditorSession:
             RequestError: it does not stand still, or is over.
         """
         self.standing.resume(command, path)
-        self.forget_places()
+        self.forget_references()
 
     def work(self, seconds: float) -> None:
         """Do a slice of what the program has to do; state what came of it."""
         debugger = self.live
         stop = debugger.work(seconds)
-        self._tell_news(debugger)
+        self._report_effects(debugger)
         if stop is not None and not debugger.running:
-            self.told(stop)
+            self.report(stop)
 
-    def told(self, stop: Stop) -> None:
+    def report(self, stop: Stop) -> None:
         """State why the program stands still."""
         debugger = self.live
         if stop.over:
             self._end(stop)
             return
-        self._tell_threads(debugger)
-        self.send(
-            "stopped",
-            {
-                "reason": _REASONS.get(stop.reason, stop.reason),
-                "description": stop.text or _DESCRIPTIONS.get(stop.reason, stop.reason),
-                "threadId": self.thread(stop.path),
-                "allThreadsStopped": True,
-                **({"text": stop.text} if stop.text else {}),
-                **({"hitBreakpointIds": [self.numbers[number] for number in stop.numbers]} if stop.numbers else {}),
-            },
-        )
+        self._report_threads(debugger)
+        body = {"reason": _REASONS.get(stop.reason, stop.reason), "threadId": self.thread(stop.path)}
+        body |= {"description": stop.text or _DESCRIPTIONS.get(stop.reason, stop.reason), "allThreadsStopped": True}
+        optional = {"text": stop.text, "hitBreakpointIds": [self.numbers[number] for number in stop.numbers]}
+        self.send("stopped", {**body, **{key: value for key, value in optional.items() if value}})
 
     def _end(self, stop: Stop) -> None:
         """The program is over: its output is written, and the editor told."""
@@ -239,18 +229,18 @@ class EditorSession:
         assert self.loaded is not None  # noqa: S101 - it has run
         status = stop.status
         if stop.diagnostic is not None:
-            self.say(render([stop.diagnostic], self.loaded.code.source), "stderr")
+            self.write(render([stop.diagnostic], self.loaded.code.source), "stderr")
         if self.launch is not None and self.launch.output is not None:
-            recording = stop.recording or self.live.recording
+            recording = stop.recording or self.live.machine.recording
             try:
-                self.say(self._save(self.launch, self.loaded, recording()) + "\n", "console")
+                self.write(self._save(self.launch, self.loaded, recording()) + "\n", "console")
             except ArmwrightError as error:
-                self.say(f"{error}\n", "stderr")
+                self.write(f"{error}\n", "stderr")
                 status = error.exit_status
         self.send("exited", {"exitCode": int(status)})
         self.send("terminated", {})
 
-    def give_up(self) -> None:
+    def terminate(self) -> None:
         """End the program where it is."""
         if not self.ended and self.debugger is not None:
             if self.debugger.running:
@@ -259,32 +249,31 @@ class EditorSession:
             self.send("exited", {"exitCode": int(ExitStatus.INTERRUPTED)})
             self.send("terminated", {})
 
-    # ---- what is reported
-    # ----------------------------------------------------------------------------------------------
+    # ---- events ----------------------------------------------------------------------------------------------------
 
-    def say(self, text: str, category: str, span: Span | None = None) -> None:
+    def write(self, text: str, category: str, span: Span | None = None) -> None:
         """Show a text to the user, with the location in the program that it comes from."""
-        position = {} if span is None else {"source": self.source(), **self.place(span, full=False)}
+        position = {} if span is None else {"source": self.source(), **self.location(span, full=False)}
         self.send("output", {"category": category, "output": text, **position})
 
-    def _tell_news(self, debugger: Debugger) -> None:
-        news = excerpt([new for new in debugger.news() if new.kind in {"PRINT", "ERROR"}], ON_A_TERMINAL)
+    def _report_effects(self, debugger: Debugger) -> None:
+        news = excerpt([new for new in debugger.new_effects() if new.kind in {"PRINT", "ERROR"}], ON_A_TERMINAL)
         for effect in news.first:
-            self._tell(effect)
+            self._report_effect(effect)
         if news.left_out:
-            self.say(f"{more(news.left_out, _ALL_OF_IT)}\n", "console")
+            self.write(f"{more(news.left_out, _ALL_OF_IT)}\n", "console")
         for effect in news.last:
-            self._tell(effect)
-        for text, breakpoint_ in debugger.said():
-            self.say(f"{text}\n", "console", breakpoint_.start.span if breakpoint_.start else None)
+            self._report_effect(effect)
+        for text, breakpoint_ in debugger.log_messages():
+            self.write(f"{text}\n", "console", breakpoint_.start.span if breakpoint_.start else None)
 
-    def _tell(self, effect: Effect) -> None:
+    def _report_effect(self, effect: Effect) -> None:
         if effect.kind == "PRINT":
-            self.say(f"{one_line(effect.data['printed'], _ALL_OF_IT)}\n", "stdout", effect.span)
+            self.write(f"{one_line(effect.data['printed'], _ALL_OF_IT)}\n", "stdout", effect.span)
         else:
-            self.say(f"recovered: {effect.text}\n", "stderr", effect.span)
+            self.write(f"recovered: {effect.text}\n", "stderr", effect.span)
 
-    def _tell_threads(self, debugger: Debugger) -> None:
+    def _report_threads(self, debugger: Debugger) -> None:
         alive = {self.thread(process.path) for process in debugger.processes}
         for number in sorted(alive - self._alive):
             self.send("thread", {"reason": "started", "threadId": number})
@@ -292,8 +281,7 @@ class EditorSession:
             self.send("thread", {"reason": "exited", "threadId": number})
         self._alive = alive
 
-    # ---- numbers of threads, locations and breakpoints
-    # ----------------------------------------------------------------
+    # ---- threads, locations and breakpoints ------------------------------------------------------------------------
 
     def thread(self, path: ProcessPath) -> int:
         """Return the number of a process."""
@@ -310,7 +298,7 @@ class EditorSession:
                 return path
         raise RequestError(f"there is no thread {number}")
 
-    def forget_places(self) -> None:
+    def forget_references(self) -> None:
         """Frames and variables have other numbers after the next stop."""
         self.frames.clear()
         self.opened.clear()
@@ -322,7 +310,7 @@ class EditorSession:
             return {"name": self.loaded.code.source.name, "sourceReference": LISTED}
         return {"name": self.launch.program.name, "path": str(self.launch.program)}
 
-    def place(self, span: Span, *, full: bool = True) -> dict[str, int]:
+    def location(self, span: Span, *, full: bool = True) -> dict[str, int]:
         """Return where a stretch of the text is, in the numbers of the editor."""
         assert self.loaded is not None  # noqa: S101 - asked for only with a program
         source = self.loaded.code.source
@@ -333,38 +321,41 @@ class EditorSession:
             before = columns(source.text[source.line_starts[line - 1] : offset], UTF_16)
             return line - 1 + self.first_line, before + self.first_column
 
-        line, column = position(span.start)
-        start = {"line": line, "column": column}
-        if not full:
-            return start
-        line, column = position(span.end)
-        return {**start, "endLine": line, "endColumn": column}
+        start = dict(zip(("line", "column"), position(span.start), strict=True))
+        return start | dict(zip(("endLine", "endColumn"), position(span.end), strict=True)) if full else start
 
-    def number(self) -> int:
-        """Return a new number for a breakpoint."""
-        self._count += 1
-        return self._count
+    def variables(self, arguments: Arguments) -> tuple[Sequence[Variable], ProcessPath, int]:
+        """Return the variables inside of the one that a request names, with its process and level.
+
+        Raises:
+            RequestError: there is no such variable.
+        """
+        reference = arguments.whole("variablesReference")
+        if not 0 < reference <= len(self.opened):
+            raise RequestError(f"there is nothing to open under {reference}")
+        group, path, level = self.opened[reference - 1]
+        return () if group.inside is None else group.inside(), path, level
 
     def bind(self) -> None:
         """Set the breakpoints that were asked for before there was a program."""
         if self.debugger is None:
             return
-        self.debugger.clear(breakpoints=True)
-        for number, request in self.wanted:
-            self.send("breakpoint", {"reason": "changed", "breakpoint": self.bound(number, request)})
-        for watched in self.watched:
-            self.watch(*watched)
+        self.debugger.execution.breakpoints.clear()
+        for number, request in self.breakpoints:
+            self.send("breakpoint", {"reason": "changed", "breakpoint": self.set_breakpoint(number, request)})
+        for data_breakpoint in self.data_breakpoints:
+            self.watch(*data_breakpoint)
 
-    def watch(self, number: int, kept: str, condition: str, hits: str) -> dict[str, Any]:
+    def watch(self, number: int, slot: str, condition: str, hits: str) -> dict[str, Any]:
         """Watch a frame or a variable; return what the editor has to know of it."""
         try:
-            watch = self.live.watch(kept, condition=condition.strip(), hits=hits.strip())
+            watch = self.live.watch(slot, condition=condition.strip(), hits=hits.strip())
         except ArmwrightError as error:
             return {"id": number, "verified": False, "message": str(error)}
         self.numbers[watch.number] = number
         return {"id": number, "verified": True}
 
-    def bound(self, number: int, request: Arguments) -> dict[str, Any]:
+    def set_breakpoint(self, number: int, request: Arguments) -> dict[str, Any]:
         """Set a breakpoint; return what the editor has to know of it."""
         if self.debugger is None:
             return {"id": number, "verified": False, "message": "no program has been launched"}
@@ -383,4 +374,4 @@ class EditorSession:
         self.numbers[breakpoint_.number] = number
         if breakpoint_.start is None:
             return {"id": number, "verified": False, "message": breakpoint_.message}
-        return {"id": number, "verified": True, "source": self.source(), **self.place(breakpoint_.start.span)}
+        return {"id": number, "verified": True, "source": self.source(), **self.location(breakpoint_.start.span)}

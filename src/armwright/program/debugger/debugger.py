@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from itertools import count
 from typing import Literal, TypeAlias
 
 import attrs
@@ -13,28 +13,27 @@ from armwright.errors import ArmwrightError
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger import variables
 from armwright.program.debugger.breakpoints import Breakpoint, CountError, Watch, counts
-from armwright.program.debugger.execution import Execution, Position, Way
+from armwright.program.debugger.execution import Execution, Position, RunToStop
 from armwright.program.debugger.expressions import (
     ExpressionError,
     compute,
     condition,
-    kept_name,
     names_at,
     parse,
+    slot_of,
     value_for,
 )
 from armwright.program.debugger.history import Path
 from armwright.program.debugger.snapshot import Frame, mover, process_of, stack
-from armwright.program.debugger.statements import Start
 from armwright.program.debugger.step_rules import step_of
 from armwright.program.debugger.stop_reason import Stop
-from armwright.program.debugger.variables import Shown
+from armwright.program.debugger.variables import Variable
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_arm
 from armwright.program.vm.interpreter import Limits, RunError
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Element, Process
-from armwright.program.vm.recording import Effect, Recording
+from armwright.program.vm.recording import Effect
 
 # To the next stop; to the next statement, over calls, into them, out of them; to the next stage of a MOVE; to the next
 # servo tick; back to the statement before, the tick before, the breakpoint before.
@@ -51,6 +50,7 @@ class Debugger:
 
     Attributes:
         stop: why the run stands still; None while it goes on, and before it has begun.
+        execution: the run itself, with its breakpoints, watches and statements.
     """
 
     def __init__(self, code: Code, cell: Cell, limits: Limits | None = None) -> None:
@@ -63,23 +63,23 @@ class Debugger:
         """
         self.code = code
         self.stop: Stop | None = None
-        self._going = Execution(code, cell, limits)
-        self._way: Way | None = None
+        self.execution = Execution(code, cell, limits)
+        self._active: RunToStop | None = None
         # Where a run backwards was begun, to return to when it is given up.
         self._origin: Position | None = None
-        self._numbers = 0
-        self._told = 0
+        self._numbers = count(1)
+        self._reported = 0
 
     # ---- going on --------------------------------------------------------------------------------------------------
 
     def begin(self, *, stop_on_entry: bool = True) -> None:
         """Let the run begin: it stops in front of the first statement, or where a breakpoint stops it."""
-        self._way = self._going.entry() if stop_on_entry else self._going.forward()
+        self._active = self.execution.entry() if stop_on_entry else self.execution.forward()
 
     @property
     def running(self) -> bool:
         """Whether the run runs to the next stop."""
-        return self._way is not None
+        return self._active is not None
 
     @property
     def over(self) -> bool:
@@ -99,21 +99,21 @@ class Debugger:
         self._standing()
         if self.over and command not in _BACK:
             raise DebuggerError("the program is over")
-        execution = self._going
+        execution = self.execution
         self._origin = execution.position if command in _BACK else None
         match command:
             case "continue":
-                self._way = execution.forward()
+                self._active = execution.forward()
             case "tick":
-                self._way = execution.forward(tick=True)
+                self._active = execution.forward(tick=True)
             case "next" | "in" | "out" | "stage":
-                self._way = execution.forward(step_of(execution.machine, command, path))
+                self._active = execution.forward(step_of(execution.machine, command, path))
             case "back":
-                self._way = execution.back(path)
+                self._active = execution.back(path)
             case "tick back":
-                self._way = execution.back_one_tick(path)
+                self._active = execution.back_one_tick(path)
             case "reverse":
-                self._way = execution.reverse()
+                self._active = execution.reverse()
 
     def work(self, seconds: float = math.inf) -> Stop | None:
         """Do what the run has to do up to the next stop.
@@ -125,9 +125,9 @@ class Debugger:
             Why it stopped; None where it has not yet.
         """
         end = time.perf_counter() + seconds
-        while self._way is not None:
+        while self._active is not None:
             try:
-                next(self._way)
+                next(self._active)
             except StopIteration as done:
                 self._arrive(done.value)
             else:
@@ -148,41 +148,37 @@ class Debugger:
 
     def pause(self) -> Stop:
         """Stop the run where it is; a run backwards is given up."""
-        if self._way is not None:
-            self._way.close()
+        if self._active is not None:
+            self._active.close()
             if self._origin is not None:
-                self._going.land(self._origin, passed=True)
-            process = self._going.timeline.ready
+                self.execution.land(self._origin, passed=True)
+            process = self.execution.timeline.ready
             self._arrive(Stop(reason="pause", path=() if process is None else process.path))
         assert self.stop is not None  # noqa: S101 - it stands still
         return self.stop
 
     def _arrive(self, stop: Stop) -> None:
-        self._way, self.stop = None, stop
+        self._active, self.stop = None, stop
         if self._origin is not None:
             # What was done again on a run backwards is no news.
-            self._told, self._origin = len(self.machine.state.effects), None
-        self._told = min(self._told, len(self.machine.state.effects))
+            self._reported, self._origin = len(self.machine.state.effects), None
+        self._reported = min(self._reported, len(self.machine.state.effects))
 
-    def news(self) -> list[Effect]:
+    def new_effects(self) -> list[Effect]:
         """Return what the program has done since this was last asked for."""
         if self._origin is not None:
             return []
-        effects = self.machine.state.effects[self._told :]
-        self._told += len(effects)
+        effects = self.machine.state.effects[self._reported :]
+        self._reported += len(effects)
         return effects
 
-    def said(self) -> list[tuple[str, Breakpoint]]:
-        """Return what breakpoints have said since this was last asked for."""
-        logged, self._going.said = self._going.said, []
-        return logged
-
-    def recording(self) -> Recording:
-        """Return all that has happened."""
-        return self.machine.recording()
+    def log_messages(self) -> list[tuple[str, Breakpoint]]:
+        """Return what breakpoints have logged since this was last asked for."""
+        messages, self.execution.messages = self.execution.messages, []
+        return messages
 
     def _standing(self) -> None:
-        if self._way is not None or self.stop is None:
+        if self._active is not None or self.stop is None:
             raise DebuggerError("the program is running")
 
     # ---- breakpoints -----------------------------------------------------------------------------------------------
@@ -202,24 +198,23 @@ class Debugger:
         Returns:
             The breakpoint; one without a ``start`` stops nothing, and its ``message`` says why.
         """
-        start = self._going.statements.find(line, column)
+        start = self.execution.statements.find(line, column)
         message = "" if start is not None else "no statement begins here or further down"
         if start is not None:
             try:
-                self._check(condition, hits, self._going.statements.procedure(start.index))
+                self._check(condition, hits, self.execution.statements.procedure(start.index))
             except (ExpressionError, CountError) as error:
                 start, message = None, str(error)
-        result = Breakpoint(
-            number=self._number(), start=start, condition=condition, hits=hits, log=log, message=message
-        )
-        self._going.breakpoints.append(result)
+        number = next(self._numbers)
+        result = Breakpoint(number=number, start=start, condition=condition, hits=hits, log=log, message=message)
+        self.execution.breakpoints.append(result)
         return result
 
     def watch(self, slot: str, *, condition: str = "", hits: str = "") -> Watch:
         """Stop the run when a frame moves or a variable changes.
 
         Args:
-            slot: where it is kept, as ``Shown.kept`` says.
+            slot: where it is kept, as ``Variable.slot`` says.
             condition: an expression that must be true then.
             hits: how often it must have changed.
 
@@ -232,47 +227,17 @@ class Debugger:
         if kind.sizes or not known:
             raise ExpressionError(f"`{slot}` cannot be watched: it is no frame, variable or element")
         self._check(condition, hits, None)
-        result = Watch(number=self._number(), kept=slot, condition=condition, hits=hits)
-        self._going.watches.append(result)
+        result = Watch(number=next(self._numbers), slot=slot, condition=condition, hits=hits)
+        self.execution.watches.append(result)
         return result
-
-    def clear(self, *, breakpoints: bool = False, watches: bool = False) -> None:
-        """Forget breakpoints at lines, or watches, or both."""
-        if breakpoints:
-            self._going.breakpoints.clear()
-        if watches:
-            self._going.watches.clear()
 
     def forget(self, number: int) -> bool:
         """Forget one breakpoint or watch; return whether there was one of that number."""
-        execution = self._going
+        execution = self.execution
         before = len(execution.breakpoints) + len(execution.watches)
         execution.breakpoints = [breakpoint_ for breakpoint_ in execution.breakpoints if breakpoint_.number != number]
         execution.watches = [watch for watch in execution.watches if watch.number != number]
         return len(execution.breakpoints) + len(execution.watches) < before
-
-    @property
-    def breakpoints(self) -> Sequence[Breakpoint]:
-        """The breakpoints at lines."""
-        return self._going.breakpoints
-
-    @property
-    def watches(self) -> Sequence[Watch]:
-        """What is watched."""
-        return self._going.watches
-
-    def catch(self, *, uncaught: bool, caught: bool) -> None:
-        """Stop in front of errors: those that end the program, those after which it goes on in a RECOVER."""
-        chosen = (("uncaught", uncaught), ("caught", caught))
-        self._going.catches = frozenset(name for name, chosen_ in chosen if chosen_)
-
-    def places(self, first: int, last: int) -> list[Start]:
-        """Return the statements that begin in some lines."""
-        return list(self._going.statements.between(first, last))
-
-    def _number(self) -> int:
-        self._numbers += 1
-        return self._numbers
 
     def _check(self, text: str, hits: str, procedure: str | None) -> None:
         if hits:
@@ -285,12 +250,12 @@ class Debugger:
     @property
     def machine(self) -> Machine:
         """The state of the program."""
-        return self._going.machine
+        return self.execution.machine
 
     @property
     def view(self) -> Machine:
         """The machine as it is seen now, with the arms where they are on their path."""
-        return self._going.view
+        return self.execution.view
 
     @property
     def time(self) -> float:
@@ -308,18 +273,17 @@ class Debugger:
         Raises:
             DebuggerError: there is no such process.
         """
-        return stack(self.machine, self._process(path), self._going.statements)
+        return stack(self.machine, self._process(path), self.execution.statements)
 
-    def scopes(self, path: Path = (), level: int = 0) -> list[Shown]:
+    def scopes(self, path: Path = (), level: int = 0) -> list[Variable]:
         """Return what there is to see from one level of a stack.
 
         Raises:
             DebuggerError: there is no such process or level.
         """
-        view = self.view
-        return variables.scopes(view, self._process(path), self._frame(path, level))
+        return variables.scopes(self.view, self._process(path), self._frame(path, level))
 
-    def evaluate(self, text: str, path: Path = (), level: int = 0) -> Shown:
+    def evaluate(self, text: str, path: Path = (), level: int = 0) -> Variable:
         """Return the value of an expression, as a level of a stack sees it.
 
         Args:
@@ -334,16 +298,16 @@ class Debugger:
         frame, view = self._frame(path, level), self.view
         types = names_at(view, frame.procedure)
         if text.strip().upper() == "FRAMES" and "FRAMES" not in types:
-            return Shown(name="frames", value="\n".join(variables.frames_text(view)))
+            return Variable(name="frames", value="\n".join(variables.frames_text(view)))
         parsed = parse(text, types, self.code)
         process = self._process(path)
-        slot = kept_name(view, process, frame, parsed)
+        slot = slot_of(view, process, frame, parsed)
         if slot is not None:
             return attrs.evolve(variables.variable(view, slot, name=text), expression=text)
         kind = "" if parsed.sort is None else parsed.sort.word
         return variables.result(view, text, compute(view, process, frame, parsed), kind)
 
-    def assign(self, slot: str, text: str, path: Path = (), level: int = 0) -> Shown:
+    def assign(self, slot: str, text: str, path: Path = (), level: int = 0) -> Variable:
         """Give a variable or a frame another value; the run goes on with it.
 
         Args:
@@ -374,7 +338,7 @@ class Debugger:
                 machine.state.values[slot] = value
 
         try:
-            self._going.timeline.change(change)
+            self.execution.timeline.change(change)
         except RunError as error:
             raise ExpressionError(str(error)) from None
         return variables.variable(self.view, slot)

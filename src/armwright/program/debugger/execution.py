@@ -20,8 +20,8 @@ from armwright.program.vm.interpreter import Limits, RunError
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Process
 
-# A path to the next stop; it can be left whenever it yields.
-Way: TypeAlias = Generator[None, None, Stop]
+# A run to the next stop; it can be given up whenever it yields.
+RunToStop: TypeAlias = Generator[None, None, Stop]
 # A moment of a run: the steps done, and the servo tick.
 Position: TypeAlias = tuple[int, int]
 
@@ -38,7 +38,7 @@ class Execution:
         breakpoints: lines at which it stops.
         watches: frames and variables at whose change it stops.
         catches: what errors it stops at: ``uncaught`` ones, and ``caught`` ones.
-        said: what breakpoints had to say instead of stopping.
+        messages: of breakpoints that log instead of stopping.
     """
 
     def __init__(self, code: Code, cell: Cell, limits: Limits | None) -> None:
@@ -49,7 +49,7 @@ class Execution:
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[Watch] = []
         self.catches = frozenset({"uncaught"})
-        self.said: list[tuple[str, Breakpoint]] = []
+        self.messages: list[tuple[str, Breakpoint]] = []
         # After so many steps it was stopped in front of a statement, or of an error, and now goes past it.
         self._passed = self._raised = -1
         self._silent = False
@@ -91,13 +91,13 @@ class Execution:
 
     # ---- forwards --------------------------------------------------------------------------------------------------
 
-    def entry(self) -> Way:
+    def entry(self) -> RunToStop:
         """Stop in front of the first statement."""
         yield
         self._passed = 0
         return Stop(reason="entry")
 
-    def forward(self, step: Step | None = None, *, tick: bool = False, until: Position | None = None) -> Way:
+    def forward(self, step: Step | None = None, *, tick: bool = False, until: Position | None = None) -> RunToStop:
         """Go on to the next stop.
 
         Args:
@@ -105,7 +105,7 @@ class Execution:
             tick: whether the next servo tick ends it.
             until: no farther than to this moment, which is no stop.
         """
-        self._start_watches(frozenset(watch.number for watch in self.watches if watch.told is not None))
+        self._start_watches(frozenset(watch.number for watch in self.watches if watch.reported is not None))
         while until is None or self.position < until:
             yield
             process = self.timeline.ready
@@ -128,7 +128,7 @@ class Execution:
     def _wait(self, wake: int, until: Position | None, *, tick: bool) -> Generator[None, None, Stop | None]:
         """Let the time go by until a process has something to do."""
         while self.ticks < wake and (until is None or self.position < until):
-            if tick or any(watch.rides(self.machine) for watch in self.watches):
+            if tick or any(watch.is_moved(self.machine) for watch in self.watches):
                 self.ticks += 1
                 stop = self._changed(None)
                 if stop is not None or tick:
@@ -147,15 +147,12 @@ class Execution:
 
     def _arrived(self, process: Process, step: Step | None) -> Stop | None:
         """Return why the run stops in front of a statement; None where it does not."""
-        here = [
-            breakpoint_
-            for breakpoint_ in self.breakpoints
-            if breakpoint_.start is not None and breakpoint_.start.index == process.at
-        ]
         numbers, text = [], ""
-        for breakpoint_ in here:
+        for breakpoint_ in self.breakpoints:
+            if breakpoint_.start is None or breakpoint_.start.index != process.at:
+                continue
             try:
-                is_due = self._met(breakpoint_, process)
+                is_due = self._applies(breakpoint_, self.timeline.marks.visits.get(process.at, 0) + 1, process)
             except ExpressionError as error:
                 is_due, text = True, f"the condition of this breakpoint has no value: {error}"
             if is_due and breakpoint_.log and not text:
@@ -166,11 +163,11 @@ class Execution:
             return Stop(reason="breakpoint", path=process.path, numbers=tuple(numbers), text=text)
         return Stop(reason="step", path=process.path) if step is not None and step.ends(process) else None
 
-    def _met(self, breakpoint_: Breakpoint, process: Process) -> bool:
-        visits = self.timeline.marks.visits.get(process.at, 0) + 1
-        if breakpoint_.hits and not counts(breakpoint_.hits, visits):
+    def _applies(self, point: Breakpoint | Watch, hits: int, process: Process) -> bool:
+        """Whether a breakpoint that is reached for that time, or a watch, has its count and its condition."""
+        if point.hits and not counts(point.hits, hits):
             return False
-        return not breakpoint_.condition or self._holds(breakpoint_.condition, process)
+        return not point.condition or self._holds(point.condition, process)
 
     def _holds(self, condition: str, process: Process) -> bool:
         view = self.view
@@ -195,7 +192,7 @@ class Execution:
             except ExpressionError as error:
                 return f"({error})"
 
-        self.said.append((_IN_BRACES.sub(value, breakpoint_.log), breakpoint_))
+        self.messages.append((_IN_BRACES.sub(value, breakpoint_.log), breakpoint_))
 
     def _advance(self, process: Process | None, step: Step | None) -> Stop | None:
         """Do one step of the program; return why the run stops with it."""
@@ -205,14 +202,11 @@ class Execution:
         try:
             timeline.advance()
         except RunError as error:
+            stop = Stop(reason="exception", text=str(error), diagnostic=error.diagnostic)
             if self._raised == done or "uncaught" not in self.catches:
                 self.ticks = max(self.ticks, machine.state.ticks)
-                return Stop(
-                    reason="failed", path=path, text=str(error), diagnostic=error.diagnostic, recording=error.recording
-                )
-            return self._before_error(
-                done, path, Stop(reason="exception", text=str(error), diagnostic=error.diagnostic)
-            )
+                return attrs.evolve(stop, reason="failed", path=path, recording=error.recording)
+            return self._before_error(done, path, stop)
         if "caught" in self.catches and self._raised != done:
             caught = next((effect for effect in machine.state.effects[effects:] if effect.kind == "ERROR"), None)
             if caught is not None:
@@ -232,12 +226,7 @@ class Execution:
         self.timeline.seek(done)
         self._raised = done
         if self.timeline.ready is None:
-            stuck = (
-                process
-                for process in self.machine.state.processes
-                if process.waiting and process.waiting.what != "branches"
-            )
-            path = min(breakpoint_.path for breakpoint_ in stuck)
+            path = self.machine.state.stuck[0].path
         return attrs.evolve(stop, path=path)
 
     def _changed(self, path: Path | None) -> Stop | None:
@@ -245,13 +234,13 @@ class Execution:
         if not self.watches:
             return None
         # With all arms at rest the table is what one sees.
-        view = self.view if any(mover(self.machine, watch.kept) for watch in self.watches) else self.machine
+        view = self.view if any(mover(self.machine, watch.slot) for watch in self.watches) else self.machine
         texts, numbers = [], []
         for watch in self.watches:
-            text = watch.look(view)
-            if text is None or not self._wanted(watch):
+            text = watch.update(view)
+            if text is None or not self._stops_for(watch):
                 continue
-            moving = mover(view, watch.kept)
+            moving = mover(view, watch.slot)
             path = moving.path if path is None and moving is not None else path
             texts.append(text)
             numbers.append(watch.number)
@@ -261,26 +250,20 @@ class Execution:
         shown = self._present if present is None or path is None else path
         return Stop(reason="data breakpoint", path=shown, text="; ".join(texts), numbers=tuple(numbers))
 
-    def _wanted(self, watch: Watch) -> bool:
-        if watch.hits and not counts(watch.hits, watch.changes):
-            return False
-        process = self.timeline.ready or self.machine.state.program
+    def _stops_for(self, watch: Watch) -> bool:
         try:
-            return not watch.condition or self._holds(watch.condition, process)
+            return self._applies(watch, watch.changes, self.timeline.ready or self.machine.state.program)
         except ExpressionError:
             return True
 
     # ---- back ------------------------------------------------------------------------------------------------------
 
-    def back(self, path: Path) -> Way:
+    def back(self, path: Path) -> RunToStop:
         """Go back to the statement that a process began last, at the same level or further out."""
-        here = self.position
         now = process_of(self.machine, path)
         depth = 0 if now is None else len(now.stack)
-        limit = here[0]
-        for done in reversed(self.timeline.kept):
-            if done >= limit:
-                continue
+        limit = self.timeline.done
+        for done in self.timeline.moments_before(limit):
             self.timeline.seek(done)
             nearest: tuple[Position, Path] | None = None
             while self.timeline.done < limit:
@@ -298,34 +281,25 @@ class Execution:
             limit = done
         return self._landed((0, 0), Stop(reason="start"))
 
-    def back_one_tick(self, path: Path) -> Way:
+    def back_one_tick(self, path: Path) -> RunToStop:
         """Go back to the servo tick before, as it was when the time had come to it."""
         tick = self.ticks - 1
         if tick < 0:
             return self._landed((0, 0), Stop(reason="start"))
         limit = self.timeline.done
-        for done in reversed(self.timeline.kept):
-            if done > limit:
-                continue
+        for done in self.timeline.moments_before(limit + 1):
             self.timeline.seek(done)
-            if done and self.machine.state.ticks >= tick:
-                continue
-            while (
-                self.timeline.done < limit
-                and (process := self.timeline.ready) is not None
-                and (process.due or 0) < tick
-            ):
-                self.timeline.advance()
-                yield
-            break
+            if not done or self.machine.state.ticks < tick:
+                break
+        while self.timeline.done < limit and (process := self.timeline.ready) and (process.due or 0) < tick:
+            self.timeline.advance()
+            yield
         return self._landed((self.timeline.done, tick), Stop(reason="step", path=path), passed=False)
 
-    def reverse(self) -> Way:
+    def reverse(self) -> RunToStop:
         """Go back to the last moment at which a breakpoint stops the run, or else to the start."""
         limit = self.position
-        for done in reversed(self.timeline.kept):
-            if done >= limit[0] and done:
-                continue
+        for done in self.timeline.moments_before(max(limit[0], 1)):
             self.land((done, 0), passed=False)
             self.ticks, self._silent = self.machine.state.ticks, True
             begun, nearest = self.position, None

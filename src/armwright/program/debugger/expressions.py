@@ -21,9 +21,8 @@ from armwright.program.syntax.expressions import expression
 from armwright.program.syntax.lexer import TokenKind, scan
 from armwright.program.syntax.token_stream import LostError, Tokens
 from armwright.program.vm.expressions import evaluate_instructions
-from armwright.program.vm.machine import Machine, RunError
+from armwright.program.vm.machine import Machine, RunError, arrays_of
 from armwright.program.vm.process import Activation, Process, Value
-from armwright.spatial.poses import from_noap
 
 
 class ExpressionError(ArmwrightError, ValueError):
@@ -100,16 +99,16 @@ def compute(machine: Machine, process: Process, frame: Frame, parsed: Parsed) ->
     Raises:
         ExpressionError: something in it has no value.
     """
+    here, asking, operand = _worked_out(machine, process, frame, parsed)
+    if parsed.sort is ExpressionType.EVENT:
+        return float(here.state.events.get(here.name(asking, operand), 0))
     try:
-        here, asking, operand = _worked_out(machine, process, frame, parsed)
-        if parsed.sort is ExpressionType.EVENT:
-            return float(here.state.events.get(here.name(asking, operand), 0))
         return here.read(asking, operand, Instruction(op=Op.PRINT, span=parsed.node.span))
     except RunError as error:
         raise ExpressionError(str(error)) from None
 
 
-def kept_name(machine: Machine, process: Process, frame: Frame, parsed: Parsed) -> str | None:
+def slot_of(machine: Machine, process: Process, frame: Frame, parsed: Parsed) -> str | None:
     """Return where an expression is kept, if it is a variable, an element or an arm; None for anything else.
 
     Raises:
@@ -122,10 +121,7 @@ def kept_name(machine: Machine, process: Process, frame: Frame, parsed: Parsed) 
         return frame.activation.bindings.get(node.key, node.key)
     if not isinstance(node, tree.Index):
         return None
-    try:
-        here, asking, operand = _worked_out(machine, process, frame, parsed)
-    except RunError as error:
-        raise ExpressionError(str(error)) from None
+    here, asking, operand = _worked_out(machine, process, frame, parsed)
     return here.name(asking, operand)
 
 
@@ -162,18 +158,19 @@ def _worked_out(machine: Machine, process: Process, frame: Frame, parsed: Parsed
         A machine and a process that know these values, and the operand that has the last one.
 
     Raises:
-        RunError: something in it has no value.
+        ExpressionError: something in it has no value.
     """
     emitter = Emitter(parsed.source, machine.code.units)
     operand = emitter.value(parsed.node)
     steps = tuple(emitter.instructions)
     here, asking = copy.copy(machine), copy.copy(process)
     here.code = attrs.evolve(machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source)
-    here.constants = [
-        from_noap(constant) if isinstance(constant, tuple) else float(constant) for constant in emitter.constants
-    ]
+    here.constants = arrays_of(emitter.constants)
     asking.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
-    evaluate_instructions(here, asking, steps)
+    try:
+        evaluate_instructions(here, asking, steps)
+    except RunError as error:
+        raise ExpressionError(str(error)) from None
     return here, asking, operand
 
 

@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
+import attrs
+
 from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
 from armwright.program.bytecode.instructions import Code, Op
@@ -32,6 +34,7 @@ class _Moment(NamedTuple):
     marks: "Marks"
 
 
+@attrs.define
 class Marks:
     """What a debugger remembers of the path to a moment, beside the state of the program itself.
 
@@ -41,17 +44,13 @@ class Marks:
         visits: how often each statement has been begun, by its first instruction.
     """
 
-    def __init__(self) -> None:
-        """Remember nothing."""
-        self.blocked: set[Path] = set()
-        self.came: dict[Path, int] = {}
-        self.visits: dict[int, int] = {}
+    blocked: set[Path] = attrs.field(factory=set)
+    came: dict[Path, int] = attrs.field(factory=dict)
+    visits: dict[int, int] = attrs.field(factory=dict)
 
     def copy(self) -> "Marks":
         """Return the same marks."""
-        marks = Marks()
-        marks.blocked, marks.came, marks.visits = set(self.blocked), dict(self.came), dict(self.visits)
-        return marks
+        return Marks(set(self.blocked), dict(self.came), dict(self.visits))
 
 
 class Timeline:
@@ -79,10 +78,9 @@ class Timeline:
         """The process that does the next step; None where all wait for one another."""
         return ready(self.machine)
 
-    @property
-    def kept(self) -> list[int]:
-        """The steps after which a moment was kept, in order."""
-        return [moment.done for moment in self._moments]
+    def moments_before(self, done: int) -> list[int]:
+        """Return the numbers of steps, fewer than ``done``, after which a moment was kept, the largest first."""
+        return [moment.done for moment in reversed(self._moments) if moment.done < done]
 
     def arrives(self, process: Process) -> bool:
         """Whether the next step of a process begins a statement, or another pass of a loop."""

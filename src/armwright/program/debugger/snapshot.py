@@ -4,11 +4,8 @@ import copy
 
 import attrs
 
-from armwright.cell.model import base_name
-from armwright.kinematics.forward_kinematics import forward
 from armwright.program.debugger.history import Path
 from armwright.program.debugger.statements import Statements
-from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Activation, Process
@@ -28,13 +25,12 @@ def sampled(machine: Machine, ticks: int) -> Machine:
     view.state = copy.copy(machine.state)
     view.state.ticks = ticks
     moving = {process.motion.arm for process in machine.state.processes if process.motion is not None}
-    for name, arm in machine.cell.arms.items():
+    for name in machine.cell.arms:
         last = machine.state.runs[name][-1] if machine.state.runs[name] else None
         if name not in moving and (last is None or view.now > last.t0 + last.duration):
             # It rests, and the frame table knows where.
             continue
-        X_BH = forward(arm.arm, machine.hardware.configuration(name, view.now))
-        view.state.tree = view.state.tree.place(name, view.state.tree.world(base_name(name)) @ X_BH)
+        view.state.tree = view.state.tree.place(name, view.gripper_pose(name))
     return view
 
 
@@ -45,14 +41,8 @@ def process_of(machine: Machine, path: Path) -> Process | None:
 
 def mover(machine: Machine, frame: str) -> Process | None:
     """Return the process that moves a frame by moving an arm; None where it rests."""
-    if frame not in machine.state.tree:
-        return None
-    above = (frame, *machine.state.tree.ancestors(frame))
-    arm = next((name for name in above if is_arm(name)), None)
-    return next(
-        (process for process in machine.state.processes if process.motion is not None and process.motion.arm == arm),
-        None,
-    )
+    arm = machine.carrier(frame) if frame in machine.state.tree else None
+    return None if arm is None else machine.mover(arm)
 
 
 @attrs.frozen(kw_only=True)
@@ -77,10 +67,8 @@ def stack(machine: Machine, process: Process, statements: Statements) -> list[Fr
     frames = []
     index, span = process.at, _where(process, statements)
     for activation in reversed(process.stack):
-        procedure = statements.procedure(index)
-        frames.append(
-            Frame(title=_title(machine, process, activation), span=span, activation=activation, procedure=procedure)
-        )
+        title, procedure = _title(machine, process, activation), statements.procedure(index)
+        frames.append(Frame(title=title, span=span, activation=activation, procedure=procedure))
         index = activation.back
         if activation.called is not None:
             span = activation.called
@@ -88,13 +76,8 @@ def stack(machine: Machine, process: Process, statements: Statements) -> list[Fr
 
 
 def _where(process: Process, statements: Statements) -> Span:
-    if process.waiting is not None:
-        return process.waiting.span
-    if process.pending is not None:
-        return process.pending.span
-    if process.follows is not None:
-        return process.follows.span
-    return statements.at(process.at).span
+    cause = process.waiting or process.pending or process.follows or statements.at(process.at)
+    return cause.span
 
 
 def _title(machine: Machine, process: Process, activation: Activation) -> str:

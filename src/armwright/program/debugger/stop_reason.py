@@ -11,9 +11,8 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 
-Reason: TypeAlias = Literal[
-    "entry", "breakpoint", "data breakpoint", "step", "exception", "pause", "start", "end", "failed"
-]
+_End: TypeAlias = Literal["start", "end", "failed"]
+Reason: TypeAlias = _End | Literal["entry", "breakpoint", "data breakpoint", "step", "exception", "pause"]
 
 
 @attrs.frozen(kw_only=True)

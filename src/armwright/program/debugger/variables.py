@@ -8,8 +8,6 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
-from armwright.cell.model import base_name
-from armwright.kinematics.forward_kinematics import forward
 from armwright.program.debugger.snapshot import Frame
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.vm.machine import Machine
@@ -19,12 +17,11 @@ from armwright.spatial.poses import to_noap
 _NOTHING = "no value yet"
 # Less than this of a number between -1 and 1 is rounding.
 _ROUNDING = 1e-9
-_COLUMNS = "noap"
 
 
 @attrs.frozen(kw_only=True)
-class Shown:
-    """A line that can be opened.
+class Variable:
+    """A variable, or a group of them, as a line that can be opened.
 
     Attributes:
         name: what it is.
@@ -33,19 +30,19 @@ class Shown:
         inside: gives the lines inside of it; None where there are none.
         elements: how many of those are elements of an array.
         expression: what asks for it again; empty where nothing does.
-        kept: where it is kept, if it is a variable, an element or an arm.
+        slot: where it is kept, if it is a variable, an element or an arm.
     """
 
     name: str
     value: str
     type: str = ""
-    inside: Callable[[], "Sequence[Shown]"] | None = None
+    inside: Callable[[], "Sequence[Variable]"] | None = None
     elements: int = 0
     expression: str = ""
-    kept: str | None = None
+    slot: str | None = None
 
 
-def scopes(machine: Machine, process: Process, frame: Frame) -> list[Shown]:
+def scopes(machine: Machine, process: Process, frame: Frame) -> list[Variable]:
     """Return what there is to see from one level of a stack.
 
     Args:
@@ -57,7 +54,7 @@ def scopes(machine: Machine, process: Process, frame: Frame) -> list[Shown]:
     # Of a branch in the program itself, or of a procedure that has no names, there is nothing own to be seen.
     local = {key: frame.activation.bindings.get(key, key) for key in own if key in frame.activation.bindings}
     values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not VariableKind.FRAME}
-    parts: list[tuple[str, Callable[[], Sequence[Shown]]]] = [
+    parts: list[tuple[str, Callable[[], Sequence[Variable]]]] = [
         ("Locals", lambda: [variable(machine, slot, name=machine.spelled(key)) for key, slot in local.items()]),
         ("Variables", lambda: [variable(machine, value) for value in values]),
         ("Frames", lambda: [variable(machine, name) for name in frames(machine)]),
@@ -65,7 +62,7 @@ def scopes(machine: Machine, process: Process, frame: Frame) -> list[Shown]:
         ("Run", lambda: list(_run(machine, process))),
     ]
     there = {"Locals": local, "Variables": values}
-    return [Shown(name=name, value="", inside=inside) for name, inside in parts if there.get(name, True)]
+    return [Variable(name=name, value="", inside=inside) for name, inside in parts if there.get(name, True)]
 
 
 def frames(machine: Machine) -> list[str]:
@@ -73,7 +70,7 @@ def frames(machine: Machine) -> list[str]:
     return [name for name in machine.state.tree if name != WORLD and not set(name) & set(".'[")]
 
 
-def variable(machine: Machine, slot: str, *, name: str = "") -> Shown:
+def variable(machine: Machine, slot: str, *, name: str = "") -> Variable:
     """Return a variable, an element, an array or the gripper of an arm.
 
     Args:
@@ -82,25 +79,25 @@ def variable(machine: Machine, slot: str, *, name: str = "") -> Shown:
         name: what to call it; as the program spells it when left out.
     """
     kind = machine.type_of(slot)
-    called = name or machine.spelled(slot)
+    name = name or machine.spelled(slot)
     if kind.sizes:
-        return _array(machine, slot, called, kind)
-    if kind.kind is VariableKind.EVENT:
-        count = str(machine.state.events.get(slot, 0))
-        return Shown(name=called, value=count, type="EVENT", expression=called, kept=slot)
-    if kind.kind is VariableKind.FRAME:
-        return _frame(machine, slot, called)
-    value = machine.state.values.get(slot)
-    if value is None:
-        return Shown(name=called, value=_NOTHING, type=str(kind), expression=called, kept=slot)
-    return attrs.evolve(result(machine, called, value, str(kind)), expression=called, kept=slot)
+        entry = _array(machine, slot, name, kind)
+    elif kind.kind is VariableKind.EVENT:
+        entry = Variable(name=name, value=str(machine.state.events.get(slot, 0)), type="EVENT")
+    elif kind.kind is VariableKind.FRAME:
+        entry = _frame(machine, slot, name)
+    elif (value := machine.state.values.get(slot)) is None:
+        entry = Variable(name=name, value=_NOTHING, type=str(kind))
+    else:
+        entry = result(machine, name, value, str(kind))
+    return attrs.evolve(entry, expression=name, slot=slot)
 
 
-def result(machine: Machine, name: str, value: Value, kind: str) -> Shown:
+def result(machine: Machine, name: str, value: Value, kind: str) -> Variable:
     """Return a value that stands for itself."""
     if isinstance(value, np.ndarray):
-        return Shown(name=name, value=_matrix(machine, value), type=kind, inside=lambda: _columns(machine, value))
-    return Shown(name=name, value=_truth(value) if isinstance(value, bool) else f"{value:.12g}", type=kind)
+        return Variable(name=name, value=_matrix(machine, value), type=kind, inside=lambda: _columns(machine, value))
+    return Variable(name=name, value=_truth(value) if isinstance(value, bool) else f"{value:.12g}", type=kind)
 
 
 def frames_text(machine: Machine) -> list[str]:
@@ -123,22 +120,16 @@ def frames_text(machine: Machine) -> list[str]:
 # ---- frames, steps, arrays -----------------------------------------------------------------------------------------
 
 
-def _frame(machine: Machine, slot: str, called: str) -> Shown:
+def _frame(machine: Machine, slot: str, name: str) -> Variable:
     if not machine.has_place(slot):
-        return Shown(name=called, value=_NOTHING, type="FRAME", expression=called, kept=slot)
+        return Variable(name=name, value=_NOTHING, type="FRAME")
     parent = machine.state.tree.parent(slot)
-    hangs = "" if parent is None else f" on {_above(machine, parent)}"
-    return Shown(
-        name=called,
-        value=_matrix(machine, machine.state.tree.world(slot)),
-        type=f"FRAME{hangs}",
-        inside=lambda: _inside(machine, slot),
-        expression=called,
-        kept=slot,
-    )
+    kind = "FRAME" if parent is None else f"FRAME on {_above(machine, parent)}"
+    value = _matrix(machine, machine.state.tree.world(slot))
+    return Variable(name=name, value=value, type=kind, inside=lambda: _inside(machine, slot))
 
 
-def _inside(machine: Machine, slot: str) -> list[Shown]:
+def _inside(machine: Machine, slot: str) -> list[Variable]:
     lines = _columns(machine, machine.state.tree.world(slot))
     parent = machine.state.tree.parent(slot)
     if parent is not None:
@@ -146,13 +137,17 @@ def _inside(machine: Machine, slot: str) -> list[Shown]:
         X = machine.state.tree.relation(slot, parent)
         frame = variable(machine, parent) if parent != WORLD else None
         lines += [
-            Shown(name="parent", value=above, type="FRAME", inside=frame.inside if frame else None, expression=above),
-            attrs.evolve(result(machine, "relation", X, "TRANS"), name="relation"),
+            Variable(
+                name="parent", value=above, type="FRAME", inside=frame.inside if frame else None, expression=above
+            ),
+            result(machine, "relation", X, "TRANS"),
         ]
         if machine.state.tree.nodes[slot].rigid:
-            lines.append(Shown(name="rigid", value="true"))
+            lines.append(Variable(name="rigid", value="true"))
     if slot in machine.state.written:
-        lines.append(Shown(name="set in line", value=str(machine.code.source.line(machine.state.written[slot].start))))
+        lines.append(
+            Variable(name="set in line", value=str(machine.code.source.line(machine.state.written[slot].start)))
+        )
     return lines
 
 
@@ -160,15 +155,11 @@ def _above(machine: Machine, parent: str) -> str:
     return f"the base of {parent.removesuffix('.BASE')}" if parent.endswith(".BASE") else machine.spelled(parent)
 
 
-def _columns(machine: Machine, X: Array) -> list[Shown]:
+def _columns(machine: Machine, X: Array) -> list[Variable]:
     numbers = _numbers(machine, X)
-    unit = machine.code.units.length.lower()
-    return [
-        Shown(
-            name=column, value=f"({', '.join(numbers[3 * index : 3 * index + 3])})", type=unit if column == "p" else ""
-        )
-        for index, column in enumerate(_COLUMNS)
-    ]
+    units = ("", "", "", machine.code.units.length.lower())
+    texts = [f"({', '.join(numbers[index : index + 3])})" for index in range(0, 12, 3)]
+    return [Variable(name=name, value=text, type=unit) for name, text, unit in zip("noap", texts, units, strict=True)]
 
 
 def _matrix(machine: Machine, X: Array) -> str:
@@ -189,93 +180,84 @@ def _place(machine: Machine, name: str) -> str:
     return f"({', '.join(_numbers(machine, machine.state.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
 
 
-def _array(machine: Machine, slot: str, called: str, kind: VariableType) -> Shown:
-    count = math.prod(kind.sizes)
-    return Shown(
-        name=called,
-        value=f"{count} elements",
-        type=str(kind),
-        inside=lambda: _Elements(machine, slot, called, kind),
-        elements=count,
-        expression=called,
-        kept=slot,
-    )
+def _array(machine: Machine, slot: str, name: str, kind: VariableType) -> Variable:
+    count, elements = math.prod(kind.sizes), Elements(machine, slot, name, kind)
+    return Variable(name=name, value=f"{count} elements", type=str(kind), inside=lambda: elements, elements=count)
 
 
-class _Elements(Sequence[Shown]):
+class Elements(Sequence[Variable]):
     """The elements of an array, made when they are looked at: there may be a million."""
 
     def __init__(self, machine: Machine, slot: str, called: str, kind: VariableType) -> None:
-        self._machine, self._kept, self._called, self._sizes = machine, slot, called, kind.sizes
+        self._machine, self._slot, self._called, self._sizes = machine, slot, called, kind.sizes
 
     def __len__(self) -> int:
         return math.prod(self._sizes)
 
-    def __getitem__(self, index: "int | slice") -> "Shown | list[Shown]":  # type: ignore[override]
+    def __getitem__(self, index: "int | slice") -> "Variable | list[Variable]":  # type: ignore[override]
         if isinstance(index, slice):
             return [self._one(value) for value in range(*index.indices(len(self)))]
         return self._one(range(len(self))[index])
 
-    def _one(self, number: int) -> Shown:
+    def _one(self, number: int) -> Variable:
         indices = []
         for size in reversed(self._sizes):
             number, index = divmod(number, size)
             indices.append(str(index + 1))
         which = f"[{','.join(reversed(indices))}]"
-        element = variable(self._machine, self._kept + which, name=self._called + which)
+        element = variable(self._machine, self._slot + which, name=self._called + which)
         return attrs.evolve(element, name=which)
 
 
 # ---- arms and the run ----------------------------------------------------------------------------------------------
 
 
-def _arm(machine: Machine, name: str) -> Shown:
+def _arm(machine: Machine, name: str) -> Variable:
     arm = machine.cell.arms[name].arm
     q = machine.hardware.configuration(name, machine.now)
-    joints = [
-        Shown(
-            name=f"joint {number}",
-            value=f"{math.degrees(position):.6g} deg" if joint.revolute else f"{position * 1e3:.6g} mm",
-        )
-        for number, (joint, position) in enumerate(zip(arm.joints, q.tolist(), strict=True), 1)
+    texts = [
+        f"{math.degrees(position):.6g} deg" if joint.revolute else f"{position * 1e3:.6g} mm"
+        for joint, position in zip(arm.joints, q.tolist(), strict=True)
     ]
+    joints = [Variable(name=f"joint {number}", value=text) for number, text in enumerate(texts, 1)]
 
-    def inside() -> list[Shown]:
-        X_WH = machine.state.tree.world(base_name(name)) @ forward(arm, q)
+    def inside() -> list[Variable]:
         holds = machine.state.hands[name].holds
-        force = ", ".join(f"{index:.6g}" for index in machine.hardware.force(name, machine.now).tolist())
+        force = ", ".join(f"{component:.6g}" for component in machine.hardware.force(name, machine.now).tolist())
+        hand = result(machine, "hand", machine.gripper_pose(name), "FRAME")
         return [
             *joints,
-            attrs.evolve(result(machine, "hand", X_WH, "FRAME"), name="hand", expression=name, kept=name),
-            Shown(name="moves", value=_motion(machine, name)),
-            Shown(name="holds", value=machine.spelled(holds) if holds else "nothing"),
-            Shown(name="force", value=f"({force}) N"),
+            attrs.evolve(hand, expression=name, slot=name),
+            Variable(name="moves", value=_motion(machine, name)),
+            Variable(name="holds", value=machine.spelled(holds) if holds else "nothing"),
+            Variable(name="force", value=f"({force}) N"),
         ]
 
-    return Shown(name=name, value=", ".join(joint.value for joint in joints), type=arm.name, inside=inside)
+    return Variable(name=name, value=", ".join(texts), type=arm.name, inside=inside)
 
 
 def _motion(machine: Machine, arm: str) -> str:
     """Return which stage of which MOVE an arm is in."""
-    motion = next(
-        (process.motion for process in machine.state.processes if process.motion and process.motion.arm == arm), None
-    )
-    if motion is None:
+    process = machine.mover(arm)
+    if process is None or process.motion is None:
         return "nothing"
+    motion = process.motion
     stage = machine.state.stages[motion.record]
     line = machine.code.source.line(motion.span.start)
     since = machine.now - stage.t0
     return f"{stage.stage.kind} {' '.join(stage.to)} of line {line}, {since:.3f} s of {stage.duration:.3f} s"
 
 
-def _run(machine: Machine, process: Process) -> Iterable[Shown]:
-    yield Shown(name="clock", value=f"{machine.now:.6g} s")
-    yield Shown(name="servo tick", value=str(machine.state.ticks))
-    yield Shown(name="devices on", value=", ".join(map(machine.spelled, sorted(machine.hardware.running()))) or "none")
-    yield Shown(name="arm used last", value=process.last_arm or "none")
-    yield Shown(name="priority", value=f"{process.priority:g}")
+def _run(machine: Machine, process: Process) -> Iterable[Variable]:
+    yield Variable(name="clock", value=f"{machine.now:.6g} s")
+    yield Variable(name="servo tick", value=str(machine.state.ticks))
+    yield Variable(
+        name="devices on", value=", ".join(map(machine.spelled, sorted(machine.hardware.running()))) or "none"
+    )
+    yield Variable(name="arm used last", value=process.last_arm or "none")
+    yield Variable(name="priority", value=f"{process.priority:g}")
     if process.locks:
-        yield Shown(name="locks", value=", ".join(map(machine.spelled, process.locks)))
+        yield Variable(name="locks", value=", ".join(map(machine.spelled, process.locks)))
 
 
 def _truth(value: bool) -> str:  # noqa: FBT001 - a value, not a switch

@@ -81,7 +81,7 @@ class Machine:
         self.code, self.cell, self.hardware = code, cell, hardware
         self.limits = limits or Limits()
         self.state = state or MachineState.initial(code, cell)
-        self.constants = [from_noap(value) if isinstance(value, tuple) else float(value) for value in code.constants]
+        self.constants = arrays_of(code.constants)
 
     def copy(self) -> "Machine":
         """Return a machine in the same state; what one of them does changes nothing in the other.
@@ -370,6 +370,11 @@ class Machine:
             helps=tuple(helps),
         )
         return RunError(diagnostic, self.state.tree, self.now)
+
+
+def arrays_of(constants: Sequence[tuple[float, ...] | float]) -> list[float | Array]:
+    """Return the constants of a code as values: numbers, and poses (4, 4)."""
+    return [from_noap(value) if isinstance(value, tuple) else float(value) for value in constants]
 
 
 def pose_data(frame: str, X: Array) -> dict[str, object]:
