@@ -35,9 +35,9 @@ def main() -> None:
     fast = compile_arm(arm)
     poses = wavy(forward(arm, START))
     move = cartesian_move(fast, poses, TIMES)
-    if move.hand is None or move.certificate is None:
+    if move.tool_path is None or move.certificate is None:
         raise SystemExit("a Cartesian move plans a path of the hand")
-    samples = move.hand(move.trajectory.times)
+    samples = move.tool_path(move.trajectory.times)
     robot = toolbox_robot(arm)
 
     def numeric() -> None:

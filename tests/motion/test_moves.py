@@ -104,8 +104,8 @@ def test_as_fast_as_the_limits_allow(puma: CompiledArm) -> None:
     assert max(use.max() for use in uses.values()) == pytest.approx(1.0, abs=1e-6)
     np.testing.assert_allclose(move.trajectory([0, move.trajectory.duration], 1), 0, atol=ROUNDING)
     np.testing.assert_allclose(move.trajectory(move.trajectory.duration), SEED_Q[-1], atol=ROUNDING)
-    assert move.misses[1] > 0
-    assert move.misses[0] == move.misses[2] == 0
+    assert move.passing_distances[1] > 0
+    assert move.passing_distances[0] == move.passing_distances[2] == 0
 
 
 def test_slowed_until_the_limits_hold(puma: CompiledArm) -> None:
@@ -148,24 +148,24 @@ def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str,
             continue
         run += 1
         t = np.linspace(0, 3, 20_000)
-        assert move.hand is not None
+        assert move.tool_path is not None
         assert move.certificate is not None
-        hand, planned = forward(arm.arm, move.trajectory(t)), move.hand(t)
+        hand, planned = forward(arm.arm, move.trajectory(t)), move.tool_path(t)
         off = np.linalg.norm(hand[:, :3, 3] - planned[:, :3, 3], axis=-1).max()
         turn = angle_between(planned[:, :3, :3], hand[:, :3, :3]).max()
         certificate = move.certificate
-        assert 0.99 * certificate.deviation_seen - ROUNDING <= off <= certificate.deviation + ROUNDING
+        assert 0.99 * certificate.deviation_sampled - ROUNDING <= off <= certificate.deviation + ROUNDING
         assert certificate.deviation <= deviation
         # Angles near 0 are found to the root of the rounding.
-        assert 0.99 * certificate.turn_seen - 1e-7 <= turn <= certificate.turn + 1e-7
-        assert certificate.turn <= 5 * deviation
-        assert np.linalg.norm(move.hand(certificate.worst_time)[:3, 3] - certificate.worst_place) < ROUNDING
+        assert 0.99 * certificate.rotation_sampled - 1e-7 <= turn <= certificate.rotation + 1e-7
+        assert certificate.rotation <= 5 * deviation
+        assert np.linalg.norm(move.tool_path(certificate.worst_time)[:3, 3] - certificate.worst_position) < ROUNDING
         assert continuity(move.trajectory).order >= 2
         lowest, highest = move.trajectory.extremes(0)
         assert (lowest >= arm.arm.limit("lower") - ROUNDING).all()
         assert (highest <= arm.arm.limit("upper") + ROUNDING).all()
         for at in (0.4, 1.5, 2.9):
-            labels = [b.label for b in inverse(arm.arm, move.hand(at), move.trajectory(at)).branches]
+            labels = [b.label for b in inverse(arm.arm, move.tool_path(at), move.trajectory(at)).branches]
             assert move.label in labels
     sample.record(f"moves of the {name} with {ends} ends, {orientation}, looked at 20,000 times", run, 0)
     assert run >= 6 or not sample.whole
@@ -181,8 +181,8 @@ def test_via_poses_are_missed_by_the_blend(puma: CompiledArm) -> None:
 
     hand = forward(puma.arm, move.trajectory(np.linspace(0, 4, 4001)))[:, :3, 3]
     nearest = np.linalg.norm(hand - X[1, :3, 3], axis=-1).min()
-    assert nearest == pytest.approx(move.misses[1], abs=2e-5)
-    assert move.misses[1] == pytest.approx(3 / 16 * 0.5 * 0.1 * np.sqrt(2))
+    assert nearest == pytest.approx(move.passing_distances[1], abs=2e-5)
+    assert move.passing_distances[1] == pytest.approx(3 / 16 * 0.5 * 0.1 * np.sqrt(2))
 
 
 def test_times_by_the_tool(puma: CompiledArm) -> None:
@@ -195,8 +195,8 @@ def test_times_by_the_tool(puma: CompiledArm) -> None:
     assert move.times[1] > 0.3 / puma.arm.tool_speed
     uses = limit_use(puma, move.trajectory)
     assert max(use.max() for use in uses.values()) == pytest.approx(1.0, abs=1e-6)
-    assert move.hand is not None
-    np.testing.assert_allclose(move.hand(move.times)[:, :3, 3], X[:, :3, 3], atol=ROUNDING)
+    assert move.tool_path is not None
+    np.testing.assert_allclose(move.tool_path(move.times)[:, :3, 3], X[:, :3, 3], atol=ROUNDING)
     assert move.certificate is not None
     assert move.certificate.holds
     assert move.certificate.factor > 1
@@ -229,8 +229,8 @@ def test_seven_joints() -> None:
     move = cartesian_move(arm, X, [0, 1, 2], near=q, deviation=1e-3)
 
     t = np.linspace(0, 2, 500)
-    assert move.hand is not None
-    assert np.abs(forward(arm, move.trajectory(t)) - move.hand(t))[:, :3, 3].max() <= 1e-3
+    assert move.tool_path is not None
+    assert np.abs(forward(arm, move.trajectory(t)) - move.tool_path(t))[:, :3, 3].max() <= 1e-3
 
 
 @pytest.mark.parametrize("by", ["via", "damped"])

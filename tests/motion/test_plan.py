@@ -91,7 +91,7 @@ def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.ra
         off = distance_from_line(X[:, :3, 3], A[:3, 3], B[:3, 3])
         assert off.max() <= found.certificate.deviation + POSE
         assert found.certificate.deviation <= deviation
-        assert found.certificate.turn <= ROTATION_PER_METRE * deviation
+        assert found.certificate.rotation <= ROTATION_PER_METRE * deviation
         assert (found.trajectory.peaks(1) <= arm.limit("speed") * (1 + 1e-9)).all()
         assert (found.trajectory.peaks(2) <= arm.limit("acceleration") * (1 + 1e-9)).all()
         np.testing.assert_allclose(X[0], A, atol=POSE)
@@ -112,7 +112,7 @@ def test_coarser_lines_are_no_slower(name: str, rng: np.random.Generator) -> Non
             continue
         assert (np.diff([run.trajectory.duration for run in runs]) <= 0).all()
         assert runs[-1].certificate.deviation <= 5e-3
-        assert runs[-1].certificate.turn <= 5e-3 * ROTATION_PER_METRE
+        assert runs[-1].certificate.rotation <= 5e-3 * ROTATION_PER_METRE
         done += 1
         if done == 3:
             break

@@ -12,7 +12,7 @@ from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, KindError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.certified import CertifiedMotion
+from armwright.motion.certified_motion import CertifiedMotion
 from armwright.motion.obstruction import PathError
 from armwright.motion.straight import straight_line
 from armwright.spatial.rotations import angle_between, rotation_from_vector, rotation_vector
@@ -88,11 +88,11 @@ def test_bounds_hold_for_a_hundred_times_the_looks(fast: CompiledArm, sample: Sa
         assert off <= certificate.deviation + ROUNDING
         if np.linalg.norm(X_B[:3, 3] - X_A[:3, 3]) <= deviation:
             continue
-        assert twisted <= certificate.turn + ANGLE_ROUNDING
+        assert twisted <= certificate.rotation + ANGLE_ROUNDING
         assert certificate.backward is not None
         assert back <= certificate.backward + ROUNDING
         run += 1
-        worst = max(worst, off / certificate.deviation, twisted / certificate.turn)
+        worst = max(worst, off / certificate.deviation, twisted / certificate.rotation)
     sample.record(f"lines of the {arm.name} looked at 100 times as often", run, 0, worst_of_bound=f"{worst:.3f}")
 
 
@@ -110,7 +110,7 @@ def test_short_line_with_a_large_turn() -> None:
     off, twisted, _ = strayed(line, fast, X_A, X_B, 100_001)
     assert line.certificate.holds
     assert off <= line.certificate.deviation <= 1e-4
-    assert twisted <= line.certificate.turn <= 5e-4
+    assert twisted <= line.certificate.rotation <= 5e-4
 
 
 @pytest.mark.drawn(0.34)
@@ -233,7 +233,7 @@ def test_bad_manner() -> None:
             "deviation: expected 1e-09 m or more, the closest that can be certified, got nan",
         ),
         ({"deviation": 1e-12}, "deviation: expected 1e-09 m or more, the closest that can be certified, got 1e-12"),
-        ({"turn": -1.0}, "turn: expected 1e-09 rad or more, the closest that can be certified, got -1"),
+        ({"rotation": -1.0}, "rotation: expected 1e-09 rad or more, the closest that can be certified, got -1"),
         ({"speed": 121}, r"speed 121 is outside 1\.\.120"),
     ):
         with pytest.raises(InvalidValueError, match=words):
@@ -241,7 +241,7 @@ def test_bad_manner() -> None:
     for period in (0.0, -1e-3, float("nan")):
         with pytest.raises(InvalidValueError, match=f"period: expected more than 0 s, got {period}"):
             plain_line(puma, period=period)
-    for name in ("deviation", "turn", "speed", "period"):
+    for name in ("deviation", "rotation", "speed", "period"):
         with pytest.raises(KindError, match=f"{name}: expected a number, got 'little'"):
             plain_line(puma, **{name: "little"})  # type: ignore[arg-type]
 

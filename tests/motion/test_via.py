@@ -16,7 +16,7 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.chain import chain
 from armwright.motion.continuity_report import continuity
 from armwright.motion.efforts import slowing_for_efforts
-from armwright.motion.plan import Manner, Stage, StageError, StageGoal, plan
+from armwright.motion.plan import Manner, PlannedStage, StageError, StageGoal, plan
 from armwright.motion.solver import solver_of
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
@@ -38,7 +38,7 @@ ROUNDING = 1e-9
 TIGHT, HAIR = 1.5, CORNER / 1000
 
 
-def by_via(arm: Arm, q: Array, X: Array, corner: float | None = CORNER, speed: float = 100.0) -> Stage:
+def by_via(arm: Arm, q: Array, X: Array, corner: float | None = CORNER, speed: float = 100.0) -> PlannedStage:
     return plan(arm, q, [StageGoal(kind="SPLINE", poses=X[1:], corner=corner)], Manner(speed=speed))[0]
 
 
@@ -83,7 +83,7 @@ def random_way(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
                 return q, np.stack(X)
 
 
-def faults(arm: Arm, stage: Stage, X: Array) -> list[str]:
+def faults(arm: Arm, stage: PlannedStage, X: Array) -> list[str]:
     """What a path past frames does that it should not, by where the hand is seen alone."""
     run, found = stage.trajectory, []
     hand = forward(arm, run(np.linspace(0, run.duration, LOOKS)))

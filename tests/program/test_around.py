@@ -115,7 +115,7 @@ def test_the_price_is_paid(by: Around) -> None:
 
     leg = DEVIATION if by == "via" else 0.0
     assert 0.7 * price.distance <= distance <= price.distance + leg + 1e-9
-    assert 0.7 * price.turn <= turn <= price.turn + (TURN if by == "via" else 0.0) + 1e-9
+    assert 0.7 * price.rotation <= turn <= price.rotation + (TURN if by == "via" else 0.0) + 1e-9
     assert line.stage.deviation is not None
     assert distance <= line.stage.deviation <= price.distance + leg
     # By the report's rule: even speed, but for a quarter of the time at either end, where it rises and falls.

@@ -18,7 +18,7 @@ from armwright.report.page import (
     JointInfo,
     Message,
     RunPage,
-    Stage,
+    StageRow,
     TreeChange,
     run_page,
 )
@@ -127,11 +127,11 @@ def knots(t: Array, plan: list[tuple[float, float, tuple[float, ...]]], start: t
     return places
 
 
-def stage_of(record: ArmRecord, t0: float, t1: float, kind: Any, to: tuple[str, ...], **more: Any) -> Stage:
+def stage_of(record: ArmRecord, t0: float, t1: float, kind: Any, to: tuple[str, ...], **more: Any) -> StageRow:
     """Measure one stage on the record."""
     rows = (record.t >= t0) & (record.t <= t1)
     length = float(np.linalg.norm(np.diff(record.hand[rows], axis=0), axis=1).sum())
-    return Stage(
+    return StageRow(
         t0=t0,
         t1=t1,
         arm=record.name,

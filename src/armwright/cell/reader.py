@@ -43,7 +43,7 @@ DEVIATION_MM = (1e-3, 1e3)
 # No more than a corner of any use; a hundredth of a millimetre is no corner any more, but a stop.
 CORNER_MM = (1e-2, 1e3)
 # The kind of detour of a straight line, as it is written.
-WAYS_ROUND: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
+DETOURS: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
 # What the camera finds after its last answer, as it is written.
 _AFTER_LAST = ("nothing", "same")
 # A hundred times that of the earth: more is a slip of units [m/s²].
@@ -115,7 +115,7 @@ def _corner(motion: Table) -> float | None:
 
 def _around(motion: Table) -> Around | None:
     """Read the kind of detour of a straight line; without the key there is no detour."""
-    return WAYS_ROUND[motion.choice("around", WAYS_ROUND, default="none")]
+    return DETOURS[motion.choice("around", DETOURS, default="none")]
 
 
 def _arms(table: Table, folder: Path) -> dict[str, CellArm]:

@@ -236,7 +236,11 @@ def _files(moved: "PlannedMove", uses: "dict[LimitName, Any]", *, film: bool, qu
 def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> dict[str, Any]:
     """Return a summary of a move as plain data in SI units."""
     passages = zip(
-        file.names, planned.times.tolist(), planned.configurations.tolist(), planned.misses.tolist(), strict=True
+        file.names,
+        planned.times.tolist(),
+        planned.configurations.tolist(),
+        planned.passing_distances.tolist(),
+        strict=True,
     )
     return {
         "arm": planned.arm.name,
@@ -250,7 +254,7 @@ def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -
                 "method": detour.method,
                 "obstacle": None if detour.obstacle is None else str(detour.obstacle),
                 "position_deviation": detour.price.distance,
-                "rotation_deviation": detour.price.turn,
+                "rotation_deviation": detour.price.rotation,
                 "extra_time": detour.price.time,
             }
             for detour in planned.detours
@@ -264,11 +268,11 @@ def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> 
     from armwright.cli.joints import unit_names, units
 
     console = plain_console()
-    shown = table(("pose", "s", *unit_names(planned.arm), *(["deviation mm"] if planned.hand else [])))
+    shown = table(("pose", "s", *unit_names(planned.arm), *(["deviation mm"] if planned.tool_path else [])))
     scale = units(planned.arm)
     for i, pose in enumerate(file.names):
         configurations = [f"{q:z.1f}" for q in planned.configurations[i] / scale]
-        deviation = [f"{planned.misses[i] * 1e3:.1f}"] if planned.hand else []
+        deviation = [f"{planned.passing_distances[i] * 1e3:.1f}"] if planned.tool_path else []
         shown.add_row(
             pose, f"{planned.times[i]:.3f}", *configurations, *deviation, end_section=i == len(file.names) - 1
         )

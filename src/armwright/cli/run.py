@@ -182,13 +182,13 @@ def _refuse_without_cell(program: Path) -> NoReturn:
 def _adjusted(cell: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
     import attrs
 
-    from armwright.cell.reader import DEVIATION_MM, SERVO_MS, WAYS_ROUND
+    from armwright.cell.reader import DETOURS, DEVIATION_MM, SERVO_MS
 
     period = cell.period if servo_ms is None else within(servo_ms, SERVO_MS, "--servo-ms") * 1e-3
     deviation = cell.deviation
     if deviation_mm is not None:
         deviation = within(deviation_mm, DEVIATION_MM, "--deviation-mm") * 1e-3
-    detour = cell.around if around is None else WAYS_ROUND[around.value]
+    detour = cell.around if around is None else DETOURS[around.value]
     return attrs.evolve(cell, period=period, deviation=deviation, around=detour)
 
 

@@ -4,10 +4,10 @@ from .blends import (
     via_deviations as via_deviations,
     via_distances as via_distances,
 )
-from .braking import brake as brake
 from .certificate import Certificate as Certificate
-from .certified import CertifiedMotion as CertifiedMotion
+from .certified_motion import CertifiedMotion as CertifiedMotion
 from .continuity_report import Continuity as Continuity, continuity as continuity
+from .controlled_stop import brake as brake
 from .cubic_polynomials import cubic as cubic, cubic_through as cubic_through
 from .detour import Detour as Detour, line_or_detour as line_or_detour
 from .efforts import effort_peaks as effort_peaks, slowing_for_efforts as slowing_for_efforts

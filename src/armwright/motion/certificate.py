@@ -22,16 +22,16 @@ class Certificate:
 
     Attributes:
         arm: the arm.
-        deviation_asked: bound of the distance of the tool from the path [m].
-        deviation: upper bound of what that distance is, between samples as well [m].
-        deviation_seen: the largest distance at the samples [m].
-        turn_asked: bound of the angle from the orientation that belongs to the progress on the path, and on a straight
-            line to the position of the tool on it as well [rad].
-        turn: upper bound of what that angle is [rad].
-        turn_seen: the largest angle at the samples [rad]; None where only the bound is known.
+        deviation_tolerance: bound of the distance of the tool from the path [m].
+        deviation: upper bound of that distance, between samples as well [m].
+        deviation_sampled: the largest distance at the samples [m].
+        rotation_tolerance: bound of the angle from the orientation that belongs to the progress on the path, and on a
+            straight line to the position of the tool on it as well [rad].
+        rotation: upper bound of that angle, between samples as well [rad].
+        rotation_sampled: the largest angle at the samples [rad]; None where only the bound is known.
         backward: upper bound of how far the tool runs backwards along a straight line [m]; None for other paths.
         worst_time: when the largest distance was sampled [s].
-        worst_place: (3,) where the tool was then, seen from the base [m].
+        worst_position: (3,) where the tool was then, seen from the base [m].
         knots: number of poses that were solved.
         samples: how often the tool was sampled in between.
         peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at
@@ -41,14 +41,14 @@ class Certificate:
     """
 
     arm: Arm
-    deviation_asked: float
+    deviation_tolerance: float
     deviation: float
-    deviation_seen: float
-    turn_asked: float
-    turn: float
-    turn_seen: float | None
+    deviation_sampled: float
+    rotation_tolerance: float
+    rotation: float
+    rotation_sampled: float | None
     worst_time: float
-    worst_place: Array
+    worst_position: Array
     knots: int
     samples: int
     peaks: dict[LimitName, Array]
@@ -62,14 +62,14 @@ class Certificate:
         still = np.zeros(arm.n)
         return cls(
             arm=arm,
-            deviation_asked=tolerance.position,
+            deviation_tolerance=tolerance.position,
             deviation=0.0,
-            deviation_seen=0.0,
-            turn_asked=tolerance.orientation,
-            turn=0.0,
-            turn_seen=0.0,
+            deviation_sampled=0.0,
+            rotation_tolerance=tolerance.orientation,
+            rotation=0.0,
+            rotation_sampled=0.0,
             worst_time=0.0,
-            worst_place=position,
+            worst_position=position,
             knots=1,
             samples=0,
             peaks={"speed": still, "acceleration": still, "effort": still},
@@ -94,7 +94,8 @@ class Certificate:
         uses = "".join(f", {part:.0%} of the {name} of {self.arm.called(joint)}" for name, joint, part in parts)
         return (
             f"certificate {'holds' if self.holds else 'DOES NOT HOLD'}: within {self.deviation * 1e3:.3f} of "
-            f"{self.deviation_asked * 1e3:g} mm, {self.turn * 1e3:.3f} of {self.turn_asked * 1e3:g} mrad{uses}"
+            f"{self.deviation_tolerance * 1e3:g} mm, {self.rotation * 1e3:.3f} of "
+            f"{self.rotation_tolerance * 1e3:g} mrad{uses}"
         )
 
     @property
@@ -106,9 +107,9 @@ class Certificate:
     def holds(self) -> bool:
         """Whether the path is kept within what was asked, and all limits are."""
         return (
-            self.deviation <= self.deviation_asked
-            and self.turn <= self.turn_asked
-            and (self.backward is None or self.backward <= self.deviation_asked)
+            self.deviation <= self.deviation_tolerance
+            and self.rotation <= self.rotation_tolerance
+            and (self.backward is None or self.backward <= self.deviation_tolerance)
             and all(self.use(name)[1] <= 1 + 1e-9 for name in LIMITS)
         )
 
@@ -123,14 +124,14 @@ class Certificate:
         limits = {name: self.use(name) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()}
         return {
             "holds": self.holds,
-            "deviation_asked": self.deviation_asked,
+            "deviation_tolerance": self.deviation_tolerance,
             "deviation": self.deviation,
-            "deviation_seen": self.deviation_seen,
-            "turn_asked": self.turn_asked,
-            "turn": self.turn,
-            "turn_seen": self.turn_seen,
+            "deviation_sampled": self.deviation_sampled,
+            "rotation_tolerance": self.rotation_tolerance,
+            "rotation": self.rotation,
+            "rotation_sampled": self.rotation_sampled,
             "worst_time": self.worst_time,
-            "worst_place": self.worst_place.tolist(),
+            "worst_position": self.worst_position.tolist(),
             "knots": self.knots,
             "samples": self.samples,
             "of_limits": {name: {"joint": joint + 1, "part": part} for name, (joint, part) in limits.items()},
@@ -140,15 +141,15 @@ class Certificate:
 
     def __str__(self) -> str:
         """Say it in a few lines."""
-        x, y, z = self.worst_place * 1e3
+        x, y, z = self.worst_position * 1e3
         verdict = "holds" if self.holds else "DOES NOT HOLD"
         within = (
             f"{verdict}: tool within {self.deviation * 1e3:.4f} mm of the path (asked "
-            f"{self.deviation_asked * 1e3:g} mm), within {self.turn * 1e3:.3f} mrad of its orientation (asked "
-            f"{self.turn_asked * 1e3:g} mrad)"
+            f"{self.deviation_tolerance * 1e3:g} mm), within {self.rotation * 1e3:.3f} mrad of its orientation (asked "
+            f"{self.rotation_tolerance * 1e3:g} mrad)"
         )
         sampled = (
-            f"largest distance sampled {self.deviation_seen * 1e3:.4f} mm, at {self.worst_time:.3f} s, "
+            f"largest distance sampled {self.deviation_sampled * 1e3:.4f} mm, at {self.worst_time:.3f} s, "
             f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base; {self.knots} knots, {self.samples} samples"
         )
         lines = [within, sampled]

@@ -18,12 +18,12 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations, joint_distance
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.motion.certified import CertifiedMotion
+from armwright.motion.certified_motion import CertifiedMotion
 from armwright.motion.deviation import cubic_peaks, hand_bounds, tracking_error
 from armwright.motion.limit_utilization import slowing_for_limits
 from armwright.motion.obstruction import PathError
 from armwright.motion.solver import AnyArm, Solver, solver_of
-from armwright.motion.straight import asked_line, certified_line
+from armwright.motion.straight import certified_line, requested_line
 from armwright.motion.straight_path import StraightPath
 from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
 from armwright.motion.trajectory import Trajectory, join
@@ -67,18 +67,18 @@ class Price:
 
     Attributes:
         distance: largest distance of the tool from the straight line [m].
-        turn: largest angle from the orientation that belongs to the line [rad].
+        rotation: largest angle from the orientation that belongs to the line [rad].
         time: how much longer it takes than the line by the report's rule would [s]; 0 for a line that is run, if it is
             no crawl.
     """
 
     distance: float
-    turn: float
+    rotation: float
     time: float
 
     def __str__(self) -> str:
         """Say it in mm, mrad and s."""
-        return f"{self.distance * 1e3:.1f} mm off the line, {self.turn * 1e3:.1f} mrad, {self.time:+.2f} s"
+        return f"{self.distance * 1e3:.1f} mm off the line, {self.rotation * 1e3:.1f} mrad, {self.time:+.2f} s"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -138,7 +138,7 @@ def line_or_detour(
     solver = solver_of(arm)
     q, B = single_configuration(solver.arm, q_start, "q_start"), exact_pose(X_goal)
     allowed = tolerance(deviation)
-    requested = asked_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
+    requested = requested_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
     straight: Detour | None = None
     try:
         line = certified_line(arm, q, B, allowed, speed=speed)
@@ -165,7 +165,7 @@ def line_or_detour(
 
 def _straight(line: CertifiedMotion, slower: float) -> Detour:
     """Return the line itself."""
-    price = Price(distance=line.certificate.deviation, turn=line.certificate.turn, time=slower)
+    price = Price(distance=line.certificate.deviation, rotation=line.certificate.rotation, time=slower)
     return Detour(trajectory=line.trajectory, method="line", obstacle=None, via=None, price=price, legs=(line,))
 
 
@@ -199,8 +199,8 @@ def _by_via(
             except (PathError, IncapableArmError):
                 continue
             motion = join([there.trajectory, back.trajectory])
-            distance, turn = _apart(line, via)
-            price = Price(distance=distance, turn=turn, time=motion.duration - line.duration)
+            distance, rotation = _apart(line, via)
+            price = Price(distance=distance, rotation=rotation, time=motion.duration - line.duration)
             ways.append(
                 Detour(trajectory=motion, method="via", obstacle=obstacle, via=via, price=price, legs=(there, back))
             )
@@ -255,9 +255,9 @@ def _turning(arm: Arm) -> Flags:
     return np.array([joint.revolute for joint in arm.joints])
 
 
-def _moved(X: Array, shift: Array, turn: Array) -> Array:
+def _moved(X: Array, shift: Array, rotation: Array) -> Array:
     Y = X.copy()
-    Y[:3, :3] = rotation_from_vector(turn) @ X[:3, :3]
+    Y[:3, :3] = rotation_from_vector(rotation) @ X[:3, :3]
     Y[:3, 3] += shift
     return Y
 
@@ -265,8 +265,8 @@ def _moved(X: Array, shift: Array, turn: Array) -> Array:
 def _apart(line: StraightPath, X: Array) -> tuple[float, float]:
     """Return how far a pose is from the nearest position of the line, and rotated from the orientation there."""
     on = line.at(0, np.array([_nearest(line, X)]))[0]
-    turn = rotation_vector(on[:3, :3].T @ X[:3, :3])
-    return float(np.linalg.norm(X[:3, 3] - on[:3, 3])), float(np.linalg.norm(turn))
+    rotation = rotation_vector(on[:3, :3].T @ X[:3, :3])
+    return float(np.linalg.norm(X[:3, 3] - on[:3, 3])), float(np.linalg.norm(rotation))
 
 
 def _nearest(line: StraightPath, X: Array) -> float:
@@ -301,7 +301,7 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
     trajectory = trajectory.slowed(factor)
     price = Price(
         distance=float(error.position.max()),
-        turn=float(error.orientation.max()),
+        rotation=float(error.orientation.max()),
         time=trajectory.duration - line.duration,
     )
     return Detour(trajectory=trajectory, method="damped", obstacle=obstacle, via=None, price=price, legs=())

@@ -18,14 +18,14 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
 from armwright.motion.branch_selection import configurations_at, configurations_through
 from armwright.motion.certificate import Certificate
-from armwright.motion.certified import certificate_of, limit_peaks
+from armwright.motion.certified_motion import certificate_of, limit_peaks
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
-from armwright.motion.hand_path import HandPath, Orientation, hand_path
 from armwright.motion.limit_utilization import slowing_for_limits
 from armwright.motion.obstruction import PathError, cause_of
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.tolerance import Tolerance, tolerance
+from armwright.motion.tool_path import Orientation, ToolPath, tool_path
 from armwright.motion.tracking import Task, Tracking, path_error, track
 from armwright.motion.trajectory import Trajectory, join
 from armwright.spatial.poses import homogeneous
@@ -47,12 +47,12 @@ class Move:
         arm: the arm.
         poses: (k, 4, 4) poses of the tool, their rotations made exact.
         times: (k,) when they are passed [s].
-        postures: (k, n) joint positions at the poses.
+        configurations: (k, n) joint positions at the poses.
         label: branch of the configurations; several, joined by arrows, where it changes from pose to pose.
         trajectory: of the joints.
-        misses: (k,) shortest distance at which the planned path passes each pose: of the tool [m] for a Cartesian move,
-            in joint space for a joint move; the ends are met, and so is every pose that is stopped at.
-        hand: where the tool is planned to be; None where no path of it is planned.
+        passing_distances: (k,) shortest distance at which the planned path passes each pose: of the tool [m] for a
+            Cartesian move, in joint space for a joint move; 0 at the ends and at poses that are stopped at.
+        tool_path: where the tool is planned to be; None where no path of it is planned.
         certificate: how near the tool keeps to that, and which part of the limits is used; None where none is planned.
         detours: the segments from pose to pose of a move that stops at each of them; else none.
     """
@@ -63,8 +63,8 @@ class Move:
     configurations: Array
     label: str
     trajectory: Trajectory
-    misses: Array
-    hand: HandPath | None = None
+    passing_distances: Array
+    tool_path: ToolPath | None = None
     certificate: Certificate | None = None
     detours: tuple[Detour, ...] = ()
 
@@ -83,7 +83,7 @@ class Move:
             self,
             times=self.times * factor,
             trajectory=slow,
-            hand=None if self.hand is None else self.hand.slowed(factor),
+            tool_path=None if self.tool_path is None else self.tool_path.slowed(factor),
             certificate=certificate,
         )
 
@@ -137,7 +137,7 @@ def joint_move(
         configurations=q,
         label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
         trajectory=blended(t, q, b, ends=ends),
-        misses=via_distances(t, q, b, ends=ends),
+        passing_distances=via_distances(t, q, b, ends=ends),
     )
     return move if times is not None else _inside_limits(arm, move)
 
@@ -183,7 +183,7 @@ def cartesian_move(
     one_of("orientation", orientation, ("geodesic", "zyz"))
     solver, X = solver_of(arm), exact_poses(poses)
     t, b = _timing(_tool_times(solver.arm, X) if times is None else times, blend, len(X))
-    hand = hand_path(X, t, b, ends=ends, orientation=orientation)
+    hand = tool_path(X, t, b, ends=ends, orientation=orientation)
     move = along(arm, X, hand, t, b, near=near, ends=ends, deviation=deviation)
     return move if times is not None else _inside_limits(arm, move)
 
@@ -191,7 +191,7 @@ def cartesian_move(
 def along(
     arm: AnyArm,
     X: Array,
-    hand: HandPath,
+    hand: ToolPath,
     times: Array,
     blend: ArrayLike,
     *,
@@ -210,9 +210,9 @@ def along(
         configurations=tracked.trajectory(times),
         label=label,
         trajectory=tracked.trajectory,
-        misses=via_distances(times, X[:, :3, 3], blend, ends=ends),
-        hand=hand,
-        certificate=attrs.evolve(certificate, worst_place=hand(certificate.worst_time)[:3, 3]),
+        passing_distances=via_distances(times, X[:, :3, 3], blend, ends=ends),
+        tool_path=hand,
+        certificate=attrs.evolve(certificate, worst_position=hand(certificate.worst_time)[:3, 3]),
     )
 
 
@@ -335,7 +335,7 @@ def _inside_limits(arm: AnyArm, move: Move) -> Move:
 
 
 def _followed(
-    solver: Solver, hand: HandPath, near: Array, allowed: Tolerance, *, from_rest: bool
+    solver: Solver, hand: ToolPath, near: Array, allowed: Tolerance, *, from_rest: bool
 ) -> tuple[str, Tracking]:
     """Return a branch, and the joints that follow a path of the tool on it.
 
@@ -387,6 +387,6 @@ def _stopping(arm: Arm, X: Array, q_start: Array, legs: Sequence[Detour]) -> Mov
         configurations=configurations,
         label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
         trajectory=join([leg.trajectory for leg in legs]),
-        misses=np.zeros(len(X)),
+        passing_distances=np.zeros(len(X)),
         detours=tuple(legs),
     )

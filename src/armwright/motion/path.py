@@ -46,8 +46,8 @@ class Path:
     def lengths(self) -> Array:
         """Return the length of every segment (k-1,) [m]; a rotation counts with ``TURN_RADIUS``."""
         shift = np.linalg.norm(np.diff(self.poses[:, :3, 3], axis=0), axis=-1)
-        turn = angle_between(self.poses[:-1, :3, :3], self.poses[1:, :3, :3])
-        return np.asarray(np.maximum(shift, TURN_RADIUS * turn))
+        angle = angle_between(self.poses[:-1, :3, :3], self.poses[1:, :3, :3])
+        return np.asarray(np.maximum(shift, TURN_RADIUS * angle))
 
     def at(self, segment: int, fraction: ArrayLike) -> Array:
         """Return poses (..., 4, 4) at fractions (...) of one segment."""

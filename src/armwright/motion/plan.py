@@ -13,13 +13,13 @@ from armwright.errors import ArmwrightError, IncapableArmError
 from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations, joint_distance
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.certificate import Certificate
-from armwright.motion.certified import joined
+from armwright.motion.certified_motion import joined
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
 from armwright.motion.ends import check_ends
 from armwright.motion.obstruction import Cause, PathError, cause_of
 from armwright.motion.path import Path
 from armwright.motion.quintic_polynomials import point_to_point
-from armwright.motion.rounded import rounded_move
+from armwright.motion.rounded_corners import rounded_move
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import coarse_line
 from armwright.motion.through import through
@@ -101,7 +101,7 @@ class Obstacle:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Stage:
+class PlannedStage:
     """One stage, planned.
 
     Attributes:
@@ -140,7 +140,7 @@ class StageError(ArmwrightError, ValueError):
         super().__init__(obstacle.reason)
 
 
-def plan(arm: AnyArm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manner) -> list[Stage]:
+def plan(arm: AnyArm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manner) -> list[PlannedStage]:
     """Plan the stages of one move, each beginning where the last one ended.
 
     A point-to-point stage has up to eight configurations to end in. The nearest comes first; when no straight line
@@ -184,7 +184,7 @@ def _worth_looking(arm: AnyArm, goals: Sequence[StageGoal]) -> bool:
     )
 
 
-def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, number: int) -> list[Stage]:
+def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, number: int) -> list[PlannedStage]:
     if number == len(goals):
         return []
     first_error: StageError | None = None
@@ -197,7 +197,7 @@ def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, num
     raise first_error
 
 
-def _ways(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[Stage]:
+def _ways(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[PlannedStage]:
     """Give the paths to make one stage, best first: one per configuration for point to point, else one."""
     poses = of_shape(goal.poses, (4, 4), "poses")
     far = np.abs(poses[:, :3, 3]).max(axis=-1)
@@ -221,7 +221,7 @@ def _ways(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -
         yield way_round
 
 
-def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -> Stage:
+def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -> PlannedStage:
     """Return the stage that follows a path: a line, the report's spline, or rounded corners."""
     how = {"deviation": manner.deviation, "speed": manner.speed}
     stops, stopped_by = "", None
@@ -237,7 +237,7 @@ def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -
     else:
         motion = through(arm, path, q, **how)
     motion = motion.on_ticks(manner.period)
-    return Stage(
+    return PlannedStage(
         kind=goal.kind,
         trajectory=motion.trajectory,
         length=_length(path.poses) if goal.kind == "LINE" else hand_length(arm, motion.trajectory),
@@ -270,7 +270,7 @@ def _at_pose(cause: Cause, reason: str, pose: int, X: Array) -> Obstacle:
     )
 
 
-def _way_round(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> Stage | None:
+def _way_round(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> PlannedStage | None:
     """Return the stage that bypasses what stops a line; None where that is not asked for, or there is no path."""
     if manner.around is None or goal.kind != "LINE" or obstacle.certain:
         return None
@@ -285,7 +285,7 @@ def _way_round(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle:
     taken = detour.method != "line"
     corners = [X, Y] if detour.via is None else [X, detour.via, Y]
     deviation = 0.0 if legs is None else legs.certificate.deviation
-    return Stage(
+    return PlannedStage(
         kind="LINE",
         trajectory=trajectory,
         length=_length(np.stack(corners)) if legs else hand_length(arm, trajectory),
@@ -318,9 +318,9 @@ def _configurations(arm: AnyArm, X: Array, q: Array, number: int) -> list[Array]
     return sorted(configurations, key=lambda configuration: joint_distance(model, q, configuration))
 
 
-def _direct(arm: AnyArm, q: Array, goal: Array, manner: Manner) -> Stage:
+def _direct(arm: AnyArm, q: Array, goal: Array, manner: Manner) -> PlannedStage:
     trajectory = point_to_point(solver_of(arm).arm, q, goal, manner.speed)
-    return Stage(
+    return PlannedStage(
         kind="PTP",
         trajectory=whole_ticks(trajectory, manner.period),
         length=hand_length(arm, trajectory),

@@ -13,7 +13,7 @@ from armwright.arrays import Array, ArrayLike
 from armwright.errors import IncapableArmError
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solution import violations
-from armwright.motion.certified import CertifiedMotion, fastest, standstill
+from armwright.motion.certified_motion import CertifiedMotion, fastest, standstill
 from armwright.motion.obstruction import Obstruction, PathError
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed, report_step
 from armwright.motion.quintic_polynomials import check_speed
@@ -37,7 +37,7 @@ def straight_line(
     X_goal: ArrayLike,
     *,
     deviation: float = 1e-3,
-    turn: float | None = None,
+    rotation: float | None = None,
     speed: float = 100.0,
     period: float | None = None,
 ) -> CertifiedMotion:
@@ -52,7 +52,7 @@ def straight_line(
         q_start: (n,) present joint positions [rad] or [m].
         X_goal: (4, 4) pose at the end of the line.
         deviation: allowed distance of the tool from the line [m].
-        turn: allowed angle from the orientation that belongs to the position of the tool on the line, and to its
+        rotation: allowed angle from the orientation that belongs to the position of the tool on the line, and to its
             progress on it [rad]; 5 mrad for each mm of the deviation when left out. On a line shorter than the
             deviation the progress alone counts.
         speed: 1 to 120, 100 is normal: by the report's rule, as a LINE of the robot language has it.
@@ -65,10 +65,10 @@ def straight_line(
         PathError: a pose of the line is out of reach, a joint passes a limit, the configuration would have to change
             on the path, or a singularity keeps the tool from staying within the deviation; with the position and the
             cause.
-        InvalidValueError: deviation, turn or speed are out of range.
+        InvalidValueError: deviation, rotation or speed are out of range.
         IncapableArmError: gravity alone takes more than a joint may give, or the arm has no reach or tool speed.
     """
-    return certified_line(arm, q_start, X_goal, tolerance(deviation, turn), speed=speed, period=period)
+    return certified_line(arm, q_start, X_goal, tolerance(deviation, rotation), speed=speed, period=period)
 
 
 def certified_line(
@@ -104,7 +104,7 @@ def certified_line(
     if even is None:
         return standstill(solver, q, allowed)
     motion = line(A, B, even, near=allowed.position)
-    task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(_asked_time, even))
+    task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(_requested_time, even))
     tracked = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
     if isinstance(tracked, Obstruction):
         raise path_error(motion, tracked)
@@ -141,7 +141,7 @@ def coarse_deviations(deviation: float) -> list[float]:
     return [each for each in COARSE if each <= deviation] or [deviation]
 
 
-def asked_line(arm: Arm, A: Array, B: Array, speed: float) -> StraightPath | None:
+def requested_line(arm: Arm, A: Array, B: Array, speed: float) -> StraightPath | None:
     """Return the line from A to B at the speed of the report's rule, whatever the joints; None for one of no length."""
     even = even_time(arm, A, B, speed)
     return None if even is None else line(A, B, even, near=0.0, ramp=_RAMP)
@@ -172,7 +172,7 @@ def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
     return np.linspace(0.0, motion.duration, min(max(_FEWEST, count), _MOST))
 
 
-def _asked_time(even: float, t: Array) -> Array:
+def _requested_time(even: float, t: Array) -> Array:
     """Return when times of a line at even speed are passed where the tool gathers speed first, and loses it, evenly.
 
     Args:

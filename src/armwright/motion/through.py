@@ -6,7 +6,7 @@ import numpy as np
 
 from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike
-from armwright.motion.certified import CertifiedMotion, slowed_alike, standstill
+from armwright.motion.certified_motion import CertifiedMotion, slowed_alike, standstill
 from armwright.motion.ends import check_ends
 from armwright.motion.moves import exact_poses
 from armwright.motion.obstruction import Obstruction, PathError

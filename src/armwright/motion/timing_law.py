@@ -225,7 +225,7 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
     bounds, lengths = grid.bounds, grid.lengths
     tighter, runs, x = np.ones((len(lengths), 1)), [], grid.squares
     for _ in range(_ROUNDS):
-        runs.append(_looked_at(grid, *_averaged(lengths, np.sqrt(x), window)))
+        runs.append(_checked(grid, *_averaged(lengths, np.sqrt(x), window)))
         if runs[-1].duration <= (1 + _HAIR) * grid.allowed:
             break
         worst = np.ones(len(lengths))
@@ -269,7 +269,7 @@ def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Arra
     return breaks, (ahead - behind) / window
 
 
-def _looked_at(grid: _Grid, breaks: Array, law: Array) -> _Run:
+def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
     """Return q(s(t)), cut where s(t) passes a knot of the path, and what it uses of the limits."""
     arm, path, caps = grid.arm, grid.path, grid.caps
     knots = path.times[1:-1]

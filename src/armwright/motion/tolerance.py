@@ -34,8 +34,8 @@ def tolerance(deviation: float, orientation: float | None = None) -> Tolerance:
         )
     if orientation is None:
         return Tolerance(deviation, ROTATION_PER_METRE * deviation)
-    if not number(orientation, "turn") >= CLOSEST:
+    if not number(orientation, "rotation") >= CLOSEST:
         raise InvalidValueError(
-            f"turn: expected {CLOSEST:g} rad or more, the closest that can be certified, got {orientation:g}"
+            f"rotation: expected {CLOSEST:g} rad or more, the closest that can be certified, got {orientation:g}"
         )
     return Tolerance(deviation, orientation)

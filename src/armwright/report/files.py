@@ -15,7 +15,7 @@ from armwright.cell.frames import WORLD
 from armwright.errors import ExitStatus
 from armwright.files.inputs import hash_read
 from armwright.files.output import sha256
-from armwright.motion.plan import Stage
+from armwright.motion.plan import PlannedStage
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import IN_A_LIST, KEPT, Excerpt, excerpt, listed, more
@@ -167,7 +167,7 @@ def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
     }
 
 
-def _detour(stage: Stage) -> dict[str, Any] | None:
+def _detour(stage: PlannedStage) -> dict[str, Any] | None:
     """Return the obstacle of a straight line with the detour of the stage and its cost; None without an obstacle."""
     obstacle, detour = stage.obstacle, stage.detour
     if obstacle is None or detour is None:
@@ -183,7 +183,7 @@ def _detour(stage: Stage) -> dict[str, Any] | None:
         "line": obstacle.length,
         "position": _numbers(obstacle.place),
         "position_deviation": detour.price.distance,
-        "rotation_deviation": detour.price.turn,
+        "rotation_deviation": detour.price.rotation,
         "extra_time": detour.price.time,
     }
 

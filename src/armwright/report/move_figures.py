@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.motion.hand_path import zyz_angles
+from armwright.motion.tool_path import zyz_angles
 from armwright.motion.trajectory import Samples
 from armwright.report.figures import empty_figure, equal_scales, literal, spread, svg_text
 

@@ -10,7 +10,7 @@ from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.moves import Move
 from armwright.motion.poses_file import PosesFile
 from armwright.motion.trajectory import Samples
-from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, Stage
+from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, StageRow
 from armwright.report.sticks import joints_of, sticks, thinned
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
@@ -80,12 +80,14 @@ def move_page(planned: PlannedMove) -> RunPage:
 
 def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
     for i, (name, t, line) in enumerate(zip(file.names, move.times.tolist(), file.lines, strict=True)):
-        deviation = f" with a deviation of {move.misses[i] * 1e3:.1f} mm" if move.hand else " approximately"
-        passage = "reached" if move.misses[i] == 0 else f"passed{deviation}"
+        deviation = (
+            f" with a deviation of {move.passing_distances[i] * 1e3:.1f} mm" if move.tool_path else " approximately"
+        )
+        passage = "reached" if move.passing_distances[i] == 0 else f"passed{deviation}"
         yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {passage}")
 
 
-def _stages(planned: PlannedMove) -> Iterator[Stage]:
+def _stages(planned: PlannedMove) -> Iterator[StageRow]:
     move, file, samples = planned.move, planned.file, planned.samples
     for i, (t0, t1) in enumerate(zip(move.times[:-1].tolist(), move.times[1:].tolist(), strict=True)):
         hand = forward(move.arm, move.trajectory(np.linspace(t0, t1, _SAMPLES)))[:, :3, 3]
@@ -93,12 +95,12 @@ def _stages(planned: PlannedMove) -> Iterator[Stage]:
         if not during.any():  # a segment shorter than a tick
             during = np.abs(samples.times - (t0 + t1) / 2) == np.abs(samples.times - (t0 + t1) / 2).min()
         detour = move.detours[i] if move.detours else None
-        yield Stage(
+        yield StageRow(
             t0=t0,
             t1=t1,
             line=file.lines[i + 1],
             arm=_ARM,
-            kind="HAND" if move.hand or detour else "JOINT",
+            kind="HAND" if move.tool_path or detour else "JOINT",
             to=(file.names[i + 1],),
             speed=100.0,
             peak_speed=np.abs(samples.qd[during]).max(axis=0).tolist(),

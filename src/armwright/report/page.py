@@ -74,7 +74,7 @@ class Effect:
 
 
 @attrs.frozen(kw_only=True)
-class Stage:
+class StageRow:
     """A stage of a motion.
 
     Attributes:
@@ -285,7 +285,7 @@ class RunPage:
     status: str = "finished"
     messages: tuple[Message, ...] = attrs.field(default=(), converter=_tuple)
     effects: tuple[Effect, ...] = attrs.field(default=(), converter=_tuple)
-    stages: tuple[Stage, ...] = attrs.field(default=(), converter=_tuple)
+    stages: tuple[StageRow, ...] = attrs.field(default=(), converter=_tuple)
     arms: tuple[ArmRecord, ...] = attrs.field(default=(), converter=_tuple)
     animation: Animation | None = None
     text_kind: TextKind = "Program"

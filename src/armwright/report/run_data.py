@@ -16,7 +16,7 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line
 from armwright.program.vm.move_diagnostics import note_of
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
-from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, Stage, TreeChange
+from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
 from armwright.report.sticks import joints_of, sticks, thinned
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
@@ -94,8 +94,8 @@ def _effects(recording: Recording, code: Code) -> list[Effect]:
     return effects.mapped(shown).joined(*omitted)
 
 
-def _stage(run: RunStage, line: int) -> Stage:
-    return Stage(
+def _stage(run: RunStage, line: int) -> StageRow:
+    return StageRow(
         t0=run.t0,
         t1=run.t1,
         line=line,

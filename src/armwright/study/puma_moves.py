@@ -20,11 +20,11 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.blends import blended, via_deviations
 from armwright.motion.chain import chain
 from armwright.motion.detour import DetourMethod
-from armwright.motion.hand_path import HandPath, hand_path, zyz_angles
 from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 from armwright.motion.moves import along, stopping_move
 from armwright.motion.obstruction import PathError
 from armwright.motion.solver import solver_of
+from armwright.motion.tool_path import ToolPath, tool_path, zyz_angles
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.euler import matlab_zyz
@@ -73,16 +73,16 @@ def joint_trajectory() -> Trajectory:
     return blended(TIMES, np.radians(PRINTED_Q), BLEND, ends="running")
 
 
-def path_of(kind: MoveKind) -> HandPath:
+def path_of(kind: MoveKind) -> ToolPath:
     """Return the planned path of the tool of a Cartesian move."""
     X = study_poses()
     if kind == "seed":
         position = blended(TIMES, X[:, :3, 3], BLEND, ends="running")
         angles = blended(TIMES, matlab_zyz(PRINTED_ROTATIONS), BLEND, ends="running")
-        return HandPath(place=position, turns=None, angles=angles, times=np.array(TIMES))
+        return ToolPath(position=position, rotations=None, angles=angles, times=np.array(TIMES))
     if kind == "joint":
         raise UnknownNameError("Cartesian move", kind, [known for known in MOVES if known != "joint"])
-    return hand_path(X, TIMES, BLEND, ends="running", orientation=kind)
+    return tool_path(X, TIMES, BLEND, ends="running", orientation=kind)
 
 
 def poses_along(kind: MoveKind, t: Array) -> Array:
@@ -347,7 +347,7 @@ def courses(number: int) -> list[Course]:
         return [Course(title=title, unit=f"deg{per}", curves={f"joint {i + 1}": q[:, i] for i in range(6)})]
     hand = path_of(kind)
     assert hand.angles is not None  # noqa: S101 - this path has them
-    position, angles = hand.place(t, order) * 100, np.degrees(hand.angles(t, order))
+    position, angles = hand.position(t, order) * 100, np.degrees(hand.angles(t, order))
     derivative = ("", "speed of the ", "acceleration of the ")[order]
     return [
         Course(title=f"{derivative}position", unit=f"cm{per}", curves=dict(zip("xyz", position.T, strict=True))),

@@ -140,7 +140,7 @@ def _films() -> dict[str, bytes]:
         configurations=np.radians(puma_moves.PRINTED_Q),
         label="",
         trajectory=puma_moves.joint_trajectory(),
-        misses=np.zeros(len(puma_moves.NAMES)),
+        passing_distances=np.zeros(len(puma_moves.NAMES)),
     )
     return {name.replace("move", f"figure{puma_moves.FILM}"): film for name, film in films(move).items()}
 

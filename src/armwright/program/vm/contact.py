@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.cell.hardware import Press
 from armwright.cell.model import base_name
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.braking import brake
+from armwright.motion.controlled_stop import brake
 from armwright.motion.plan import hand_length
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.program.language.source import Span

@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.cell.model import base_name
 from armwright.errors import IncapableArmError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
+from armwright.motion.plan import Manner, Obstacle, PlannedStage, StageError, StageGoal, plan
 from armwright.motion.trajectory import Trajectory, hold, slowed_together, whole_ticks
 from armwright.program.bytecode.instructions import Instruction, MotionKind, Op, StagePlan, stages_of, stages_text
 from armwright.program.language.diagnostic import Label
@@ -176,7 +176,7 @@ def _one_at_a_time(machine: Machine, process: Process, arm: str, span: Span) -> 
 
 def _plan(
     machine: Machine, process: Process, request: MoveRequest, arm: str, moved: str
-) -> list[tuple[Stage, tuple[str, ...]]]:
+) -> list[tuple[PlannedStage, tuple[str, ...]]]:
     """Return the stages of a MOVE with the names of where they lead.
 
     Source:
@@ -214,8 +214,8 @@ def _pose(machine: Machine, process: Process, goal: Goal) -> Array:
 
 
 def _timed(
-    machine: Machine, process: Process, request: MoveRequest, stages: Sequence[Stage], asked_for: float
-) -> list[Stage]:
+    machine: Machine, process: Process, request: MoveRequest, stages: Sequence[PlannedStage], asked_for: float
+) -> list[PlannedStage]:
     """Return the stages slowed so that the whole MOVE takes as long as was asked for."""
     least = sum(stage.trajectory.duration for stage in stages)
     if asked_for < least - machine.cell.period:
@@ -231,7 +231,7 @@ def _timed(
     return [_retimed(stage, trajectory, longer=longer) for stage, trajectory in zip(stages, slow, strict=True)]
 
 
-def _retimed(stage: Stage, slow: Trajectory, *, longer: bool) -> Stage:
+def _retimed(stage: PlannedStage, slow: Trajectory, *, longer: bool) -> PlannedStage:
     """Return a stage run as long as was asked for; no limit slows it where that is longer."""
     certificate = stage.certificate
     if certificate is not None and slow.duration:

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.hardware import Press
-from armwright.motion.plan import Stage
+from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.program.language.source import Span
 from armwright.program.vm.recording import TimedKind
@@ -160,7 +160,7 @@ class Motion:
     goal: str
     implied: bool
     text: str
-    stages: list[tuple[Stage, tuple[str, ...]]]
+    stages: list[tuple[PlannedStage, tuple[str, ...]]]
     speed: float
     depth: int
     begun: Start

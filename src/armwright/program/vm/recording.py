@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell, CellArm
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.motion.plan import Stage
+from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
 from armwright.program.language.diagnostic import Diagnostic
@@ -83,7 +83,7 @@ class RunStage:
     span: Span
     to: tuple[str, ...]
     speed: float
-    stage: Stage
+    stage: PlannedStage
     motion: Trajectory
     length: float
     peak_effort: Array

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from armwright.arrays import Array
 from armwright.motion.blends import blended
-from armwright.motion.hand_path import HandPath, Orientation, hand_path, zyz_angles
+from armwright.motion.tool_path import Orientation, ToolPath, tool_path, zyz_angles
 from armwright.spatial.euler import matlab_zyz
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_vector
@@ -21,14 +21,14 @@ ends = st.sampled_from(["rest", "running"])
 orientations: st.SearchStrategy[Orientation] = st.sampled_from(["geodesic", "zyz"])
 
 
-def random_path(seed: int, ends: str, orientation: Orientation) -> tuple[HandPath, Array]:
+def random_path(seed: int, ends: str, orientation: Orientation) -> tuple[ToolPath, Array]:
     """Return a path through four random poses, and the poses."""
     rng = np.random.default_rng(seed)
     poses = homogeneous(Rotation.random(4, random_state=rng).as_matrix(), rng.normal(size=(4, 3)))
-    return hand_path(poses, TIMES, BLENDS, ends=ends, orientation=orientation), poses  # type: ignore[arg-type]
+    return tool_path(poses, TIMES, BLENDS, ends=ends, orientation=orientation), poses  # type: ignore[arg-type]
 
 
-def body_rates(path: HandPath, t: Array) -> Array:
+def body_rates(path: ToolPath, t: Array) -> Array:
     """Return the angular velocity in the axes of the hand at times, by central differences."""
     h = 1e-5
     before, after = path(t - h)[..., :3, :3], path(t + h)[..., :3, :3]
@@ -109,7 +109,7 @@ def test_places_are_blended() -> None:
     t = np.linspace(-1, 4, 77)
 
     np.testing.assert_array_equal(path(t)[:, :3, 3], blended(TIMES, poses[:, :3, 3], BLENDS)(t))
-    assert path.acceleration().max() <= np.linalg.norm(path.place.peaks(2)) + 1e-12
+    assert path.acceleration().max() <= np.linalg.norm(path.position.peaks(2)) + 1e-12
 
 
 @settings(max_examples=10)
@@ -120,7 +120,7 @@ def test_bounds_hold_between_knots(seed: int, ends: str, orientation: Orientatio
     t = np.linspace(1e-3, 3 - 1e-3, 3001)
     rates = np.linalg.norm(body_rates(path, t), axis=-1)
     changes = np.linalg.norm(np.diff(body_rates(path, t), axis=0), axis=-1) / (t[1] - t[0])
-    accelerations = np.linalg.norm(path.place(t, 2), axis=-1)
+    accelerations = np.linalg.norm(path.position(t, 2), axis=-1)
     fastest, change = path.spin()
 
     for k, (start, end) in enumerate(pairwise(path.knots)):

@@ -63,14 +63,14 @@ def joined(motions: Sequence[CertifiedMotion]) -> CertifiedMotion:
     """Return motions run one after the other, with what all of them keep; of the slowing the largest."""
     certificates = [motion.certificate for motion in motions]
     starts = np.cumsum([0.0, *(motion.trajectory.duration for motion in motions)])
-    worst = int(np.argmax([each.deviation_seen for each in certificates]))
+    worst = int(np.argmax([each.deviation_sampled for each in certificates]))
     slowest = max(certificates, key=lambda each: each.factor)
     peaks = {name: np.max([each.peaks[name] for each in certificates], axis=0) for name in LIMITS}
     certificate = attrs.evolve(
         certificates[worst],
         deviation=max(each.deviation for each in certificates),
-        turn=max(each.turn for each in certificates),
-        turn_seen=max(each.turn_seen or 0.0 for each in certificates),
+        rotation=max(each.rotation for each in certificates),
+        rotation_sampled=max(each.rotation_sampled or 0.0 for each in certificates),
         worst_time=float(starts[worst]) + certificates[worst].worst_time,
         knots=sum(each.knots for each in certificates),
         samples=sum(each.samples for each in certificates),
@@ -105,14 +105,14 @@ def certificate_of(
     time = float(error.times[error.sampled_position.argmax()]) if time is None else time
     return Certificate(
         arm=solver.arm,
-        deviation_asked=allowed.position,
+        deviation_tolerance=allowed.position,
         deviation=float(error.position.max()),
-        deviation_seen=float(error.sampled_position.max()),
-        turn_asked=allowed.orientation,
-        turn=float(error.orientation.max()),
-        turn_seen=float(error.sampled_orientation.max()),
+        deviation_sampled=float(error.sampled_position.max()),
+        rotation_tolerance=allowed.orientation,
+        rotation=float(error.orientation.max()),
+        rotation_sampled=float(error.sampled_orientation.max()),
         worst_time=time,
-        worst_place=np.asarray(solver.forward(trajectory(time))[:3, 3]),
+        worst_position=np.asarray(solver.forward(trajectory(time))[:3, 3]),
         knots=len(error.position) + 1,
         samples=error.samples * len(error.position),
         peaks=limit_peaks(arm, trajectory) if peaks is None else peaks,

@@ -32,44 +32,44 @@ Orientation: TypeAlias = Literal["geodesic", "zyz"]
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class HandPath:
+class ToolPath:
     """Poses of the tool as a function of time.
 
     Attributes:
-        place: (x, y, z) [m].
+        position: (x, y, z) [m].
         times: (k,) when the poses are passed that it was planned through [s].
-        turns: the orientation by rotations about one fixed axis from pose to pose; None where it is by ``angles``.
-        angles: the orientation by ZYZ angles [rad]; None where it is by ``turns``.
+        rotations: the orientation by rotations about one fixed axis from pose to pose; None where it is by ``angles``.
+        angles: the orientation by ZYZ angles [rad]; None where it is by ``rotations``.
     """
 
-    place: Trajectory
-    turns: Turns | None
+    position: Trajectory
+    rotations: Rotations | None
     angles: Trajectory | None
     times: Array
 
     @property
     def knots(self) -> Array:
         """When blends begin and end [s], start and end among them."""
-        return self.place.times
+        return self.position.times
 
     def __call__(self, t: ArrayLike) -> Array:
         """Return poses (..., 4, 4) at times (...)."""
         t = floats(t, "t")
         if self.angles is not None:
-            return homogeneous(from_zyz(self.angles(t)), self.place(t))
-        assert self.turns is not None  # noqa: S101 - one of the two is there
-        return homogeneous(self.turns(t), self.place(t))
+            return homogeneous(from_zyz(self.angles(t)), self.position(t))
+        assert self.rotations is not None  # noqa: S101 - one of the two is there
+        return homogeneous(self.rotations(t), self.position(t))
 
     def first_knots(self, step: float, fewest: int) -> Array:
         """Return the first times: so far apart [s], and so many at least in each blend and on each straight segment."""
         parts = np.clip(np.ceil(np.diff(self.knots) / step), fewest, _ENOUGH).astype(np.intp)
         return divided(self.knots, parts)
 
-    def slowed(self, factor: float) -> HandPath:
+    def slowed(self, factor: float) -> ToolPath:
         """Return the same path run ``factor`` times slower."""
-        return HandPath(
-            place=self.place.slowed(factor),
-            turns=None if self.turns is None else self.turns.slowed(factor),
+        return ToolPath(
+            position=self.position.slowed(factor),
+            rotations=None if self.rotations is None else self.rotations.slowed(factor),
             angles=None if self.angles is None else self.angles.slowed(factor),
             times=self.times * factor,
         )
@@ -97,12 +97,12 @@ class HandPath:
 
     def acceleration(self) -> Array:
         """Return upper bounds (m,) of the acceleration of the position on each interval between ``knots`` [m/s²]."""
-        return np.asarray(np.linalg.norm(self.place.segment_peaks(2), axis=-1))
+        return np.asarray(np.linalg.norm(self.position.segment_peaks(2), axis=-1))
 
     def spin(self) -> tuple[Array, Array]:
         """Return upper bounds (m,) of angular speed [rad/s] and acceleration [rad/s²] on each interval."""
-        if self.turns is not None:
-            return self.turns.spin((self.knots[1:] + self.knots[:-1]) / 2)
+        if self.rotations is not None:
+            return self.rotations.spin((self.knots[1:] + self.knots[:-1]) / 2)
         assert self.angles is not None  # noqa: S101 - one of the two is there
         phi, theta, psi = self.angles.segment_peaks(1).T
         # Each angle rotates about an axis of length 1 that the angles before it carry round.
@@ -111,7 +111,7 @@ class HandPath:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Turns:
+class Rotations:
     """Orientations through k poses: about one fixed axis from pose to pose, with a blend around each pose.
 
     Around each pose the rotation vector of the rotation from it is blended, so that rate and its change are continuous.
@@ -141,16 +141,16 @@ class Turns:
         h = np.clip(since + width, 0.0, 2 * width)
         safe = np.where(width > 0, width, 1.0)
         blend = before * (h - width) + (after - before) * h**3 * (1 / (4 * safe**2) - h / (16 * safe**3))
-        turn = np.where(since <= -width, before * since, np.where(since >= width, after * since, blend))
-        return np.asarray(self.R[i] @ rotation_from_vector(turn))
+        vector = np.where(since <= -width, before * since, np.where(since >= width, after * since, blend))
+        return np.asarray(self.R[i] @ rotation_from_vector(vector))
 
-    def slowed(self, factor: float) -> Turns:
+    def slowed(self, factor: float) -> Rotations:
         """Return the same rotations run ``factor`` times slower."""
         p = self.plan
         slow = BlendPlan(
             p.centres * factor, p.blend * factor, p.points, p.before / factor, p.after / factor, p.end * factor
         )
-        return Turns(R=self.R, plan=slow)
+        return Rotations(R=self.R, plan=slow)
 
     def spin(self, t: Array) -> tuple[Array, Array]:
         """Return upper bounds (m,) of angular speed [rad/s] and acceleration [rad/s²] around times (m,).
@@ -168,7 +168,7 @@ class Turns:
         return rate, np.where(blending, peak, 0.0)
 
 
-def hand_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, orientation: Orientation) -> HandPath:
+def tool_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, orientation: Orientation) -> ToolPath:
     """Plan positions and orientations through poses.
 
     Args:
@@ -187,14 +187,16 @@ def hand_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, o
     position = blended(times, poses[:, :3, 3], blend, ends=ends)
     R, t = poses[:, :3, :3], floats(times, "times")
     if orientation == "zyz":
-        return HandPath(place=position, turns=None, angles=blended(times, zyz_angles(R), blend, ends=ends), times=t)
+        return ToolPath(
+            position=position, rotations=None, angles=blended(times, zyz_angles(R), blend, ends=ends), times=t
+        )
     plan = blend_plan(times, poses[:, :3, 3], blend, ends)
     # A rotation is the same vector in the axes of the pose before it and of that after it.
     ways = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / np.diff(plan.centres)[:, None]
     still = np.zeros((1, 3))
     first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])
     plan = plan._replace(before=np.concatenate([first, ways]), after=np.concatenate([ways, last]))
-    return HandPath(place=position, turns=Turns(R=R, plan=plan), angles=None, times=t)
+    return ToolPath(position=position, rotations=Rotations(R=R, plan=plan), angles=None, times=t)
 
 
 def zyz_angles(R: Array) -> Array:

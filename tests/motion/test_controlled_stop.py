@@ -7,8 +7,8 @@ from scipy.interpolate import CubicSpline
 
 from armwright.arm.load import load_arm
 from armwright.errors import InvalidValueError
-from armwright.motion.braking import brake
 from armwright.motion.continuity_report import continuity
+from armwright.motion.controlled_stop import brake
 from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.trajectory import Trajectory
 from samples import Sample

@@ -9,7 +9,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.continuity_report import continuity
 from armwright.motion.obstruction import PathError
 from armwright.motion.path import Path
-from armwright.motion.rounded import Rounded, rounded_move
+from armwright.motion.rounded_corners import RoundedMotion, rounded_move
 from armwright.spatial.poses import homogeneous
 
 ARM = load_arm("stanford")
@@ -23,7 +23,7 @@ def start() -> np.ndarray:
     return inverse(ARM, homogeneous(DOWN, (0.45, 0.0, 0.25))).best.q
 
 
-def corner(blend: float, *places: tuple[float, float, float]) -> Rounded:
+def corner(blend: float, *places: tuple[float, float, float]) -> RoundedMotion:
     q = start()
     path = Path(poses=np.stack([forward(ARM, q), *(homogeneous(DOWN, place) for place in places)]))
     return rounded_move(ARM, path, q, blend=blend, deviation=DEVIATION, speed=100.0)

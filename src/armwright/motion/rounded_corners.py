@@ -23,11 +23,10 @@ from armwright.arrays import Array
 from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.motion.blends import MISS
 from armwright.motion.certificate import Certificate
-from armwright.motion.certified import CertifiedMotion, certificate_of, joined, standstill
+from armwright.motion.certified_motion import CertifiedMotion, certificate_of, joined, standstill
 from armwright.motion.chain import chain
 from armwright.motion.efforts import slowing_for_efforts
 from armwright.motion.ends import check_ends
-from armwright.motion.hand_path import hand_path
 from armwright.motion.leg_distance import farthest_from_legs
 from armwright.motion.obstruction import MAX_SLOWDOWN, Obstruction, PathError
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed
@@ -35,6 +34,7 @@ from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import COARSE, coarse_line
 from armwright.motion.timing_law import Timed, timed
 from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
+from armwright.motion.tool_path import tool_path
 from armwright.motion.tracking import Task, Tracking, path_error, track
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.trapezoidal_profile import shortest_trapezoid
@@ -62,7 +62,7 @@ _NO_BLEND = 1.0
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Rounded:
+class RoundedMotion:
     """A run along straight legs with rounded corners.
 
     Attributes:
@@ -149,7 +149,7 @@ def rounded_move(
     speed: float,
     corner: float | None = None,
     blend: float | None = None,
-) -> Rounded:
+) -> RoundedMotion:
     """Plan a run straight from pose to pose that rounds its corners and rests only at both ends.
 
     The path and the joints on it depend on the poses, on ``corner`` or ``blend`` and on ``deviation``, the timing
@@ -182,7 +182,7 @@ def rounded_move(
     together = NEGLIGIBLE if corner is None else max(min(_TOGETHER * corner, _MIDDLE / 2), NEGLIGIBLE)
     corners = _apart(path.poses, together)
     if Path(poses=path.poses[corners]).lengths().max() <= NEGLIGIBLE:
-        return Rounded(motion=standstill(solver, q_start, tolerance(deviation if corner is None else corner)))
+        return RoundedMotion(motion=standstill(solver, q_start, tolerance(deviation if corner is None else corner)))
     check_ends(solver, path, q_start)
     deviation = min(deviation, COARSE[-1])
     legs = _legs(solver.arm, path, corners, speed)
@@ -203,13 +203,13 @@ def rounded_move(
     return _without_stop(task) if corner is None else _never_slower(task)
 
 
-def _without_stop(task: _Task) -> Rounded:
+def _without_stop(task: _Task) -> RoundedMotion:
     """Return the run past the corners."""
     motion, _ = _tightened(task, MAX_SLOWDOWN)
-    return Rounded(motion=_inside_efforts(task, motion))
+    return RoundedMotion(motion=_inside_efforts(task, motion))
 
 
-def _never_slower(task: _Task) -> Rounded:
+def _never_slower(task: _Task) -> RoundedMotion:
     """Return the run past the corners, or that with stops where it is faster or the only one.
 
     Beside a singularity a joint may be too fast: the timing slows the tool there, no further than stops would.
@@ -220,7 +220,7 @@ def _never_slower(task: _Task) -> Rounded:
     except PathError as error:
         if stops.run is None:
             raise
-        return Rounded(
+        return RoundedMotion(
             motion=stops.run, stops=_WITH_STOPS.format("the arm cannot follow rounded corners"), stopped_by=error
         )
     if ratio > MAX_SLOWDOWN and stops.run is None:
@@ -230,8 +230,8 @@ def _never_slower(task: _Task) -> Rounded:
         motion = _inside_efforts(task, motion)
     duration = motion.trajectory.duration
     if duration > stops.least and stops.run is not None and stops.run.trajectory.duration < duration:
-        return Rounded(motion=stops.run, stops=_WITH_STOPS.format("rounded corners would take longer"))
-    return Rounded(motion=motion)
+        return RoundedMotion(motion=stops.run, stops=_WITH_STOPS.format("rounded corners would take longer"))
+    return RoundedMotion(motion=motion)
 
 
 def _apart(poses: Array, together: float) -> list[int]:
@@ -314,9 +314,9 @@ def _certificate(task: _Task, widths: Array, tracking: Tracking, run: Timed) -> 
         certificate_of(task.arm, run.trajectory, tracking.error, task.allowed, time=time),
         # Poses that are passed with others are as near to them.
         deviation=min(task.off + deviation, legs.bound + task.off - task.closer),
-        deviation_seen=legs.sampled,
-        turn=ROTATION_PER_METRE * task.off + twist,
-        turn_seen=None,
+        deviation_sampled=legs.sampled,
+        rotation=ROTATION_PER_METRE * task.off + twist,
+        rotation_sampled=None,
         factor=max(run.factor, 1.0),
         because=run.because,
     )
@@ -327,7 +327,7 @@ def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, Timed]:
     legs, solver = task.legs, solver_of(task.arm)
     top, times = float(legs.speeds.max()), legs.times
     blends = np.concatenate([[_NO_BLEND], widths / top, [_NO_BLEND]])
-    hand = hand_path(legs.poses, times, blends, ends="running", orientation="geodesic")
+    hand = tool_path(legs.poses, times, blends, ends="running", orientation="geodesic")
     close, wide = tolerance(task.closer), tolerance(_CLOSER * task.closer)
     tracked = track(
         Task(solver, hand, task.q_start, close, wide, rest=False, max_slowdown=most), hand.first_knots(_STEP, _FEWEST)
@@ -398,11 +398,11 @@ class _Stops:
         run = joined(lines)
         certificate = attrs.evolve(
             run.certificate,
-            deviation_asked=task.allowed.position,
+            deviation_tolerance=task.allowed.position,
             # Poses that are passed with others are as near to them.
             deviation=run.certificate.deviation + task.off - task.closer,
-            turn_asked=task.allowed.orientation,
-            turn=run.certificate.turn + ROTATION_PER_METRE * (task.off - task.closer),
+            rotation_tolerance=task.allowed.orientation,
+            rotation=run.certificate.rotation + ROTATION_PER_METRE * (task.off - task.closer),
             backward=None,
         )
         return attrs.evolve(run, certificate=certificate)
