@@ -1,7 +1,7 @@
 """Compile a program, and run it in a cell: each in one call."""
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -122,7 +122,7 @@ def compile(  # noqa: A001 - what a translator does
         compiled = _compile(source, known, strict=strict, std=std, read_import=read_import, generate_code=generate_code)
     if place is None:
         place = next((one.cell for one in compiled.imports if one.cell and one.cell.arms), None)
-    return attrs.evolve(compiled, cell=_with_imports(place, compiled) if isinstance(place, Cell) else None)
+    return attrs.evolve(compiled, cell=with_imports(place, compiled.imports) if isinstance(place, Cell) else None)
 
 
 def run(
@@ -163,9 +163,8 @@ def run(
         raise ProgramError(compiled)
     if compiled.cell is None:
         raise InvalidValueError(f"{compiled.source.name} needs a cell to run in, and IMPORTs none")
-    return interpret(
-        compiled.code, compiled.cell, hardware or Simulator(compiled.cell), progress=progress, limits=limits
-    )
+    hardware = hardware or Simulator(compiled.cell)
+    return interpret(compiled.code, compiled.cell, hardware, progress=progress, limits=limits)
 
 
 def import_reader(folder: Path) -> ReadImport:
@@ -178,12 +177,14 @@ def import_reader(folder: Path) -> ReadImport:
     return read
 
 
-def _with_imports(cell: Cell, compiled: Compilation) -> Cell:
-    """Return a cell with the frames that a program imports; a frame of the cell itself stays as it is."""
-    frames = dict(cell.frames)
-    for imported in compiled.imports:
-        if imported.cell is not None:
-            frames = {**imported.cell.frames, **frames}
+def with_imports(cell: Cell | None, imports: Iterable[Imported]) -> Cell | None:
+    """Return a cell with the frames of imported cells; a frame of the cell itself stays as it is."""
+    cells = [imported.cell for imported in imports if imported.cell is not None and imported.cell is not cell]
+    if cell is None or not cells:
+        return cell
+    frames = cell.frames
+    for imported in cells:
+        frames = {**imported.frames, **frames}
     return attrs.evolve(cell, frames=frames)
 
 

@@ -33,7 +33,7 @@ STANFORD = CORPUS / "cell1.json"
 
 def analysis_of(text: str, *, cell: Path | None = None, std: Standard = Standard.RLO_2) -> Analysis:
     """Return what is known of a program."""
-    return analyse("test.rlo", text, None, Cells(), Settings(cell=cell, std=std)).analysis
+    return analyse("test.rlo", text, None, Cells(), Settings(cell=cell, std=std))
 
 
 def labels(text: str, **how: Standard) -> list[str]:

@@ -1,7 +1,8 @@
 """All that is known of one version of a program, worked out once; and what stands around a place of a text."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -26,13 +27,15 @@ class Analysis:
         compiled: the translation.
         cell: what it acts on, with what it imports; None where that is not known.
         frames: the frames of the cell at the start; None without a cell.
-        files: where frames and arms are told of, by name: the URI of the file, and the line from 1.
+        files: where frames and arms are declared, by name: the URI of the file, and the line from 1.
+        problem: why the cell of the settings cannot be read; empty if it can.
     """
 
     compiled: Compilation
     cell: Cell | None = None
     frames: FrameTree | None = None
     files: Mapping[str, tuple[str, int]] = attrs.field(factory=dict)
+    problem: str = ""
 
     @property
     def text(self) -> str:
@@ -50,12 +53,12 @@ class Analysis:
         return occurrences(self.compiled.tokens, self.extents)
 
     @cached_property
-    def by_key(self) -> Mapping[str, tuple[Occurrence, ...]]:
+    def by_key(self) -> Mapping[str, Sequence[Occurrence]]:
         """All occurrences of each name."""
-        operands: dict[str, list[Occurrence]] = {}
+        by_key: defaultdict[str, list[Occurrence]] = defaultdict(list)
         for occurrence in self.occurrences:
-            operands.setdefault(occurrence.key, []).append(occurrence)
-        return {key: tuple(several) for key, several in operands.items()}
+            by_key[occurrence.key].append(occurrence)
+        return by_key
 
     @cached_property
     def _occurrence_starts(self) -> list[int]:
@@ -90,7 +93,7 @@ class Analysis:
 
     def same(self, occurrence: Occurrence) -> tuple[Occurrence, ...]:
         """Return all occurrences of the same thing."""
-        return tuple(diagnostic for diagnostic in self.by_key.get(occurrence.key, ()) if diagnostic.is_same(occurrence))
+        return tuple(other for other in self.by_key.get(occurrence.key, ()) if other.is_same(occurrence))
 
     def declaration(self, occurrence: Occurrence) -> tree.Name | None:
         """Return where the name was declared, if it was."""
@@ -150,22 +153,23 @@ def _word_start(text: str, start: int, end: int) -> int:
 
 
 def _hinted(program: tree.Program) -> list[tree.Move | tree.Call | tree.Grasp]:
-    operands: list[tree.Move | tree.Call | tree.Grasp] = []
+    statements: list[tree.Move | tree.Call | tree.Grasp] = []
     waiting: list[object] = [*reversed(program.statements)]
     waiting += [procedure.body for procedure in reversed(program.procedures)]
     while waiting:
         node = waiting.pop()
         match node:
             case tree.Move(clauses=clauses):
-                operands.append(node)
+                statements.append(node)
                 waiting += [clause.action for clause in clauses if isinstance(clause, tree.On)]
             case tree.Call() | tree.Grasp():
-                operands.append(node)
+                statements.append(node)
             case _:
-                waiting += reversed(_inner(node))
-    return sorted(operands, key=lambda diagnostic: diagnostic.span.start)
+                waiting += reversed(_INNER[type(node)](node) if type(node) in _INNER else ())
+    return sorted(statements, key=lambda statement: statement.span.start)
 
 
+# The statements directly inside of a statement.
 _INNER: Mapping[type, Callable[[Any], tuple[tree.Statement, ...]]] = {
     tree.Block: lambda node: node.statements,
     tree.If: lambda node: node.statements,
@@ -176,9 +180,3 @@ _INNER: Mapping[type, Callable[[Any], tuple[tree.Statement, ...]]] = {
     tree.Cobegin: lambda node: tuple(branch.body for branch in node.branches),
     tree.Try: lambda node: (*node.body, *node.recovery),
 }
-
-
-def _inner(node: object) -> tuple[tree.Statement, ...]:
-    """Return the statements directly inside of a statement."""
-    inner = _INNER.get(type(node))
-    return () if inner is None else inner(node)

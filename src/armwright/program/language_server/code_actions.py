@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from itertools import chain
 
 import attrs
 
@@ -36,11 +37,11 @@ class QuickFix:
 def quickfixes(analysis: Analysis, span: Span) -> tuple[QuickFix, ...]:
     """Return the cures of what is wrong in a stretch of text: those that are certain, and names that were meant."""
     source = analysis.compiled.source
-    diagnostics = [_meant(diagnostic, source) for diagnostic in analysis.compiled.diagnostics]
+    pairs = [(_meant(diagnostic, source), diagnostic) for diagnostic in analysis.compiled.diagnostics]
     return tuple(
-        QuickFix(_title(first, source), _edits(first), diagnostic)
-        for first, diagnostic in zip(diagnostics, analysis.compiled.diagnostics, strict=True)
-        if first.fixes and any(_touch(place, span) for place in (first.span, *(fix.span for fix in first.fixes)))
+        QuickFix(_title(cured, source), _edits(cured), diagnostic)
+        for cured, diagnostic in pairs
+        if cured.fixes and any(_touch(part, span) for part in (cured.span, *(fix.span for fix in cured.fixes)))
     )
 
 
@@ -49,7 +50,7 @@ def _meant(diagnostic: Diagnostic, source: Source) -> Diagnostic:
 
     It is no certain one, so that an editor offers it and `armwright fix` leaves it alone.
     """
-    word = next((match[1] for first in diagnostic.helps if (match := _DID_YOU_MEAN.match(first))), None)
+    word = next((match[1] for help_ in diagnostic.helps if (match := _DID_YOU_MEAN.match(help_))), None)
     if diagnostic.fixes or word is None:
         return diagnostic
     written = _LAST_WORD.search(source.slice(diagnostic.span))
@@ -61,20 +62,17 @@ def _meant(diagnostic: Diagnostic, source: Source) -> Diagnostic:
 
 def all_fixes(diagnostics: Iterable[Diagnostic]) -> tuple[Edit, ...]:
     """Return all certain cures that can be made at once, in the order of the text; of two that touch the first."""
-    made = [
-        edit
-        for first in apart([diagnostic for diagnostic in diagnostics if diagnostic.fixes])
-        for edit in _edits(first)
-    ]
-    return tuple(sorted(made, key=lambda edit: edit.span.start))
+    curable = apart([diagnostic for diagnostic in diagnostics if diagnostic.fixes])
+    edits = chain.from_iterable(map(_edits, curable))
+    return tuple(sorted(edits, key=lambda edit: edit.span.start))
 
 
 def _edits(diagnostic: Diagnostic) -> tuple[Edit, ...]:
     return tuple(Edit(fix.span, fix.replacement) for fix in diagnostic.fixes)
 
 
-def _touch(diagnostic: Span, other: Span) -> bool:
-    return diagnostic.start <= other.end and other.start <= diagnostic.end
+def _touch(span: Span, other: Span) -> bool:
+    return span.start <= other.end and other.start <= span.end
 
 
 def _title(diagnostic: Diagnostic, source: Source) -> str:

@@ -1,10 +1,10 @@
 """What can be written at a place of a program: words of the language, names of the right kind, whole statements."""
 
-import enum
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 
 import attrs
+from lsprotocol.types import CompletionItemKind as Kind
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
@@ -23,29 +23,14 @@ from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.parser import expected
 
 
-class Sort(enum.Enum):
-    """What is offered."""
-
-    WORD = "word"
-    SNIPPET = "snippet"
-    TYPE = "type"
-    VARIABLE = "variable"
-    FRAME = "frame"
-    EVENT = "event"
-    ARM = "arm"
-    DEVICE = "device"
-    PROCEDURE = "procedure"
-    FUNCTION = "function"
-
-
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class Completion:
     """One thing that can be written.
 
     Attributes:
         label: how it is shown.
         text: what is written; in a snippet ``${1:name}`` are the places to fill in, in order.
-        sort: what it is.
+        kind: what it is.
         span: what it takes the place of.
         detail: what it is, in a word or two.
         documentation: what it does.
@@ -54,7 +39,7 @@ class Completion:
 
     label: str
     text: str
-    sort: Sort
+    kind: Kind
     span: Span
     detail: str = ""
     documentation: str = ""
@@ -86,16 +71,11 @@ _GOES_ON = {
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
 }
-_SORTS = {
-    VariableKind.SCALAR: Sort.VARIABLE,
-    VariableKind.TRANS: Sort.VARIABLE,
-    VariableKind.FRAME: Sort.FRAME,
-    VariableKind.EVENT: Sort.EVENT,
-}
+_KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
 
 
-# Ways that exclude each other, for one clause each.
+# Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
     "DIRECTLY": frozenset(("STRAIGHTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
     "STRAIGHTLY": frozenset(("DIRECTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
@@ -130,23 +110,18 @@ _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCAL
 _NOTHING = _Operand()
 _ANYTHING = _Operand(kinds=frozenset(VariableKind) - {VariableKind.EVENT}, arms=True, functions=tuple(FUNCTIONS))
 _NUMBER = _Operand(kinds=_SCALAR, functions=_MEASURES)
-_PLACE = _Operand(kinds=_FRAME, arms=True)
+_POSE = _Operand(kinds=_FRAME, arms=True)
 _TRANS = _Operand(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
 _STEP = _Operand(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
 _EVENT = _Operand(kinds=frozenset((VariableKind.EVENT,)))
-_OF_KIND = {
-    VariableKind.SCALAR: _NUMBER,
-    VariableKind.TRANS: _STEP,
-    VariableKind.FRAME: _PLACE,
-    VariableKind.EVENT: _EVENT,
-}
+_FITS = {VariableKind.SCALAR: _NUMBER, VariableKind.TRANS: _STEP, VariableKind.FRAME: _POSE, VariableKind.EVENT: _EVENT}
 # By what the parser calls it in its messages.
 _OPERANDS: Mapping[str, _Operand] = {
     "a value or a text": _ANYTHING,
     "a condition": attrs.evolve(_NUMBER, words=("NOT",)),
     **dict.fromkeys(("a number", "a number of seconds", "a width"), _NUMBER),
     **dict.fromkeys(("an index", "the name of a SCALAR"), _Operand(kinds=_SCALAR)),
-    **dict.fromkeys(("a place", "the name of a FRAME or an arm"), _PLACE),
+    **dict.fromkeys(("a place", "the name of a FRAME or an arm"), _POSE),
     "a TRANS": _TRANS,
     "the name of a FRAME": _Operand(kinds=_FRAME),
     "the name of an EVENT": _EVENT,
@@ -159,7 +134,7 @@ _OPERANDS: Mapping[str, _Operand] = {
 # What functions take.
 _TAKEN: Mapping[str, _Operand] = {
     "FORCE": _Operand(words=AXES),
-    "DIST": _PLACE,
+    "DIST": _POSE,
     "INV": _STEP,
     **dict.fromkeys(("XYZ", "ROTX", "ROTY", "ROTZ"), _NUMBER),
 }
@@ -185,18 +160,12 @@ def completions(text: str, analysis: Analysis, offset: int) -> list[Completion]:
     operand = _NOTHING if expectation.operand is None else _operand(expectation, around.tokens, maker.scope)
     words = (*operand.words, *_words(expectation, around, compiled.standard))
     if not expectation.starts:
-        operand_ = [
-            *maker.arms(operand),
-            *maker.names(operand.kinds),
-            *maker.devices(operand),
-            *maker.functions(operand),
-        ]
-        return [*operand_, *maker.words(words)]
-    operand_ = [*maker.words(words, starts=True)]
+        operands = [*maker.arms(operand), *maker.names(operand.kinds), *maker.devices(operand)]
+        return [*operands, *maker.functions(operand), *maker.words(words)]
+    statements = [*maker.words(words, starts=True)]
     if "MOVE" not in words and "HALT" not in words:
-        return operand_
-    kinds = frozenset(VariableKind) - {VariableKind.EVENT}
-    return [*operand_, *maker.procedures(), *maker.names(kinds, starts=True)]
+        return statements
+    return [*statements, *maker.procedures(), *maker.names(_ANYTHING.kinds, starts=True)]
 
 
 def _operand(operand: Expected, tokens: Sequence[Token], scope: Scope) -> _Operand:
@@ -212,7 +181,7 @@ def _operand(operand: Expected, tokens: Sequence[Token], scope: Scope) -> _Opera
     elif operand_ is None:
         kind = scope.type(operand.target)
         # Behind a comma stands a number of a matrix.
-        operand_ = _NUMBER if tokens[-1].key == "," else _ANYTHING if kind is None else _OF_KIND[kind.kind]
+        operand_ = _NUMBER if tokens[-1].key == "," else _ANYTHING if kind is None else _FITS[kind.kind]
     if tokens and tokens[-1].key == "*":
         # Behind `*` stands a step.
         if VariableKind.FRAME in operand_.kinds:
@@ -228,22 +197,22 @@ def _argument(name: Token, number: int, symbols: Symbols) -> _Operand:
     if number >= len(procedure.parameters):
         return _NOTHING
     kind = procedure.types.get(procedure.parameters[number])
-    return _ANYTHING if kind is None else _OF_KIND[kind.kind]
+    return _ANYTHING if kind is None else _FITS[kind.kind]
 
 
 def _words(operand: Expected, around: Before, std: Standard) -> Iterator[str]:
     """Give the words that may stand at a place; of clauses those that go with the others of their MOVE."""
     vocabulary = VOCABULARIES[std]
     clauses = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *VOCABULARIES[Standard.RLO_2].with_clauses))
-    written = operand.given | {token.key for token in takewhile(lambda name: not _ends(name), around.behind)}
+    written = operand.given | {token.key for token in takewhile(lambda token: not _ends(token), around.behind)}
     # What ends a stretch of statements is not offered behind each of them, unless it is being written.
     unasked = frozenset() if operand.starts or around.word.start < around.word.end else frozenset(CLOSING | {"RECOVER"})
+    without_via = "VIA" not in written
     for word in dict.fromkeys(operand.words):
         last = word.rpartition(" ")[2]
         # The action of ON is over in front of the place, or behind it.
-        excluded = last in clauses and (
-            last in written or _EXCLUDES[last] & written or (last == "BLEND" and "VIA" not in written)
-        )
+        excluded = last in written or _EXCLUDES.get(last, frozenset()) & written or (last == "BLEND" and without_via)
+        excluded = excluded and last in clauses
         if last in vocabulary.reserved - unasked and not excluded and (word != "RETRY" or operand.recovering):
             yield word
 
@@ -262,19 +231,11 @@ class _Maker:
         self.scope = scope
         self._analysis, self._span, self._lower = analysis, span, analysis.lower
 
-    def _one(self, label: str, sort: Sort, text: str = "", detail: str = "", documentation: str = "") -> Completion:
-        return Completion(
-            label=label,
-            text=text or label,
-            sort=sort,
-            span=self._span,
-            detail=detail,
-            documentation=documentation,
-            snippet="$" in text,
-        )
+    def _offer(self, label: str, kind: Kind, text: str = "", detail: str = "", documentation: str = "") -> Completion:
+        return Completion(label, text or label, kind, self._span, detail, documentation, "$" in text)
 
     def _cased(self, text: str) -> str:
-        """Return words of the language as this program writes them; what is to be filled in stays."""
+        """Return words of the language as this program writes them; names to be filled in are lower case anyway."""
         return text.lower() if self._lower else text
 
     def words(self, words: Iterable[str], *, starts: bool = False) -> Iterator[Completion]:
@@ -285,17 +246,10 @@ class _Maker:
             form, text = (meaning.form, meaning.text) if meaning else ("", "")
             written = _GOES_ON.get(last, "")
             written = (f"WITH {written}" if word != last else written) if written else ""
-            sort = Sort.TYPE if word in _TYPES else Sort.WORD
-            yield self._one(self._cased(word), sort, self._snippet(written) or self._cased(word), form, text)
-            if starts:
-                for label, snippet in _SNIPPETS.get(word, ()):
-                    yield self._one(self._cased(label), Sort.SNIPPET, self._snippet(snippet), form, text)
-
-    def _snippet(self, text: str) -> str:
-        if not self._lower:
-            return text
-        # A choice of types is a choice of words; names to be filled in are lower case anyway.
-        return text.lower()
+            kind = Kind.TypeParameter if word in _TYPES else Kind.Keyword
+            yield self._offer(self._cased(word), kind, self._cased(written or word), form, text)
+            for label, snippet in _SNIPPETS.get(word, ()) if starts else ():
+                yield self._offer(self._cased(label), Kind.Snippet, self._cased(snippet), form, text)
 
     def names(self, kinds: frozenset[VariableKind], *, starts: bool = False) -> Iterator[Completion]:
         """Give the variables that can be seen and are of the right kind."""
@@ -303,7 +257,7 @@ class _Maker:
         own = {} if local is None else local.types
         others = [(key, kind) for key, kind in symbols.types.items() if key not in own]
         # What the program declares comes before what there is without it.
-        others.sort(key=lambda token: token[0] not in symbols.declared)
+        others.sort(key=lambda item: item[0] not in symbols.declared)
         for key, kind in (*own.items(), *others):
             if kind is None or kind.kind not in kinds or (starts and key == WORLD):
                 continue
@@ -312,7 +266,9 @@ class _Maker:
             where = "predeclared" if declared is None and key in PREDECLARED else "imported" if declared is None else ""
             where = f"of {local.node.name.text}" if local is not None and key in own else where
             text = f"{name}[${{1:1}}]" if kind.sizes else name
-            yield self._one(name, _SORTS[kind.kind], text, f"{kind} {where}".rstrip(), self._place(key, kind))
+            yield self._offer(
+                name, _KINDS.get(kind.kind, Kind.Variable), text, f"{kind} {where}".rstrip(), self._place(key, kind)
+            )
 
     def _place(self, key: str, kind: VariableType) -> str:
         frames = self._analysis.frames
@@ -325,30 +281,27 @@ class _Maker:
         if not operand.arms:
             return
         cell = self._analysis.cell
-        if cell is not None:
-            for name in sorted(cell.arms):
-                yield self._one(name, Sort.ARM, "", cell.arms[name].arm.name)
-            return
-        used = {key for key in self._analysis.by_key if is_arm(key)}
-        for name in sorted(used | {"ARM_1"}):
-            yield self._one(name, Sort.ARM, "", "arm")
+        used = dict.fromkeys(("ARM_1", *filter(is_arm, self._analysis.by_key)), "arm")
+        arms = used if cell is None else {name: arm.arm.name for name, arm in cell.arms.items()}
+        for name in sorted(arms):
+            yield self._offer(name, Kind.Constant, "", arms[name])
 
     def devices(self, operand: _Operand) -> Iterator[Completion]:
         """Give the devices of the cell."""
         if operand.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):
-                yield self._one(self._cased(name), Sort.DEVICE, "", "device")
+                yield self._offer(self._cased(name), Kind.Property, "", "device")
 
     def functions(self, operand: _Operand) -> Iterator[Completion]:
         """Give functions of the language, which RLO-83 has none of."""
         for name in operand.functions if self._analysis.compiled.standard is Standard.RLO_2 else ():
             meaning = explained(name)
             form, text = (meaning.form, meaning.text) if meaning else ("", "")
-            yield self._one(self._cased(name), Sort.FUNCTION, f"{self._cased(name)}($1)", form, text)
+            yield self._offer(self._cased(name), Kind.Function, f"{self._cased(name)}($1)", form, text)
 
     def procedures(self) -> Iterator[Completion]:
         """Give the procedures of the program."""
         for procedure in self.scope.symbols.procedures.values():
             name = procedure.node.name.text
             text = f"{name}($1) ;" if procedure.parameters else f"{name}() ;"
-            yield self._one(name, Sort.PROCEDURE, text, signature(procedure.node)[0])
+            yield self._offer(name, Kind.Function, text, signature(procedure.node)[0])

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 from lsprotocol import types as lsp
 
@@ -18,6 +19,9 @@ SHORT_LINES = 2000
 PAUSE, PAUSE_LONG = 0.02, 0.5
 
 
+Analyse: TypeAlias = "Callable[[Document], Analysis]"
+
+
 class Document:
     """One open program.
 
@@ -30,12 +34,7 @@ class Document:
     """
 
     def __init__(
-        self,
-        uri: str,
-        path: Path | None,
-        codec: PositionCodec,
-        version: int | None,
-        analyse: "Callable[[Document], Analysis]",
+        self, uri: str, path: Path | None, codec: PositionCodec, version: int | None, analyse: "Analyse"
     ) -> None:
         """Take up a text; it is analysed when somebody asks, or soon."""
         self.uri, self.path, self.codec, self.version = uri, path, codec, version

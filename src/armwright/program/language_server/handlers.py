@@ -7,7 +7,7 @@ from lsprotocol import types as lsp
 from armwright.errors import ArmwrightError
 from armwright.program.formatter.partial import formatted_around
 from armwright.program.language.source import Source
-from armwright.program.language.text_edits import smallest_edit
+from armwright.program.language.text_edits import Edit, smallest_edit
 from armwright.program.language_server import lsp_types
 from armwright.program.language_server.code_actions import all_fixes, quickfixes
 from armwright.program.language_server.completions import completions
@@ -141,36 +141,33 @@ def _changes(server: RloServer) -> None:
     async def on_code_action(params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
         document = server.document(params.text_document.uri)
         analysis = await document.analysis()
-        codec, uri = document.codec, document.uri
+        codec = document.codec
         actions: list[lsp.CodeAction] = []
 
+        def changed(edits: Sequence[Edit]) -> lsp.WorkspaceEdit:
+            return lsp.WorkspaceEdit(changes={document.uri: lsp_types.text_edits(codec, edits)})
+
         def wanted(kind: str) -> bool:
-            asked = params.context.only
-            return asked is None or any(
-                kind == occurrence or kind.startswith(f"{occurrence}.") for occurrence in map(_word, asked)
-            )
+            only = params.context.only
+            return only is None or any(f"{kind}.".startswith(f"{_word(prefix)}.") for prefix in only)
 
         if wanted(_word(lsp.CodeActionKind.QuickFix)):
-            published = {
-                (diagnostic.code, _place(diagnostic.range)): diagnostic for diagnostic in params.context.diagnostics
-            }
-            for quickfix in quickfixes(analysis, lsp_types.span_of(codec, params.range)):
-                diagnostic = published.get(
-                    (quickfix.diagnostic.code, _place(lsp_types.span_range(codec, quickfix.diagnostic.span)))
-                )
+            published = {(shown.code, _start(shown.range)): shown for shown in params.context.diagnostics}
+            for fix in quickfixes(analysis, lsp_types.span_of(codec, params.range)):
+                start = _start(lsp_types.span_range(codec, fix.diagnostic.span))
+                diagnostic = published.get((fix.diagnostic.code, start))
                 actions.append(
                     lsp.CodeAction(
-                        title=quickfix.title,
+                        title=fix.title,
                         kind=lsp.CodeActionKind.QuickFix,
                         diagnostics=None if diagnostic is None else [diagnostic],
-                        is_preferred=bool(quickfix.diagnostic.fixes),
-                        edit=lsp.WorkspaceEdit(changes={uri: lsp_types.text_edits(codec, quickfix.edits)}),
+                        is_preferred=bool(fix.diagnostic.fixes),
+                        edit=changed(fix.edits),
                     )
                 )
         every = all_fixes(analysis.compiled.diagnostics)
         if every and wanted(_FIX_ALL_HERE):
-            edit = lsp.WorkspaceEdit(changes={uri: lsp_types.text_edits(codec, every)})
-            actions.append(lsp.CodeAction(title="fix all that is certain", kind=_FIX_ALL_HERE, edit=edit))
+            actions.append(lsp.CodeAction("fix all that is certain", kind=_FIX_ALL_HERE, edit=changed(every)))
         return actions
 
     @server.feature(lsp.TEXT_DOCUMENT_FORMATTING)
@@ -190,7 +187,7 @@ def _word(kind: lsp.CodeActionKind | str) -> str:
     return kind.value if isinstance(kind, lsp.CodeActionKind) else kind
 
 
-def _place(where: lsp.Range) -> tuple[int, int]:
+def _start(where: lsp.Range) -> tuple[int, int]:
     return where.start.line, where.start.character
 
 

@@ -15,10 +15,8 @@ from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.spatial.poses import to_noap
+from armwright.program.vm.value_text import shown
 
-# Smaller numbers in a pose are roundings.
-_NOTHING = 1e-12
 # Words that a statement can start with and that a word of the same statement is looked up by.
 _STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE"))
 
@@ -194,10 +192,7 @@ def _shown(frame: str) -> str:
 
 def pose_text(X: Array, units: UnitSystem) -> str:
     """Return a pose (4, 4) as a program writes it: n, o, a, p, lengths in the unit of the program."""
-    numbers = to_noap(X)
-    numbers[9:] /= units.metres
-    texts = [f"{0.0 if abs(number) < _NOTHING else number:.6g}" for number in numbers.tolist()]
-    return f"`({', '.join(','.join(texts[i : i + 3]) for i in range(0, 12, 3))})` {units.length.lower()}"
+    return f"`{shown(X, units)}` {units.length.lower()}"
 
 
 # ---- numbers -------------------------------------------------------------------------------------------------------

@@ -9,32 +9,11 @@ from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.text_edits import Edit
 from armwright.program.language_server.analysis import Analysis
-from armwright.program.language_server.completions import Completion, Sort
+from armwright.program.language_server.completions import Completion
 from armwright.program.language_server.hover import Hover
 from armwright.program.language_server.inlay_hints import Hint
-from armwright.program.language_server.outline import Entry, Fold, Part
+from armwright.program.language_server.outline import Entry, Fold
 from armwright.program.language_server.signature_help import Signature
-
-_ITEMS = {
-    Sort.WORD: lsp.CompletionItemKind.Keyword,
-    Sort.SNIPPET: lsp.CompletionItemKind.Snippet,
-    Sort.TYPE: lsp.CompletionItemKind.TypeParameter,
-    Sort.VARIABLE: lsp.CompletionItemKind.Variable,
-    Sort.FRAME: lsp.CompletionItemKind.Struct,
-    Sort.EVENT: lsp.CompletionItemKind.Event,
-    Sort.ARM: lsp.CompletionItemKind.Constant,
-    Sort.DEVICE: lsp.CompletionItemKind.Property,
-    Sort.PROCEDURE: lsp.CompletionItemKind.Function,
-    Sort.FUNCTION: lsp.CompletionItemKind.Function,
-}
-_SYMBOLS = {
-    Part.PROCEDURE: lsp.SymbolKind.Function,
-    Part.PARAMETER: lsp.SymbolKind.Variable,
-    Part.VARIABLE: lsp.SymbolKind.Variable,
-    Part.ARRAY: lsp.SymbolKind.Array,
-    Part.FRAME: lsp.SymbolKind.Struct,
-    Part.EVENT: lsp.SymbolKind.Event,
-}
 
 
 def span_range(codec: PositionCodec, span: Span) -> lsp.Range:
@@ -95,14 +74,11 @@ def _diagnostic(diagnostic: Diagnostic, codec: PositionCodec, uri: str, *, relat
 
 def message_of(diagnostic: Diagnostic) -> str:
     """Return all words of a diagnostic, a line each."""
-    first = (
-        f"{diagnostic.message}: {diagnostic.label}"
-        if diagnostic.label and diagnostic.label not in diagnostic.message
-        else diagnostic.message
-    )
-    return "\n".join(
-        (first, *(f"note: {note}" for note in diagnostic.notes), *(f"help: {help_}" for help_ in diagnostic.helps))
-    )
+    lines = [diagnostic.message]
+    if diagnostic.label and diagnostic.label not in diagnostic.message:
+        lines = [f"{diagnostic.message}: {diagnostic.label}"]
+    lines += [f"note: {note}" for note in diagnostic.notes]
+    return "\n".join([*lines, *(f"help: {help_}" for help_ in diagnostic.helps)])
 
 
 # ---- at a place ----------------------------------------------------------------------------------------------------
@@ -111,8 +87,7 @@ def message_of(diagnostic: Diagnostic) -> str:
 def hover(result: Hover, codec: PositionCodec, *, markdown: bool) -> lsp.Hover:
     """Return what there is to say about a stretch of text."""
     if markdown:
-        code = f"```rlo\n{result.code}\n```"
-        text = "\n\n".join((code, *result.lines))
+        text = "\n\n".join((f"```rlo\n{result.code}\n```", *result.lines))
         content = lsp.MarkupContent(lsp.MarkupKind.Markdown, text)
     else:
         text = "\n".join((result.code, *result.lines)).replace("`", "")
@@ -123,21 +98,20 @@ def hover(result: Hover, codec: PositionCodec, *, markdown: bool) -> lsp.Hover:
 def completion(result: Sequence[Completion], codec: PositionCodec, *, snippets: bool) -> lsp.CompletionList:
     """Return what can be written; whole statements only for an editor that leads from gap to gap."""
     items = []
-    for number, diagnostic in enumerate(result):
-        if diagnostic.sort is Sort.SNIPPET and not snippets:
+    for number, offer in enumerate(result):
+        if offer.kind is lsp.CompletionItemKind.Snippet and not snippets:
             continue
-        text = diagnostic.text if snippets or not diagnostic.snippet else diagnostic.label
+        is_snippet = offer.snippet and snippets
+        text = offer.label if offer.snippet and not snippets else offer.text
         items.append(
             lsp.CompletionItem(
-                label=diagnostic.label,
-                kind=_ITEMS[diagnostic.sort],
-                detail=diagnostic.detail or None,
-                documentation=diagnostic.documentation or None,
+                label=offer.label,
+                kind=offer.kind,
+                detail=offer.detail or None,
+                documentation=offer.documentation or None,
                 sort_text=f"{number:04d}",
-                insert_text_format=lsp.InsertTextFormat.Snippet
-                if diagnostic.snippet and snippets
-                else lsp.InsertTextFormat.PlainText,
-                text_edit=lsp.TextEdit(span_range(codec, diagnostic.span), text),
+                insert_text_format=lsp.InsertTextFormat.Snippet if is_snippet else lsp.InsertTextFormat.PlainText,
+                text_edit=lsp.TextEdit(span_range(codec, offer.span), text),
             )
         )
     return lsp.CompletionList(is_incomplete=False, items=items)
@@ -146,16 +120,10 @@ def completion(result: Sequence[Completion], codec: PositionCodec, *, snippets: 
 def signature(result: Signature, encoding: str) -> lsp.SignatureHelp:
     """Return what a call takes."""
     codec = PositionCodec(result.label, encoding)
-    parameters = [
-        lsp.ParameterInformation((codec.width(0, start), codec.width(0, end))) for start, end in result.parameters
-    ]
-    diagnostic = lsp.SignatureInformation(
-        label=result.label,
-        documentation=result.text or None,
-        parameters=parameters,
-        active_parameter=result.active if parameters else None,
-    )
-    return lsp.SignatureHelp([diagnostic], 0, result.active if parameters else None)
+    spans = [(codec.width(0, start), codec.width(0, end)) for start, end in result.parameters]
+    parameters, active = [lsp.ParameterInformation(span) for span in spans], result.active if spans else None
+    information = lsp.SignatureInformation(result.label, result.text or None, parameters, active)
+    return lsp.SignatureHelp([information], 0, active)
 
 
 # ---- of the whole --------------------------------------------------------------------------------------------------
@@ -165,14 +133,14 @@ def inlay_hints(result: Iterable[Hint], codec: PositionCodec) -> list[lsp.InlayH
     """Return words between the words of a program."""
     return [
         lsp.InlayHint(
-            position=lsp.Position(*codec.place(diagnostic.place)),
-            label=diagnostic.text,
-            kind=lsp.InlayHintKind.Parameter if diagnostic.parameter else lsp.InlayHintKind.Type,
-            tooltip=diagnostic.tooltip,
-            padding_left=not diagnostic.parameter,
-            padding_right=diagnostic.parameter,
+            position=lsp.Position(*codec.place(hint.place)),
+            label=hint.text,
+            kind=lsp.InlayHintKind.Parameter if hint.parameter else lsp.InlayHintKind.Type,
+            tooltip=hint.tooltip,
+            padding_left=not hint.parameter,
+            padding_right=hint.parameter,
         )
-        for diagnostic in result
+        for hint in result
     ]
 
 
@@ -181,7 +149,7 @@ def symbols(entries: Iterable[Entry], codec: PositionCodec) -> list[lsp.Document
     return [
         lsp.DocumentSymbol(
             name=entry.name or "?",
-            kind=_SYMBOLS[entry.part],
+            kind=entry.kind,
             range=span_range(codec, entry.span),
             selection_range=span_range(codec, entry.place),
             detail=entry.detail or None,
@@ -193,7 +161,5 @@ def symbols(entries: Iterable[Entry], codec: PositionCodec) -> list[lsp.Document
 
 def folding(folds: Iterable[Fold]) -> list[lsp.FoldingRange]:
     """Return what can be folded away."""
-    return [
-        lsp.FoldingRange(fold.first - 1, fold.last - 1, kind=lsp.FoldingRangeKind.Comment if fold.comment else None)
-        for fold in folds
-    ]
+    kinds = {True: lsp.FoldingRangeKind.Comment, False: None}
+    return [lsp.FoldingRange(fold.first - 1, fold.last - 1, kind=kinds[fold.comment]) for fold in folds]

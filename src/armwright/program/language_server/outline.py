@@ -1,10 +1,10 @@
 """The shape of a program: what it declares, and what can be folded away."""
 
-import enum
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import attrs
+from lsprotocol.types import SymbolKind
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source, Span
@@ -14,24 +14,13 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
 
 
-class Part(enum.Enum):
-    """What an entry of an outline is."""
-
-    PROCEDURE = "procedure"
-    PARAMETER = "parameter"
-    VARIABLE = "variable"
-    ARRAY = "array"
-    FRAME = "frame"
-    EVENT = "event"
-
-
 @attrs.frozen
 class Entry:
     """Something that a program declares.
 
     Attributes:
         name: as declared.
-        part: what it is.
+        kind: what it is.
         detail: its type or parameters.
         span: all of it.
         place: its name.
@@ -39,54 +28,46 @@ class Entry:
     """
 
     name: str
-    part: Part
+    kind: SymbolKind
     detail: str
     span: Span
     place: Span
     inside: tuple["Entry", ...] = ()
 
 
-_PARTS = {VariableKind.FRAME: Part.FRAME, VariableKind.EVENT: Part.EVENT}
+_KINDS = {VariableKind.FRAME: SymbolKind.Struct, VariableKind.EVENT: SymbolKind.Event}
 
 
 def outline(analysis: Analysis) -> tuple[Entry, ...]:
     """Return what a program declares, in the order of the text."""
     symbols = analysis.compiled.symbols
-    found: list[Entry] = []
+    entries: list[Entry] = []
     for header in analysis.compiled.tree.headers:
         if isinstance(header, tree.Declaration):
-            found += _variables(header, symbols.types)
+            entries += _variables(header, symbols.types)
         elif isinstance(header, tree.Procedure):
             own = symbols.procedures.get(header.name.key)
             types = {} if own is None else own.types
-            inside = [
-                entry for parameter in header.parameters for entry in _variables(parameter, types, parameter=True)
-            ]
-            inside += [entry for declaration in header.declarations for entry in _variables(declaration, types)]
-            detail = signature(header)[0].partition(" (")[2]
-            found.append(
-                Entry(
-                    header.name.text,
-                    Part.PROCEDURE,
-                    f"({detail}" * bool(detail),
-                    header.span,
-                    _within(header.name.span, header.span),
-                    tuple(inside),
-                )
-            )
-    return tuple(sorted(found, key=lambda one: one.span.start))
+            inside = [entry for part in header.parameters for entry in _variables(part, types, parameter=True)]
+            inside += [entry for part in header.declarations for entry in _variables(part, types)]
+            _, opening, parameters = signature(header)[0].partition("(")
+            name = _within(header.name.span, header.span)
+            kind, detail = SymbolKind.Function, opening + parameters
+            entries.append(Entry(header.name.text, kind, detail, header.span, name, tuple(inside)))
+    return tuple(sorted(entries, key=lambda entry: entry.span.start))
 
 
 def _variables(
     declaration: tree.Declaration, types: Mapping[str, VariableType | None], *, parameter: bool = False
 ) -> list[Entry]:
-    found = []
+    entries = []
     for name in declaration.names:
-        kind = types.get(name.key)
-        part = Part.VARIABLE if kind is None else Part.ARRAY if kind.sizes else _PARTS.get(kind.kind, Part.VARIABLE)
-        detail = declaration.type.text if kind is None else str(kind)
-        found.append(Entry(name.text, Part.PARAMETER if parameter else part, detail, name.span, name.span))
-    return found
+        type_, kind = types.get(name.key), SymbolKind.Variable
+        if type_ is not None and not parameter:
+            kind = SymbolKind.Array if type_.sizes else _KINDS.get(type_.kind, kind)
+        detail = declaration.type.text if type_ is None else str(type_)
+        entries.append(Entry(name.text, kind, detail, name.span, name.span))
+    return entries
 
 
 def _within(inner: Span, outer: Span) -> Span:

@@ -36,31 +36,26 @@ def nameable(analysis: Analysis, offset: int) -> Occurrence:
     text = analysis.text[one.start : one.end]
     if one.what in _NO_NAMES:
         raise InvalidValueError(f"`{text}` is {_NO_NAMES[one.what]}, and cannot be renamed")
-    symbols = analysis.compiled.symbols
-    if one.what is What.UNKNOWN or analysis.declaration(one) is None:
-        if one.key in symbols.imported:
+    undeclared = one.what is What.UNKNOWN or analysis.declaration(one) is None
+    if undeclared or (one.what is What.VARIABLE and one.owner is None):
+        if one.key in analysis.compiled.symbols.imported:
             raise InvalidValueError(f"`{text}` is imported, and cannot be renamed here")
         if one.key in PREDECLARED:
             raise InvalidValueError(f"`{text}` is predeclared, and cannot be renamed")
-        raise InvalidValueError(f"`{text}` is not declared, so it is unknown what it is")
-    if one.what is What.VARIABLE and one.owner is None:
-        _require_free(analysis, one.key, text)
+        if undeclared:
+            raise InvalidValueError(f"`{text}` is not declared, so it is unknown what it is")
+        source = _known_by(analysis, one.key)
+        if source is not None:
+            raise InvalidValueError(f"`{text}` {source} by this name; rename it there first")
     return one
 
 
-def _require_free(analysis: Analysis, key: str, text: str) -> None:
-    """Refuse a frame that the cell knows by its name."""
+def _known_by(analysis: Analysis, key: str) -> str | None:
+    """Return how the cell knows a frame by its name; None where it does not."""
     cell = analysis.cell
-    if key in analysis.compiled.symbols.imported:
-        raise InvalidValueError(f"`{text}` is imported, and cannot be renamed here")
-    if key in PREDECLARED:
-        raise InvalidValueError(f"`{text}` is predeclared, and cannot be renamed")
-    if cell is None:
-        return
-    if key in cell.frames:
-        raise InvalidValueError(f"`{text}` gets its place from {cell.name} by this name; rename it there first")
-    if key in cell.visions:
-        raise InvalidValueError(f"`{text}` is found by the camera of {cell.name} by this name; rename it there first")
+    if cell is not None and key in cell.frames:
+        return f"gets its place from {cell.name}"
+    return f"is found by the camera of {cell.name}" if cell is not None and key in cell.visions else None
 
 
 def rename(analysis: Analysis, offset: int, new: str) -> tuple[Edit, ...]:
@@ -110,9 +105,8 @@ def _require_unused(analysis: Analysis, one: Occurrence, new: str) -> None:
         raise InvalidValueError(f"procedure `{procedure.node.name.text}` has a name '{new}' already")
     span = procedure.node.span
     if any(other.key == key and span.start <= other.start < span.end for other in _meant(analysis)):
-        raise InvalidValueError(
-            f"procedure `{procedure.node.name.text}` uses the '{new}' of the program, which would then be hidden"
-        )
+        name = procedure.node.name.text
+        raise InvalidValueError(f"procedure `{name}` uses the '{new}' of the program, which would then be hidden")
 
 
 def _require_unused_globally(analysis: Analysis, one: Occurrence, new: str) -> None:

@@ -11,14 +11,9 @@ from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.symbol_index import Occurrence, What
 from armwright.program.syntax.lexer import Token, TokenKind
 
-KINDS = (
-    *("keyword", "type", "variable", "parameter", "event", "function"),
-    *("property", "enumMember", "number", "string", "comment", "operator"),
-)
-MODIFIERS = (
-    *("declaration", "modification", "readonly", "defaultLibrary"),
-    *("frame", "trans", "scalar", "array", "arm"),
-)
+_NAMES = ("variable", "parameter", "event", "function", "property", "enumMember")
+KINDS = ("keyword", "type", *_NAMES, "number", "string", "comment", "operator")
+MODIFIERS = ("declaration", "modification", "readonly", "defaultLibrary", "frame", "trans", "scalar", "array", "arm")
 _KEYWORD, _TYPE, _NUMBER, _STRING, _COMMENT, _OPERATOR = (
     KINDS.index(kind) for kind in ("keyword", "type", "number", "string", "comment", "operator")
 )
@@ -43,7 +38,7 @@ def line_stretches(analysis: Analysis, encoding: str) -> list[list[Stretch]]:
     codec = PositionCodec(analysis.text, encoding)
     compiled = analysis.compiled
     lines: list[list[Stretch]] = [[] for _ in codec.starts]
-    _put(lines, codec, compiled.tokens, analysis.occurrences, analysis)
+    _put(lines, codec, analysis)
     for comment in compiled.comments:
         _put_comment(lines, codec, comment)
     for comment in compiled.comments:
@@ -52,20 +47,14 @@ def line_stretches(analysis: Analysis, encoding: str) -> list[list[Stretch]]:
     return lines
 
 
-def _put(
-    lines: list[list[Stretch]],
-    codec: PositionCodec,
-    tokens: Sequence[Token],
-    names: Sequence[Occurrence],
-    analysis: Analysis,
-) -> None:
+def _put(lines: list[list[Stretch]], codec: PositionCodec, analysis: Analysis) -> None:
     """Add the stretches of tokens to their lines."""
-    name_at = iter((*names, None))
-    name = next(name_at)
-    for token in tokens:
+    names = iter((*analysis.occurrences, None))
+    name = next(names)
+    for token in analysis.compiled.tokens:
         what = _plain(token)
         if name is not None and name.start == token.start:
-            what, name = _named(name, analysis), next(name_at)
+            what, name = _named(name, analysis), next(names)
         if what is not None:
             line, column = codec.place(token.start)
             lines[line].append((column, codec.width(token.start, token.end), *what))

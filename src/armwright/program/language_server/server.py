@@ -4,6 +4,7 @@ import logging
 import os
 import sys
 from contextlib import suppress
+from functools import reduce
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -62,7 +63,8 @@ class RloServer(LanguageServer):
         self.settings = Settings()
         self.encoding = _USUAL
         self.cells = Cells()
-        self._left = False
+        # Whether the editor has sent ``exit``.
+        self.left = False
         self._last_problem = ""
 
     def shutdown(self) -> None:
@@ -70,23 +72,17 @@ class RloServer(LanguageServer):
         if self._stop_event is not None:
             self._stop_event.set()
 
-    def leave(self) -> None:
-        """Take note that the editor has said ``exit``."""
-        self._left = True
-
     @property
     def status(self) -> int:
         """The exit status that the protocol asks for: 1 where ``exit`` came without ``shutdown``."""
-        return int(self._left and not self.protocol._shutdown)  # noqa: SLF001 - pygls keeps it so
+        return int(self.left and not self.protocol._shutdown)  # noqa: SLF001 - pygls keeps it so
 
     # ---- what the editor can do
 
-    def can(self, *way: str) -> Any:
+    def can(self, *path: str) -> Any:
         """Return a capability of the editor; None where it says nothing of it."""
-        found: Any = self.client_capabilities
-        for word in way:
-            found = getattr(found, word, None)
-        return found
+        capabilities: Any = self.client_capabilities
+        return reduce(lambda part, name: getattr(part, name, None), path, capabilities)
 
     # ---- documents
 
@@ -115,25 +111,22 @@ class RloServer(LanguageServer):
     def analyse(self, document: Document) -> Analysis:
         """Analyse a document as it is now, and tell the editor what is wrong with it."""
         folder = None if document.path is None else document.path.parent
-        problem = ""
         try:
-            done = analyse(document.name, document.text, folder, self.cells, self.settings)
-            analysis, problem = done.analysis, done.problem
+            analysis = analyse(document.name, document.text, folder, self.cells, self.settings)
         except Exception as error:  # noqa: BLE001 - a conversation goes on, whatever happens in it
             text = f"armwright: this should not happen: {type(error).__name__}: {error}"
             self.window_log_message(lsp.LogMessageParams(lsp.MessageType.Error, text))
             # Of a program without words nothing is known, and nothing is wrong with what is known.
-            return analyse(document.name, "", None, self.cells, Settings()).analysis
+            return analyse(document.name, "", None, self.cells, Settings())
         if self.documents.get(document.uri, document) is not document:
             return analysis
         related = bool(self.can("text_document", "publish_diagnostics", "related_information"))
-        said = lsp_types.diagnostics(analysis, document.codec, document.uri, related=related)
-        self.text_document_publish_diagnostics(
-            lsp.PublishDiagnosticsParams(uri=document.uri, diagnostics=said, version=document.version)
-        )
-        if problem and problem != self._last_problem:
-            self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {problem}"))
-        self._last_problem = problem
+        diagnostics = lsp_types.diagnostics(analysis, document.codec, document.uri, related=related)
+        params = lsp.PublishDiagnosticsParams(document.uri, diagnostics, document.version)
+        self.text_document_publish_diagnostics(params)
+        if analysis.problem and analysis.problem != self._last_problem:
+            self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {analysis.problem}"))
+        self._last_problem = analysis.problem
         return analysis
 
     # ---- settings
@@ -228,13 +221,8 @@ def _conversation(server: RloServer) -> None:
         path = to_fs_path(item.uri) if item.uri.startswith("file:") else None
         if (before := server.documents.get(item.uri)) is not None:
             before.close()
-        server.documents[item.uri] = Document(
-            item.uri,
-            None if path is None else Path(path),
-            PositionCodec(item.text, server.encoding),
-            item.version,
-            server.analyse,
-        )
+        file, codec = None if path is None else Path(path), PositionCodec(item.text, server.encoding)
+        server.documents[item.uri] = Document(item.uri, file, codec, item.version, server.analyse)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
     def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
@@ -259,7 +247,7 @@ def _surroundings(server: RloServer) -> None:
 
     @server.feature(lsp.EXIT)
     def left(_: Any) -> None:
-        server.leave()
+        server.left = True
 
     @server.feature(lsp.WORKSPACE_DID_CHANGE_CONFIGURATION)
     async def did_change_configuration(params: lsp.DidChangeConfigurationParams) -> None:

@@ -97,15 +97,9 @@ class Extents:
 
 def extents_of(symbols: Symbols) -> Extents:
     """Return where the procedures of a program stand."""
-    found = sorted(
-        (procedure.node.span.start, procedure.node.span.end, key) for key, procedure in symbols.procedures.items()
-    )
-    return Extents(
-        symbols=symbols,
-        starts=tuple(start for start, _, _ in found),
-        ends=tuple(end for _, end, _ in found),
-        keys=tuple(key for _, _, key in found),
-    )
+    spans = {key: procedure.node.span for key, procedure in symbols.procedures.items()}
+    keys = sorted(spans, key=lambda key: spans[key].start)
+    return Extents(symbols, tuple(spans[key].start for key in keys), tuple(spans[key].end for key in keys), tuple(keys))
 
 
 def occurrences(tokens: Sequence[Token], extents: Extents) -> tuple[Occurrence, ...]:
