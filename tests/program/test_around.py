@@ -92,7 +92,7 @@ def test_the_warning(by: Around) -> None:
     """A line that is gone round is told at its MOVE, with the place and cause of the error, the way and the price."""
     recording = run(SEAM, cell(around=by))
 
-    (warning,) = warnings(recording)
+    (warning,) = warnings(recording.stages, recording.cell)
     assert (warning.code, warning.is_error) == ("W402", False)
     assert SEAM[warning.span.start : warning.span.end] == "MOVE ARM_1 TO bottom STRAIGHTLY"
     assert "the straight line to `bottom`" in warning.message
@@ -150,7 +150,7 @@ def test_no_way_round_where_none_is_needed() -> None:
     plain, asked = run(text, cell()), run(text, cell(around="via"))
 
     np.testing.assert_array_equal(asked.streams[0].q, plain.streams[0].q)
-    assert warnings(asked) == warnings(plain)
+    assert warnings(asked.stages, asked.cell) == warnings(plain.stages, plain.cell)
 
 
 def test_round_a_limit() -> None:
@@ -162,7 +162,7 @@ def test_round_a_limit() -> None:
 
     assert error.code == "E402"
     assert "leads joint 3 of ARM_1 beyond its limits" in error.message
-    (warning,) = warnings(recording)
+    (warning,) = warnings(recording.stages, recording.cell)
     assert error.notes[0] in warning.notes[0]
     line = the_line(recording)
     assert line.stage.obstacle is not None

@@ -349,7 +349,7 @@ def test_effort_over_the_limit_is_a_warning() -> None:
     compiled = compile_program(Source("t.rlo", (EXAMPLES / "stacking.rlo").read_text()), known_cell(weak))
     assert compiled.code is not None
 
-    found = warnings(interpret(compiled.code, weak, Simulator(weak)))
+    found = warnings(interpret(compiled.code, weak, Simulator(weak)).stages, weak)
 
     assert [one.code for one in found] == ["W401"] * 3  # one for each MOVE: joint 2 alone is weak
     assert "joint 2 of ARM_1 would need" in found[0].message

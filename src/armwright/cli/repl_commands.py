@@ -196,7 +196,7 @@ class Commands:
             Source(program.name, text), session.state.cell, std=session.std, read_import=import_reader(folder)
         )
         recording = run(compiled)
-        diagnostics = (*compiled.diagnostics, *warnings(recording))
+        diagnostics = (*compiled.diagnostics, *warnings(recording.stages, recording.cell))
         command = ["armwright", "run", str(program), *(["--cell", str(self._cell)] if self._cell else [])]
         origin = Origin(
             program=program,

@@ -125,7 +125,7 @@ def _finish(  # noqa: PLR0917 - the run, and how it is reported
     from armwright.report.files import ending, left_out, result_files, run_record, summary
 
     failed = () if error is None else (error.diagnostic,)
-    diagnostics = (*compiler_diagnostics, *warnings(recording), *failed)
+    diagnostics = (*compiler_diagnostics, *warnings(recording.stages, recording.cell), *failed)
     notes = left_out(recording, origin.motion_rows) if output is not None else ()
     if output is not None:
         results = (recording, code, diagnostics, origin)

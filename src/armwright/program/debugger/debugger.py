@@ -198,11 +198,11 @@ class Debugger:
         Returns:
             The breakpoint; one without a ``start`` stops nothing, and its ``message`` says why.
         """
-        start = self.execution.statements.find(line, column)
-        message = "" if start is not None else "no statement begins here or further down"
+        start, message = self.execution.statements.find(line, column), "no statement begins here or further down"
         if start is not None:
             try:
                 self._check(condition, hits, self.execution.statements.procedure(start.index))
+                message = ""
             except (ExpressionError, CountError) as error:
                 start, message = None, str(error)
         number = next(self._numbers)

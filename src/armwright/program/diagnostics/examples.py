@@ -60,7 +60,7 @@ def answer(source: Source) -> tuple[Diagnostic, ...]:
         recording = interpret(compiled.code, cell, Simulator(cell), limits=limits)
     except RunError as error:
         return (*compiled.diagnostics, error.diagnostic)
-    return (*compiled.diagnostics, *warnings(recording))
+    return (*compiled.diagnostics, *warnings(recording.stages, recording.cell))
 
 
 def _cell(text: str) -> Cell | None:

@@ -78,7 +78,7 @@ def merged(
     for header in entry.headers:
         if isinstance(header, tree.Import):
             path = attrs.evolve(header.path, value=path_of(header.path.value))
-            if any(isinstance(one, tree.Import) and one.path.value == path.value for one in (*old, *imports)):
+            if any(isinstance(known, tree.Import) and known.path.value == path.value for known in (*old, *imports)):
                 remarks.append(f"`{path.value}` is imported already")
             else:
                 imports.append(attrs.evolve(header, path=path))
@@ -89,9 +89,8 @@ def merged(
     new = [*imports, *new]
     again = declared(old).keys() & declared(new).keys()
     if not again:
-        return Heading(
-            headers=(*old, *new), statements=tuple(statements), imports=tuple(imports), remarks=tuple(remarks)
-        )
+        both = (*old, *new)
+        return Heading(headers=both, statements=tuple(statements), imports=tuple(imports), remarks=tuple(remarks))
     words = VOCABULARIES[std]
     taken = {*declared((*old, *new)), *fixed, *words.reserved, *FUNCTIONS}
     for header in (*old, *new):
@@ -116,18 +115,15 @@ def _spelling(changed: Redeclared) -> dict[str, str]:
 
 
 def _messages(changed: Redeclared, old: Mapping[str, tree.Name], again: Collection[str]) -> list[str]:
-    messages, now = [], _spelling(changed)
-    for key in sorted(again):
-        text = f"`{old[key].text}` is declared anew"
-        if key in changed.renamed:
-            text += f"; what it was before is now called `{now[changed.renamed[key]]}`"
-        messages.append(text)
-    messages += [
-        f"`{old[key].text}` means the new one; what it did before is now called `{now[name]}`"
-        for key, name in sorted(changed.renamed.items())
-        if key not in again
-    ]
-    return messages
+    now = _spelling(changed)
+    called = {key: f"`{old[key].text}`" for key in {*again, *changed.renamed}}
+    messages = {key: f"{called[key]} is declared anew" for key in sorted(again)}
+    for key, name in sorted(changed.renamed.items()):
+        if key in again:
+            messages[key] += f"; what it was before is now called `{now[name]}`"
+        else:
+            messages[key] = f"{called[key]} means the new one; what it did before is now called `{now[name]}`"
+    return [*messages.values()]
 
 
 def _known_to_the_cell(name: tree.Name) -> Diagnostic:

@@ -67,7 +67,7 @@ def arms(session: Session) -> list[str]:
         hand = machine.state.hands[name]
         location = f"at {session.spelled(hand.at)}" if hand.at else "at no frame"
         holds = f", closed on {session.spelled(hand.holds)}" if hand.holds else ""
-        hanging = [session.spelled(one) for one, node in machine.state.tree.nodes.items() if node.parent == name]
+        hanging = [session.spelled(frame) for frame, node in machine.state.tree.nodes.items() if node.parent == name]
         carries = f", carries {', '.join(hanging)}" if hanging else ""
         lines += [f"{name}  {arm.arm.name}", f"  joints  {', '.join(shown)}", f"  hand    {location}{holds}{carries}"]
     return lines or ["no arms: begin with `--cell`, or with an IMPORT of a cell"]

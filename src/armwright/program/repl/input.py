@@ -230,11 +230,10 @@ class _Reader:
     def headers_of(self, part: Sequence[Token]) -> None:
         """Read declarations, units, an import or a procedure; the last ``;`` and the word VAR may be left out."""
         first, last = part[0], part[-1]
-        var = _words("VAR", index=first.start) if first.kind is TokenKind.NAME else []
-        semicolon = [] if last.key in (";", ".") else _words(";", index=last.end)
-        tokens = [*var, *part]
+        tokens = [*(_words("VAR", index=first.start) if first.kind is TokenKind.NAME else ()), *part]
         if _depth(part) <= 0:
-            tokens += [*semicolon, *_words("BEGIN", "END", ".", index=last.end)]
+            semicolon = () if last.key in (";", ".") else (";",)
+            tokens += _words(*semicolon, "BEGIN", "END", ".", index=last.end)
         program = self._parse(tokens, last.end, self._std)
         self.headers += program.headers
         for header in program.headers:
@@ -255,12 +254,8 @@ class _Reader:
             std = Standard.RLO_2
             remaining = piece[:-1] if piece[-1].key == ";" else piece
             start, end = remaining[0].start, remaining[-1].end
-            tokens += [
-                *_words("PRINT", "(", index=start),
-                *remaining,
-                *_words(")", index=end),
-                *piece[len(remaining) :],
-            ]
+            tokens += [*_words("PRINT", "(", index=start), *remaining, *_words(")", index=end)]
+            tokens += piece[len(remaining) :]
         tokens += _words("END", ".", index=part[-1].end)
         self.statements += self._parse(tokens, part[-1].end, std).statements
 

@@ -1,6 +1,7 @@
 """Names that are declared anew in a session: what was done with the old one keeps it, under another name."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import count
 from typing import Any
 
 import attrs
@@ -65,8 +66,8 @@ def redeclare(
     used = _reached(mentioned(tuple(statements)), mentions)
     old = {key for key in names if key in used}
     affected = {key for key in procedures if key in used and _reached(mentions[key], mentions) & old} - old
-    names_, fresh = declared(headers), _Fresh(taken, longest)
-    new = {key: fresh.name(names_[key].text) for key in sorted(old | affected)}
+    names_, taken = declared(headers), set(taken)
+    new = {key: _unused(names_[key].text, taken, longest) for key in sorted(old | affected)}
     remaining: list[tree.Header] = []
     for header in headers:
         if isinstance(header, tree.Procedure):
@@ -76,7 +77,8 @@ def redeclare(
             if key not in names:
                 remaining.append(header)
         elif isinstance(header, tree.Declaration):
-            remaining += _declarations(header, names, new)
+            own = tuple(_named(name, new) for name in header.names if name.key not in names or name.key in new)
+            remaining += [attrs.evolve(header, names=own)] if own else []
         else:
             remaining.append(header)
     return Redeclared(
@@ -85,13 +87,6 @@ def redeclare(
         renamed={key: new[key].key for key in new},
         dropped=frozenset(names) - old,
     )
-
-
-def _declarations(
-    header: tree.Declaration, names: Collection[str], new: Mapping[str, tree.Name]
-) -> list[tree.Declaration]:
-    unchanged = [_named(name, new) for name in header.names if name.key not in names or name.key in new]
-    return [attrs.evolve(header, names=tuple(unchanged))] if unchanged else []
 
 
 def _reached(names: Collection[str], mentions: Mapping[str, Collection[str]]) -> set[str]:
@@ -105,21 +100,13 @@ def _reached(names: Collection[str], mentions: Mapping[str, Collection[str]]) ->
     return reached
 
 
-class _Fresh:
-    """Gives names that nothing has."""
-
-    def __init__(self, taken: Collection[str], longest: int) -> None:
-        self._taken, self._longest = set(taken), longest
-
-    def name(self, text: str) -> tree.Name:
-        number = 1
-        while True:
-            end = f"_{number}"
-            candidate = text[: self._longest - len(end)] + end
-            if candidate.upper() not in self._taken:
-                self._taken.add(candidate.upper())
-                return tree.Name(Span(0, 0), candidate, candidate.upper())
-            number += 1
+def _unused(text: str, taken: set[str], longest: int) -> tree.Name:
+    """Return a name like another that is not taken, and take it."""
+    ends = (f"_{number}" for number in count(1))
+    candidates = (text[: longest - len(end)] + end for end in ends)
+    name = next(candidate for candidate in candidates if candidate.upper() not in taken)
+    taken.add(name.upper())
+    return tree.Name(Span(0, 0), name, name.upper())
 
 
 # ---- trees ---------------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ come to the same: going on from an earlier state.
 """
 
 from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
 import attrs
 
@@ -31,6 +32,8 @@ from armwright.program.syntax import tree
 from armwright.program.vm.machine import Limits, Machine, RunError
 from armwright.program.vm.recording import Effect
 
+# Returns how a session names a file that it imports.
+PathOf: TypeAlias = Callable[[str], str]
 # What a declaration is good for shows later than in a whole program.
 _TOO_EARLY = ("L304",)
 _NO_CELL = "no cell"
@@ -104,7 +107,7 @@ class Answer:
         return tuple(effect.text for effect in self.effects if effect.kind not in (*SILENT, "PRINT"))
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(eq=False)
 class _Checked:
     """An input that can be done, with what the translator has to know."""
 
@@ -184,7 +187,7 @@ class Session:
         """The number of the line that is entered next."""
         return self._text.count("\n") + 1
 
-    def program(self, remark: str = "", path_of: Callable[[str], str] = str) -> str:
+    def program(self, remark: str = "", path_of: PathOf = str) -> str:
         """Return the session as a program that runs to the same end in the same cell.
 
         Args:
@@ -206,17 +209,15 @@ class Session:
 
         Frames, values, arms, the clock, the devices and the answers of the camera are as they were before.
         """
-        count = min(count, self._at)
-        taken = self._states[self._at - count + 1 : self._at + 1]
-        self._at -= count
-        return tuple(state.text for state in reversed(taken))
+        end = self._at + 1
+        self._at -= min(count, self._at)
+        return tuple(state.text for state in reversed(self._states[self._at + 1 : end]))
 
     def redo(self, count: int = 1) -> tuple[str, ...]:
         """Let what was taken back last be done again; return what it was, the first one first."""
-        count = min(count, len(self._states) - 1 - self._at)
-        again = self._states[self._at + 1 : self._at + 1 + count]
-        self._at += count
-        return tuple(state.text for state in again)
+        start = self._at + 1
+        self._at = min(self._at + count, len(self._states) - 1)
+        return tuple(state.text for state in self._states[start : self._at + 1])
 
     def _go_on(self, state: State) -> None:
         self._states = [*self._states[: self._at + 1], state]
@@ -237,7 +238,7 @@ class Session:
         """
         return self._enter(text, complete=complete)
 
-    def load(self, file: Source, path_of: Callable[[str], str] = str) -> Answer:
+    def load(self, file: Source, path_of: PathOf = str) -> Answer:
         """Take the text of a file, such as a whole program; messages about it name its own lines.
 
         Args:
@@ -245,20 +246,14 @@ class Session:
             path_of: how the session shall name a file that this one imports.
         """
         start = len(self._text)
-        answer = self._enter(file.text, complete=True, is_file=True, path_of=path_of)
-        spans = [
-            span
-            for diagnostic in answer.diagnostics
-            for span in (diagnostic.span, *(label.span for label in diagnostic.secondary))
-        ]
-        if any(span.start < start for span in spans):
+        answer = self._enter(file.text, path_of, complete=True, is_file=True)
+        labels = [label for diagnostic in answer.diagnostics for label in diagnostic.secondary]
+        if any(part.span.start < start for part in (*answer.diagnostics, *labels)):
             return answer
         own = tuple(moved(diagnostic, -start) for diagnostic in answer.diagnostics)
         return attrs.evolve(answer, source=file, diagnostics=own)
 
-    def _enter(
-        self, text: str, *, complete: bool, is_file: bool = False, path_of: Callable[[str], str] = str
-    ) -> Answer:
+    def _enter(self, text: str, path_of: PathOf = str, *, complete: bool, is_file: bool = False) -> Answer:
         start, symbols = len(self._text), self.state.symbols
         source = Source(self.name, self._text + (text if text.endswith("\n") else f"{text}\n"))
         entry = read(source, start, self.std, names=symbols.types, procedures=symbols.procedures, is_file=is_file)
@@ -279,7 +274,7 @@ class Session:
     # ---- checking --------------------------------------------------------------------------------------------------
 
     def _check(
-        self, source: Source, start: int, entry: Entry, path_of: Callable[[str], str]
+        self, source: Source, start: int, entry: Entry, path_of: PathOf
     ) -> tuple[_Checked | None, tuple[Diagnostic, ...]]:
         """Check an input together with all that came before it.
 
@@ -294,31 +289,26 @@ class Session:
         program = tree.Program(Span(0, end.end), heading.headers, (*heading.statements, *entry.statements), end)
         cell, symbols, wrong = self._check_names(program)
         diagnostics = [*entry.found, *wrong]
-        course = None
+        flow = None
         if not any(diagnostic.is_syntax for diagnostic in diagnostics):
-            course, odd = analysis.check(program, symbols, spelling, known_cell(cell), source=source)
-            diagnostics += odd
+            flow, warnings = analysis.check(program, symbols, spelling, known_cell(cell), source=source)
+            diagnostics += warnings
         new = (
             diagnostic
             for diagnostic in diagnostics
             if diagnostic.is_error or (diagnostic.span.start >= start and diagnostic.code not in _TOO_EARLY)
         )
         reported = in_order(new)
-        if course is None or any(diagnostic.is_error for diagnostic in reported):
+        if flow is None or any(diagnostic.is_error for diagnostic in reported):
             return None, reported
-        checked = _Checked(
-            source=source, entry=entry, heading=heading, cell=cell, symbols=symbols, flow=course, spelling=spelling
-        )
-        return checked, reported
+        return _Checked(source, entry, heading, cell, symbols, flow, spelling), reported
 
     def _check_names(self, program: tree.Program) -> tuple[Cell, Symbols, list[Diagnostic]]:
         """Check names and types; where nothing was done yet, the arms of an imported cell are those of the session."""
         cell = self.state.cell
         read_import = None if self._read_import is None else self._import
         symbols, diagnostics, imports = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
-        other = next(
-            (diagnostic.cell for diagnostic in imports if diagnostic.cell is not None and diagnostic.cell.arms), None
-        )
+        other = next((imported.cell for imported in imports if imported.cell and imported.cell.arms), None)
         if other is not None and not cell.arms and not self.state.statements:
             cell = other
             symbols, diagnostics, _ = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
@@ -337,15 +327,14 @@ class Session:
         source, entry = checked.source, checked.entry
         if checked.heading.headers != self.state.headers:
             self._declare(checked)
+        answer = Answer(source=source)
         effects: list[Effect] = []
         diagnostics: list[Diagnostic] = []
-        remarks: list[str] = []
-        refused = failed = False
         for number, statement in enumerate(entry.statements):
             before, shown = self.state, statement.span.start in entry.shown
             if before.machine.state.over and not shown:
-                remarks.append("the program has come to a HALT; `:undo` goes back to before it")
-                refused = True
+                remark = "the program has come to a HALT; `:undo` goes back to before it"
+                answer = Answer(source=source, remarks=(remark,), refused=True)
                 break
             machine = with_code(before.machine, checked.code(statement), self.limits)
             machine.state.over = False
@@ -353,22 +342,15 @@ class Session:
                 go_through(machine)
             except RunError as error:
                 diagnostics.append(error.diagnostic)
-                failed = True
-                remarks += [*taken_back(before.machine, machine), *_left(len(entry.statements) - number - 1)]
+                remarks = (*taken_back(before.machine, machine), *_left(len(entry.statements) - number - 1))
+                answer = Answer(source=source, remarks=remarks, failed=True)
                 break
             effects += machine.state.effects[len(before.machine.state.effects) :]
             diagnostics += new_warnings(before.machine, machine)
             if not shown:
                 text = " ".join(source.slice(statement.span).split())
                 self._go_on(checked.state(machine, (*before.statements, statement), text))
-        return Answer(
-            source=source,
-            effects=tuple(effects),
-            diagnostics=tuple(diagnostics),
-            remarks=tuple(remarks),
-            refused=refused,
-            failed=failed,
-        )
+        return attrs.evolve(answer, effects=tuple(effects), diagnostics=tuple(diagnostics))
 
     def _declare(self, checked: _Checked) -> None:
         before, heading, source = self.state, checked.heading, checked.source

@@ -15,7 +15,6 @@ from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.vm.interpreter import advance, due, warnings
 from armwright.program.vm.machine import Limits, Machine
 from armwright.program.vm.process import Activation, Process
-from armwright.program.vm.recording import Recording
 
 
 def fresh(cell: Cell, source: Source, limits: Limits) -> Machine:
@@ -63,19 +62,7 @@ def go_through(machine: Machine) -> None:
 
 def new_warnings(before: Machine, after: Machine) -> tuple[Diagnostic, ...]:
     """Return the warnings about motions that one machine has made and its twin has not."""
-    stages = tuple(after.state.stages[len(before.state.stages) :])
-    if not stages:
-        return ()
-    recording = Recording(
-        cell=after.cell,
-        duration=after.now,
-        effects=(),
-        stages=stages,
-        streams=(),
-        trees=tuple(after.state.trees),
-        configurations={},
-    )
-    return warnings(recording)
+    return warnings(after.state.stages[len(before.state.stages) :], after.cell)
 
 
 # ---- names and cells that change -----------------------------------------------------------------------------------

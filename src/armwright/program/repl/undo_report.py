@@ -36,11 +36,8 @@ def taken_back(before: Machine, after: Machine) -> list[str]:
 def _arms(before: Machine, after: Machine) -> list[str]:
     """Return the arms that stand otherwise after than before."""
     configurations = ((name, before.hardware.configuration(name, before.now)) for name in after.state.hands)
-    return [
-        name
-        for name, q in configurations
-        if np.abs(q - after.hardware.configuration(name, after.now)).max() > _ROUNDING
-    ]
+    now = after.hardware.configuration
+    return [name for name, q in configurations if np.abs(q - now(name, after.now)).max() > _ROUNDING]
 
 
 def _frames(before: Machine, after: Machine) -> list[str]:
@@ -50,10 +47,7 @@ def _frames(before: Machine, after: Machine) -> list[str]:
 
 
 def _differs(before: Machine, after: Machine, name: str) -> bool:
-    if before.has_place(name) != after.has_place(name) or before.state.tree.parent(name) != after.state.tree.parent(
-        name
-    ):
+    old, new = before.state.tree, after.state.tree
+    if before.has_place(name) != after.has_place(name) or old.parent(name) != new.parent(name):
         return True
-    if not after.has_place(name):
-        return False
-    return not np.allclose(before.state.tree.world(name), after.state.tree.world(name), rtol=0, atol=_ROUNDING)
+    return after.has_place(name) and not np.allclose(old.world(name), new.world(name), rtol=0, atol=_ROUNDING)

@@ -5,7 +5,7 @@ served first, then the one that comes first in the text; so a run is the same on
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -176,16 +176,16 @@ def _failed(machine: Machine, failure: Failure, stopped: Sequence[str]) -> Recor
     return attrs.evolve(recording, effects=in_order((*recording.effects, end)), failure=failure)
 
 
-def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
-    """Return the warnings about a run.
+def warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic, ...]:
+    """Return the warnings about stages that were run in a cell.
 
     For every straight line that was gone round, every VIA with stops because corners cannot be rounded, and every
     joint asked for too much effort.
     """
     diagnostics = []
-    for stage in recording.stages:
+    for stage in stages:
         diagnostics += [warning for warning in (detour_warning(stage), stops_warning(stage)) if warning is not None]
-        arm = recording.cell.arms[stage.arm].arm
+        arm = cell.arms[stage.arm].arm
         excessive = np.flatnonzero(stage.peak_effort / arm.limit("effort") > 1)
         diagnostics += [_effort_warning(stage, arm, joint) for joint in excessive.tolist()]
     return tuple(diagnostics)
