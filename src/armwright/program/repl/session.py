@@ -247,8 +247,9 @@ class Session:
         """
         start = len(self._text)
         answer = self._enter(file.text, path_of, complete=True, is_file=True)
-        labels = [label for diagnostic in answer.diagnostics for label in diagnostic.secondary]
-        if any(part.span.start < start for part in (*answer.diagnostics, *labels)):
+        spans = [label.span for diagnostic in answer.diagnostics for label in diagnostic.secondary]
+        spans += [diagnostic.span for diagnostic in answer.diagnostics]
+        if any(span.start < start for span in spans):
             return answer
         own = tuple(moved(diagnostic, -start) for diagnostic in answer.diagnostics)
         return attrs.evolve(answer, source=file, diagnostics=own)
