@@ -175,5 +175,5 @@ def test_too_deep() -> None:
     }
     *_, move = (effect for effect in recording.effects if effect.kind == "MOVE")
     assert move.data["contact"] == stop.data["contact"]
-    (contact,) = summary(recording, code_of(PROGRAMS["too deep"], cell_of("jam")), [])["contacts"]
+    (contact,) = summary(recording, [])["contacts"]
     assert (contact["t1"], contact["depth"]) == (pytest.approx(move.t1), pytest.approx(depth, abs=1e-6))

@@ -123,6 +123,6 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
     )
     failed = () if recording.failure is None else (recording.failure.diagnostic,)
     diagnostics = (*loaded.diagnostics, *warnings(recording.stages, recording.cell), *failed)
-    results = (recording, loaded.code, diagnostics, origin)
+    results = (recording, diagnostics, origin)
     write_folder(launch.output, result_files(*results), run_record(*results))
     return f"report{' up to the failure' if failed else ''}: {launch.output / 'report.html'}"

@@ -206,8 +206,7 @@ class Commands:
             options={"std": session.std.value},
             text=text,
         )
-        assert compiled.code is not None  # noqa: S101 - it has run
-        results = (recording, compiled.code, diagnostics, origin)
+        results = (recording, diagnostics, origin)
         write_folder(folder, {_PROGRAM: text, **result_files(*results)}, run_record(*results))
 
 

@@ -103,12 +103,11 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     origin = Origin(
         program=program, cell=cell, imports=imports, command=command_line(), options=options, motion_rows=most_rows
     )
-    _finish(recording, code, diagnostics, origin, output, error, as_json=as_json, quiet=quiet)
+    _finish(recording, diagnostics, origin, output, error, as_json=as_json, quiet=quiet)
 
 
-def _finish(  # noqa: PLR0917 - the run, and how it is reported
+def _finish(
     recording: "Recording",
-    code: "Code",
     compiler_diagnostics: "Sequence[Diagnostic]",
     origin: "Origin",
     output: Path | None,
@@ -128,24 +127,24 @@ def _finish(  # noqa: PLR0917 - the run, and how it is reported
     diagnostics = (*compiler_diagnostics, *warnings(recording.stages, recording.cell), *failed)
     notes = left_out(recording, origin.motion_rows) if output is not None else ()
     if output is not None:
-        results = (recording, code, diagnostics, origin)
+        results = (recording, diagnostics, origin)
         write_results(output, result_files(*results), run_record(*results))
     if as_json:
-        data = summary(recording, code, diagnostics, KEPT if output else NOT_KEPT)
+        data = summary(recording, diagnostics, KEPT if output else NOT_KEPT)
         folder = {"output": str(output)} if output else {}
         frames = {"time": error.time, "frames": _frame_positions(error)} if error else {}
-        print_json({**ending(recording, code), **data, **folder, "left_out": notes, **frames})
+        print_json({**ending(recording), **data, **folder, "left_out": notes, **frames})
     else:
         if diagnostics:
-            print_diagnostics(diagnostics, code.source)
+            print_diagnostics(diagnostics, recording.code.source)
         for note in notes:
             print(f"armwright: {note}", file=sys.stderr)
         if error is not None:
             if not quiet:
-                print_table(plain_console(), _trace_table(recording, code, KEPT if output else NOT_KEPT))
-            _print_frames(error, code)
+                print_table(plain_console(), _trace_table(recording, KEPT if output else NOT_KEPT))
+            _print_frames(error, recording.code)
         elif not quiet:
-            _print_summary(recording, code, KEPT if output else NOT_KEPT)
+            _print_summary(recording, KEPT if output else NOT_KEPT)
         if output is not None and (error is not None or not quiet):
             # On a line of its own and not wrapped, so that it can be clicked or copied.
             print(f"report{' up to the failure' if error else ''}: {output / 'report.html'}")
@@ -229,15 +228,15 @@ def _frame_positions(error: "RunError") -> dict[str, list[float] | None]:
     return {name: tree.world(name)[:3, 3].tolist() if tree.has_value(name) else None for name in tree}
 
 
-def _print_summary(recording: "Recording", code: "Code", hint: str) -> None:
+def _print_summary(recording: "Recording", hint: str) -> None:
     from armwright.program.vm.excerpt import ON_A_TERMINAL, listed
 
     console = plain_console()
-    print_table(console, _trace_table(recording, code, hint))
+    print_table(console, _trace_table(recording, hint))
     if recording.stages:
-        print_table(console, _stage_table(recording, code, hint))
+        print_table(console, _stage_table(recording, hint))
     slowed = [
-        f"line {code.source.line(run.span.start)}: {run.stage.kind} to {run.to[-1]} runs {run.stage.slowed}"
+        f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.to[-1]} runs {run.stage.slowed}"
         for run in recording.stages
         if run.stage.slowed
     ]
@@ -245,14 +244,14 @@ def _print_summary(recording: "Recording", code: "Code", hint: str) -> None:
         console.print(text)
     moves = sum(effect.kind == "MOVE" for effect in recording.effects)
     console.print(
-        f"{code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {counted(moves, 'move')}, "
+        f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {counted(moves, 'move')}, "
         f"{counted(len(recording.stages), 'stage')}, "
         f"{counted(len(recording.streams[0].t) if recording.streams else 0, 'servo tick')}"
     )
     console.print("Collisions are not checked.")
 
 
-def _trace_table(recording: "Recording", code: "Code", hint: str) -> "Table":
+def _trace_table(recording: "Recording", hint: str) -> "Table":
     from rich.text import Text
 
     from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more, one_line
@@ -260,7 +259,7 @@ def _trace_table(recording: "Recording", code: "Code", hint: str) -> "Table":
     several = len(recording.processes) > 1
 
     def row(effect: "Effect") -> "tuple[str | Text, ...]":
-        line = Text(str(code.source.line(effect.span.start)), style="dim")
+        line = Text(str(recording.code.source.line(effect.span.start)), style="dim")
         end = f"{effect.t1:.3f}" if effect.t1 > effect.t0 else ""
         return (line, f"{effect.t0:.3f}", end, *((effect.process,) if several else ()), one_line(effect.text, hint))
 
@@ -270,12 +269,12 @@ def _trace_table(recording: "Recording", code: "Code", hint: str) -> "Table":
     return table(names, effects.mapped(row).joined(omitted), words=range(3, len(names)))
 
 
-def _stage_table(recording: "Recording", code: "Code", hint: str) -> "Table":
+def _stage_table(recording: "Recording", hint: str) -> "Table":
     from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
 
     def row(stage: "RunStage") -> "tuple[str | Text, ...]":
         deviation = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
-        line = str(code.source.line(stage.span.start))
+        line = str(recording.code.source.line(stage.span.start))
         title = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}{', stopped' if stage.stopped else ''}"
         start, duration, length = f"{stage.t0:.3f}", f"{stage.duration:.3f}", f"{stage.length * 1e3:.0f}"
         return (line, title, start, duration, length, deviation, *_peaks(stage, recording))

@@ -16,7 +16,6 @@ from armwright.errors import ExitStatus
 from armwright.files.inputs import hash_read
 from armwright.files.output import sha256
 from armwright.motion.plan import PlannedStage
-from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import IN_A_LIST, KEPT, Excerpt, excerpt, listed, more
 from armwright.program.vm.machine import RunError
@@ -56,27 +55,26 @@ class Origin:
 
 
 def result_files(
-    recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin
+    recording: Recording, diagnostics: Sequence[Diagnostic], origin: Origin
 ) -> dict[str, str | Iterable[str]]:
     """Return the files of a run by name, identical for identical runs; those of a failed run end at the failure.
 
     Args:
         recording: the recording of the run.
-        code: the program.
         diagnostics: diagnostics of compilation and run.
         origin: the inputs of the run.
     """
     return {
         "motion.csv": motion_rows(recording.streams, _written_ticks(recording, origin.motion_rows)),
-        "events.jsonl": _events(recording, code),
-        "frames.json": _json(frames(recording, code)),
+        "events.jsonl": _events(recording),
+        "frames.json": _json(frames(recording)),
         "report.html": run_page(
-            page_of(recording, code, diagnostics, origin.command, left_out(recording, origin.motion_rows))
+            page_of(recording, diagnostics, origin.command, left_out(recording, origin.motion_rows))
         ),
     }
 
 
-def frames(recording: Recording, code: Code) -> dict[str, Any]:
+def frames(recording: Recording) -> dict[str, Any]:
     """Return the final frame tree: the parent of each frame, and its poses relative to the world and the parent."""
     tree = recording.tree
     table = {}
@@ -86,7 +84,7 @@ def frames(recording: Recording, code: Code) -> dict[str, Any]:
         known = tree.has_value(name)
         parent = tree.parent(name) or WORLD
         table[name] = {
-            "spelling": code.spelled(name),
+            "spelling": recording.code.spelled(name),
             "parent": parent,
             "world": _numbers(to_noap(tree.world(name))) if known else None,
             "relation": _numbers(to_noap(tree.relation(name, parent))) if known else None,
@@ -95,12 +93,12 @@ def frames(recording: Recording, code: Code) -> dict[str, Any]:
     return {"units": "m, rad", "pose": "columns n, o, a, p", "frames": table, "configurations": configurations}
 
 
-def ending(recording: Recording, code: Code) -> dict[str, Any]:
+def ending(recording: Recording) -> dict[str, Any]:
     """Return the exit status of a run, and the error of a failed run with its location and time."""
     failure = recording.failure
     if failure is None:
         return {"ended": "finished", "exit_status": int(ExitStatus.DONE)}
-    source, span = code.source, failure.diagnostic.span
+    source, span = recording.code.source, failure.diagnostic.span
     error = {
         "class": RunError.__name__,
         **to_json(failure.diagnostic, source),
@@ -112,27 +110,27 @@ def ending(recording: Recording, code: Code) -> dict[str, Any]:
     return {"ended": "failed", "exit_status": int(RunError.exit_status), "error": error}
 
 
-def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], hint: str = KEPT) -> dict[str, Any]:
+def summary(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str = KEPT) -> dict[str, Any]:
     """Return a summary of a run as plain data in SI units.
 
     Args:
         recording: the recording of the run.
-        code: the program.
         diagnostics: diagnostics of compilation and run, with the error that ended it.
         hint: note on the omitted lines of a trace that is too long.
     """
+    source = recording.code.source
     data = {
-        "program": code.source.name,
+        "program": source.name,
         "cell": recording.cell.name,
         "duration": recording.duration,
         "trace": listed(recording.trace(), IN_A_LIST, hint),
         "contacts": [
-            {"line": code.source.line(e.span.start), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
+            {"line": source.line(e.span.start), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
             for e in _contacts(recording).joined()
         ],
         "collisions": COLLISIONS,
-        "stages": [_stage(stage, recording, code) for stage in recording.stages],
-        "diagnostics": [to_json(diagnostic, code.source) for diagnostic in diagnostics],
+        "stages": [_stage(stage, recording) for stage in recording.stages],
+        "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics],
     }
     return {name: rounded(value) for name, value in data.items()}
 
@@ -142,11 +140,11 @@ def _contacts(recording: Recording) -> Excerpt[Effect]:
     return excerpt([e for e in recording.effects if e.kind == "MOVE" and "contact" in e.data], IN_A_LIST)
 
 
-def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
+def _stage(run: RunStage, recording: Recording) -> dict[str, Any]:
     arm = recording.cell.arms[run.arm].arm
     motion = run.motion
     return {
-        "line": code.source.line(run.span.start),
+        "line": recording.code.source.line(run.span.start),
         "arm": run.arm,
         "kind": run.stage.kind,
         "to": list(run.to),
@@ -199,9 +197,9 @@ def rounded(value: Any) -> Any:
     return value
 
 
-def _events(recording: Recording, code: Code) -> Iterator[str]:
+def _events(recording: Recording) -> Iterator[str]:
     for effect in recording.effects:
-        source = code.source
+        source = recording.code.source
         event = {
             "t0": effect.t0,
             "t1": effect.t1,
@@ -246,18 +244,17 @@ def _written_ticks(recording: Recording, most_rows: int) -> slice:
     return slice(max(0, len(recording.streams[0].t) - ticks), None)
 
 
-def run_record(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin) -> dict[str, Any]:
+def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: Origin) -> dict[str, Any]:
     """Return the record of a run for ``run.json``: its end, inputs, options, omissions, and the summary.
 
     Args:
         recording: the recording of the run.
-        code: the program.
         diagnostics: diagnostics of compilation and run, with the error that ended it.
         origin: the inputs of the run.
     """
     arms = {name: arm.arm.name for name, arm in recording.cell.arms.items()}
     return {
-        **ending(recording, code),
+        **ending(recording),
         "command": origin.command,
         "inputs": {
             "program": _file(origin.program, origin.text),
@@ -269,7 +266,7 @@ def run_record(recording: Recording, code: Code, diagnostics: Sequence[Diagnosti
         "options": dict(origin.options),
         "left_out": list(left_out(recording, origin.motion_rows)),
         "versions": {"armwright": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        **summary(recording, code, diagnostics),
+        **summary(recording, diagnostics),
     }
 
 

@@ -11,7 +11,6 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell, CellArm, base_name
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line
 from armwright.program.vm.move_diagnostics import note_of
@@ -31,7 +30,6 @@ _T = TypeVar("_T")
 
 def page_of(
     recording: Recording,
-    code: Code,
     diagnostics: Sequence[Diagnostic],
     command: str,
     left_out: Sequence[str] = (),
@@ -40,14 +38,13 @@ def page_of(
 
     Args:
         recording: the recording of the run.
-        code: the program.
         diagnostics: diagnostics of compilation and run.
         command: the command line, as shown on the page.
         left_out: notes on what other files of the run omit.
     """
-    source, cell, failure = code.source, recording.cell, recording.failure
+    source, cell, failure = recording.code.source, recording.cell, recording.failure
     stages, fewer_stages = _fewer(recording.stages, IN_A_LIST, "stages", "all in run.json")
-    animation, fewer_frames = _animation(recording, code)
+    animation, fewer_frames = _animation(recording)
     status = "finished" if failure is None else f"failed: {failure.diagnostic.code} at {failure.time:.3f} s"
     reasons = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
     errors_first = sorted(diagnostics, key=lambda diagnostic: not diagnostic.is_error)
@@ -67,7 +64,7 @@ def page_of(
             for d in listed
         ]
         + [Message(severity="note", text=text) for text in notes],
-        effects=_effects(recording, code),
+        effects=_effects(recording),
         stages=[_stage(run, source.line(run.span.start)) for run in stages],
         arms=[_record(stream, cell) for stream in recording.streams],
         animation=animation,
@@ -81,13 +78,13 @@ def _fewer(items: Sequence[_T], most: int, name: str, hint: str = KEPT) -> tuple
     return shown.joined(), [text] if shown.left_out else []
 
 
-def _effects(recording: Recording, code: Code) -> list[Effect]:
+def _effects(recording: Recording) -> list[Effect]:
     """Return the effects of a run; a line stands for those that a page cannot hold."""
     several = len(recording.processes) > 1
     effects = excerpt(recording.effects, IN_A_LIST)
 
     def shown(effect: RunEffect) -> Effect:
-        number, process = code.source.line(effect.span.start), effect.process if several else ""
+        number, process = recording.code.source.line(effect.span.start), effect.process if several else ""
         return Effect(t0=effect.t0, t1=effect.t1, line=number, text=one_line(effect.text), process=process)
 
     omitted = [attrs.evolve(shown(effects.first[-1]), text=more(effects.left_out))] if effects.left_out else []
@@ -127,7 +124,7 @@ def _record(stream: Stream, cell: Cell) -> ArmRecord:
     )
 
 
-def _animation(recording: Recording, code: Code) -> tuple[Animation, list[str]]:
+def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     """Return the animation, and notes on what it omits."""
     fps = min(_FRAMES_PER_SECOND, _MOST_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
@@ -136,12 +133,12 @@ def _animation(recording: Recording, code: Code) -> tuple[Animation, list[str]]:
     hands = {name: poses[:, -1] for name, poses in links.items()}
     visible = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
     names, fewer_frames = _fewer(visible, _MOST_FRAMES, "frames", "all in frames.json")
-    changes, fewer_changes = _fewer([*_tree_changes(recording, code, t)], IN_A_LIST, "changes of the tree of frames")
+    changes, fewer_changes = _fewer([*_tree_changes(recording, t)], IN_A_LIST, "changes of the tree of frames")
     animation = Animation(
         fps=fps,
         t=t,
         arms={name: sticks(arms[name].arm, poses, _grip(recording.effects, name, t)) for name, poses in links.items()},
-        frames=_tracks(recording, code, t, hands, names),
+        frames=_tracks(recording, t, hands, names),
         tree=changes,
     )
     return animation, [*fewer_frames, *fewer_changes]
@@ -166,9 +163,7 @@ def _grip(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
     return np.interp(t, times, values)
 
 
-def _tracks(
-    recording: Recording, code: Code, t: Array, hands: dict[str, Array], names: Sequence[str]
-) -> Iterator[FrameTrack]:
+def _tracks(recording: Recording, t: Array, hands: dict[str, Array], names: Sequence[str]) -> Iterator[FrameTrack]:
     poses = {name: np.tile(np.eye(4), (len(t), 1, 1)) for name in names}
     first: dict[str, int] = {}
     for _, rows, tree in _valid_trees(recording, t):
@@ -179,7 +174,7 @@ def _tracks(
                 first.setdefault(name, rows.start)
     for name in names:
         if name in first:
-            yield FrameTrack(name=code.spelled(name), poses=to_noap(poses[name]), visible_from=first[name])
+            yield FrameTrack(name=recording.code.spelled(name), poses=to_noap(poses[name]), visible_from=first[name])
 
 
 def _locate(name: str, tree: FrameTree, poses: dict[str, Array]) -> bool:
@@ -209,7 +204,7 @@ def _valid_trees(recording: Recording, t: Array) -> Iterator[tuple[float, slice,
             yield start, slice(rows[i], rows[i + 1]), tree
 
 
-def _tree_changes(recording: Recording, code: Code, t: Array) -> Iterator[TreeChange]:
+def _tree_changes(recording: Recording, t: Array) -> Iterator[TreeChange]:
     """Yield the changes of the frame tree that are visible at the instants of the view."""
     before: Mapping[str, Node] = {}
     shown: dict[str, str] = {}
@@ -220,7 +215,7 @@ def _tree_changes(recording: Recording, code: Code, t: Array) -> Iterator[TreeCh
             parent = WORLD if node.parent == base_name(name) else node.parent
             if shown.get(name) != parent:
                 shown[name] = parent
-                yield TreeChange(t=time, child=code.spelled(name), parent=code.spelled(parent))
+                yield TreeChange(t=time, child=recording.code.spelled(name), parent=recording.code.spelled(parent))
         before = tree.nodes
 
 

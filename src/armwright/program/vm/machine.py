@@ -102,6 +102,7 @@ class Machine:
         """Return all that happened so far."""
         cell = self.cell
         return Recording(
+            code=self.code,
             cell=cell,
             duration=self.now,
             effects=in_order(self.state.effects),

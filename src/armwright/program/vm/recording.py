@@ -15,6 +15,7 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
+from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Span
 
@@ -178,6 +179,7 @@ class Recording:
     """A run.
 
     Attributes:
+        code: the program.
         cell: in which it ran.
         duration: [s], a whole number of servo periods.
         effects: in the order in which they began.
@@ -189,6 +191,7 @@ class Recording:
         failure: why it did not come to its end; None where it did.
     """
 
+    code: Code
     cell: Cell
     duration: float
     effects: tuple[Effect, ...]
