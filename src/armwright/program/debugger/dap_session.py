@@ -257,12 +257,11 @@ class EditorSession:
         self.send("output", {"category": category, "output": text, **position})
 
     def _report_effects(self, debugger: Debugger) -> None:
-        news = excerpt([new for new in debugger.new_effects() if new.kind in {"PRINT", "ERROR"}], ON_A_TERMINAL)
-        for effect in news.first:
-            self._report_effect(effect)
-        if news.left_out:
-            self.write(f"{more(news.left_out, _ALL_OF_IT)}\n", "console")
-        for effect in news.last:
+        effects = [effect for effect in debugger.new_effects() if effect.kind in {"PRINT", "ERROR"}]
+        shown = excerpt(effects, ON_A_TERMINAL)
+        for effect in (*shown.first, *shown.last):
+            if shown.left_out and effect is shown.last[0]:
+                self.write(f"{more(shown.left_out, _ALL_OF_IT)}\n", "console")
             self._report_effect(effect)
         for text, breakpoint_ in debugger.log_messages():
             self.write(f"{text}\n", "console", breakpoint_.start.span if breakpoint_.start else None)

@@ -12,7 +12,7 @@ from armwright.program.debugger.snapshot import Frame
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Process, Value
-from armwright.spatial.poses import to_noap
+from armwright.program.vm.value_text import hierarchy, matrix_text, noap_texts
 
 _NOTHING = "no value yet"
 # Less than this of a number between -1 and 1 is rounding.
@@ -102,19 +102,8 @@ def result(machine: Machine, name: str, value: Value, kind: str) -> Variable:
 
 def frames_text(machine: Machine) -> list[str]:
     """Return the tree of frames, a line each, what hangs on something under it."""
-    below: dict[str, list[str]] = {}
-    for name in machine.state.tree:
-        if name != WORLD and not name.endswith(".BASE"):
-            parent = machine.state.tree.parent(name) or WORLD
-            # An arm hangs on its own base, which no program can name.
-            below.setdefault(WORLD if parent.endswith(".BASE") else parent, []).append(name)
-    lines = [WORLD]
-    waiting = [(name, 1) for name in sorted(below.get(WORLD, ()), reverse=True)]
-    while waiting:
-        name, depth = waiting.pop()
-        lines.append(f"{'  ' * depth}{machine.spelled(name)}  {_place(machine, name)}")
-        waiting += [(child, depth + 1) for child in sorted(below.get(name, ()), reverse=True)]
-    return lines
+    _, *below = hierarchy(machine.state.tree, sorted)
+    return [WORLD, *(f"{'  ' * depth}{machine.spelled(name)}  {_position(machine, name)}" for name, depth in below)]
 
 
 # ---- frames, steps, arrays -----------------------------------------------------------------------------------------
@@ -135,19 +124,14 @@ def _inside(machine: Machine, slot: str) -> list[Variable]:
     if parent is not None:
         above = _above(machine, parent)
         X = machine.state.tree.relation(slot, parent)
-        frame = variable(machine, parent) if parent != WORLD else None
-        lines += [
-            Variable(
-                name="parent", value=above, type="FRAME", inside=frame.inside if frame else None, expression=above
-            ),
-            result(machine, "relation", X, "TRANS"),
-        ]
+        inside = variable(machine, parent).inside if parent != WORLD else None
+        entry = Variable(name="parent", value=above, type="FRAME", inside=inside, expression=above)
+        lines += [entry, result(machine, "relation", X, "TRANS")]
         if machine.state.tree.nodes[slot].rigid:
             lines.append(Variable(name="rigid", value="true"))
     if slot in machine.state.written:
-        lines.append(
-            Variable(name="set in line", value=str(machine.code.source.line(machine.state.written[slot].start)))
-        )
+        line = machine.code.source.line(machine.state.written[slot].start)
+        lines.append(Variable(name="set in line", value=str(line)))
     return lines
 
 
@@ -164,17 +148,14 @@ def _columns(machine: Machine, X: Array) -> list[Variable]:
 
 def _matrix(machine: Machine, X: Array) -> str:
     """Return a pose or a step as the program would write it."""
-    numbers = _numbers(machine, X)
-    return "(" + ", ".join(",".join(numbers[index : index + 3]) for index in range(0, 12, 3)) + ")"
+    return matrix_text(_numbers(machine, X))
 
 
 def _numbers(machine: Machine, X: Array) -> list[str]:
-    numbers = to_noap(X)
-    numbers[9:] /= machine.code.units.metres
-    return [f"{0.0 if abs(number) < _ROUNDING else number:.7g}" for number in numbers.tolist()]
+    return noap_texts(X, machine.code.units, 7, _ROUNDING)
 
 
-def _place(machine: Machine, name: str) -> str:
+def _position(machine: Machine, name: str) -> str:
     if not machine.has_place(name):
         return _NOTHING
     return f"({', '.join(_numbers(machine, machine.state.tree.world(name))[9:])}) {machine.code.units.length.lower()}"

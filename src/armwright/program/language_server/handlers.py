@@ -28,18 +28,14 @@ _LEGEND = lsp.SemanticTokensLegend(token_types=list(KINDS), token_modifiers=list
 
 def register(server: RloServer) -> None:
     """Let a server answer."""
-    _at_a_place(server)
-    _of_names(server)
-    _renames(server)
-    _changes(server)
-    _of_the_whole(server)
-    _colours(server)
+    for features in (_position_features, _name_features, _rename_features, _edits, _document_features, _colours):
+        features(server)
 
 
-# ---- at a place ----------------------------------------------------------------------------------------------------
+# ---- at a position -------------------------------------------------------------------------------------------------
 
 
-def _at_a_place(server: RloServer) -> None:
+def _position_features(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_HOVER)
     async def on_hover(params: lsp.HoverParams) -> lsp.Hover | None:
         document = server.document(params.text_document.uri)
@@ -69,7 +65,7 @@ def _at_a_place(server: RloServer) -> None:
 # ---- names ---------------------------------------------------------------------------------------------------------
 
 
-def _of_names(server: RloServer) -> None:
+def _name_features(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
     async def on_definition(params: lsp.DefinitionParams) -> lsp.Location | None:
         document = server.document(params.text_document.uri)
@@ -108,7 +104,7 @@ def _of_names(server: RloServer) -> None:
         ]
 
 
-def _renames(server: RloServer) -> None:
+def _rename_features(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_PREPARE_RENAME)
     async def on_prepare_rename(params: lsp.PrepareRenameParams) -> lsp.PrepareRenamePlaceholder:
         document = server.document(params.text_document.uri)
@@ -134,7 +130,7 @@ def _renames(server: RloServer) -> None:
 # ---- changes -------------------------------------------------------------------------------------------------------
 
 
-def _changes(server: RloServer) -> None:
+def _edits(server: RloServer) -> None:
     kinds = [lsp.CodeActionKind.QuickFix, _FIX_ALL_HERE]
 
     @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions(code_action_kinds=kinds))
@@ -191,10 +187,10 @@ def _start(where: lsp.Range) -> tuple[int, int]:
     return where.start.line, where.start.character
 
 
-# ---- the whole -----------------------------------------------------------------------------------------------------
+# ---- a document ----------------------------------------------------------------------------------------------------
 
 
-def _of_the_whole(server: RloServer) -> None:
+def _document_features(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
     async def on_symbols(params: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
         document = server.document(params.text_document.uri)

@@ -1,13 +1,14 @@
 """What there is to see of a session: the frame tree with places and turns, and the arms with their joints and hands."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.frames import WORLD, FrameTree
+from armwright.cell.frames import WORLD
 from armwright.program.repl.session import Session
+from armwright.program.vm.value_text import hierarchy
 
 # Where the middle of three turns is this near to a right angle, the other two turn about the same axis.
 _SAME_AXIS = 1e-9
@@ -19,7 +20,8 @@ def frames(session: Session) -> list[str]:
     """Return the frame tree as lines: each frame under the one it hangs on, seen from the world."""
     units, machine = session.state.symbols.units, session.state.machine
     rows = [["frame", "x", "y", "z", units.length.lower(), "z", "y", "x", "deg"]]
-    for name, depth, rigid in _walk(machine.state.tree):
+    for name, depth in hierarchy(machine.state.tree):
+        rigid = name != WORLD and machine.state.tree.nodes[name].rigid
         shown = "  " * depth + session.spelled(name) + (" (rigidly)" if rigid else "")
         if not machine.has_place(name):
             rows.append([shown, "no value yet"])
@@ -28,20 +30,6 @@ def frames(session: Session) -> list[str]:
         position = [_number(value, _DIGITS[units.length]) for value in X[:3, 3] / units.metres]
         rows.append([shown, *position, "", *map(_degrees, to_zyx(X[:3, :3]).tolist()), ""])
     return _aligned(rows)
-
-
-def _walk(tree: FrameTree) -> Iterator[tuple[str, int, bool]]:
-    """Give each frame with its depth and whether it takes its parent along; an arm stands in place of its base."""
-    below: dict[str, list[str]] = {}
-    for name, node in tree.nodes.items():
-        if not name.endswith(".BASE"):
-            above = node.parent
-            below.setdefault(tree.parent(above) or WORLD if above.endswith(".BASE") else above, []).append(name)
-    waiting = [(WORLD, 0)]
-    while waiting:
-        name, depth = waiting.pop()
-        yield name, depth, name != WORLD and tree.nodes[name].rigid
-        waiting += [(child, depth + 1) for child in reversed(below.get(name, ()))]
 
 
 def to_zyx(R: Array) -> Array:

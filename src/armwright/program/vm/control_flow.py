@@ -64,10 +64,9 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
             if not by_value and machine.names_variable(process, operand):
                 bindings[key] = machine.name(process, operand)
                 continue
-            if kind.kind is VariableKind.SCALAR and by_value:
-                machine.state.values[slot] = machine.number(process, operand, step)
-            elif by_value:
-                machine.state.values[slot] = machine.pose(process, operand, step)
+            if by_value:
+                read = machine.number if kind.kind is VariableKind.SCALAR else machine.pose
+                machine.state.values[slot] = read(process, operand, step)
             else:
                 machine.grow(machine.state.tree.place(slot, machine.pose(process, operand, step)), slot, step.span)
         bindings[key] = slot

@@ -1,7 +1,11 @@
 """Values in words, as PRINT, the trace and the events show them."""
 
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
 import numpy as np
 
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD, FrameTree
 from armwright.program.language.units import UnitSystem
 from armwright.program.vm.process import Value
 from armwright.spatial.poses import to_noap
@@ -22,7 +26,42 @@ def shown(value: Value, units: UnitSystem) -> str:
     if isinstance(value, float | int):
         return f"{value + 0.0:.6g}"
     assert isinstance(value, np.ndarray)  # noqa: S101 - elements have been read
-    numbers = to_noap(value)
+    return matrix_text(noap_texts(value, units))
+
+
+def noap_texts(X: Array, units: UnitSystem, digits: int = 6, rounding: float = _ROUNDING) -> list[str]:
+    """Return the numbers n, o, a, p (12,) of a pose as texts, lengths in the unit of the program.
+
+    Args:
+        X: (4, 4) a pose.
+        units: of the program.
+        digits: significant digits.
+        rounding: smaller numbers are 0.
+    """
+    numbers = to_noap(X)
     numbers[9:] /= units.metres
-    texts = [f"{0.0 if abs(number) < _ROUNDING else number:.6g}" for number in numbers.tolist()]
+    return [f"{0.0 if abs(number) < rounding else number:.{digits}g}" for number in numbers.tolist()]
+
+
+def matrix_text(texts: Sequence[str]) -> str:
+    """Return the twelve numbers of a pose as a program writes them."""
     return "(" + ", ".join(",".join(texts[i : i + 3]) for i in range(0, 12, 3)) + ")"
+
+
+def hierarchy(tree: FrameTree, order: Callable[[Iterable[str]], list[str]] = list) -> Iterator[tuple[str, int]]:
+    """Give each frame with its depth in the tree, each behind its parent; an arm is shown in place of its base.
+
+    Args:
+        tree: the frames.
+        order: puts the frames on one parent in order.
+    """
+    below: dict[str, list[str]] = {}
+    for name, node in tree.nodes.items():
+        if not name.endswith(".BASE"):
+            above = node.parent
+            below.setdefault(tree.parent(above) or WORLD if above.endswith(".BASE") else above, []).append(name)
+    waiting = [(WORLD, 0)]
+    while waiting:
+        name, depth = waiting.pop()
+        yield name, depth
+        waiting += [(child, depth + 1) for child in reversed(order(below.get(name, ())))]
