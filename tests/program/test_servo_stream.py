@@ -114,6 +114,24 @@ def test_a_recovery_begins_when_all_arms_are_at_rest() -> None:
     assert (found := differences(recording)).keep(), found
 
 
+def test_a_failure_waits_for_an_arm_that_still_brakes() -> None:
+    """While an arm brakes after an error that its branch recovers, another branch fails: the run ends at rest."""
+    text = TWO_ARMS.format(TRY="", RECOVER="")
+    text = text.replace("BEGIN MOVE ARM_1 TO g1", "BEGIN TRY MOVE ARM_1 TO g1").replace(
+        "/ n END", "/ n RECOVER PAUSE 1 END END"
+    )
+    text = text.replace("MOVE ARM_2 TO f2 WITH SPEED = 10", "WHILE DIST(ARM_1, g1) > 0.27 DO PAUSE 0.001 ; n = 1 / n")
+    recording, failed = recorded(text, read_cell(EXAMPLES / "two_arms.toml"))
+
+    assert failed is not None
+    braked = recording.stages[-1]
+    assert (braked.arm, braked.stopped) == ("ARM_1", True)
+    assert recording.failure is not None
+    assert braked.t0 < recording.failure.time < braked.t1 - 0.1
+    assert braked.t1 == pytest.approx(recording.duration)
+    assert (found := differences(recording)).keep(), found
+
+
 def cells(folder: Path) -> tuple[Cell, list[Cell]]:
     """Return a cell of two arms and some of one, all above a plane of contact."""
     two = attrs.evolve(read_cell(EXAMPLES / "two_arms.toml"), contact=ContactPlane(height=0.02), deviation=0.01)

@@ -1,5 +1,6 @@
 """Jumps, procedures, processes, events, locks, attempts, and the end of a program."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 from armwright.program.bytecode.instructions import Instruction, JumpTarget, Op
@@ -219,7 +220,8 @@ def rest(machine: Machine, span: Span) -> list[str]:
     """
     for process in machine.state.processes:
         give_up(machine, process)
-    machine.state.ticks = max(_still(machine, process, span) for process in machine.state.processes)
+    ends = [_still(machine, process, span) for process in machine.state.processes]
+    machine.state.ticks = max([*ends, *(_rest_of(machine, arm) for arm in machine.state.runs)])
     not_at_rest = sorted(machine.hardware.running())
     for device in not_at_rest:
         machine.hardware.operate(device, on=False)
@@ -228,9 +230,9 @@ def rest(machine: Machine, span: Span) -> list[str]:
 
 
 def _still(machine: Machine, process: Process, span: Span) -> int:
-    """Give up the motion of a process, if it makes one; return when its arm is at rest."""
+    """Give up the motion of a process, if it makes one; return when its arm is at rest [ticks]."""
     if process.motion is None:
-        return machine.state.ticks
+        return _rest_of(machine, process.last_arm)
     motion, end = process.motion, stop(machine, process, span)
     note_contact(machine, motion, end)
     words, contact = contact_of(motion)
@@ -240,6 +242,13 @@ def _still(machine: Machine, process: Process, span: Span) -> int:
     data = {**motion.data, **contact}
     machine.effect(process, "MOVE", motion.trace, motion.span, since=since, until=end, arm=arm, data=data)
     return end
+
+
+def _rest_of(machine: Machine, arm: str | None) -> int:
+    """Return when an arm is at rest that nobody moves [ticks]: it may still brake after an error that was recovered."""
+    runs = machine.state.runs.get(arm, ()) if arm is not None and machine.mover(arm) is None else ()
+    end = math.ceil((runs[-1].t0 + runs[-1].duration) / machine.cell.period - _ROUNDING) if runs else 0
+    return max(end, machine.state.ticks)
 
 
 def finish(machine: Machine, process: Process, span: Span, word: str) -> None:
