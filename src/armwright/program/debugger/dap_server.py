@@ -173,15 +173,15 @@ class Adapter:
     def _step(self, command: str, arguments: Arguments) -> Mapping[str, Any]:
         session = self._session
         if command in {"continue", "reverseContinue"}:
-            session.go("continue" if command == "continue" else "reverse", ())
+            session.go(_STEPS[command], ())
             return {"allThreadsContinued": True}
-        wanted: Command = _STEPS[command]
+        step: Command = _STEPS[command]
         granularity = arguments.text("granularity", "statement")
         if granularity not in {"statement", "line", "instruction"}:
             raise RequestError(f"granularity: expected statement, line or instruction, got {granularity!r}")
         if granularity == "instruction":
-            wanted = "tick back" if command == "stepBack" else "tick"
-        session.go(wanted, session.process(arguments.whole("threadId", 1)))
+            step = "tick back" if command == "stepBack" else "tick"
+        session.go(step, session.process(arguments.whole("threadId", 1)))
         return {}
 
     def _pause(self, _: Arguments) -> None:

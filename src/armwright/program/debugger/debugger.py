@@ -11,18 +11,10 @@ import numpy as np
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
 from armwright.program.bytecode.instructions import Code
-from armwright.program.debugger import variables
+from armwright.program.debugger import expressions, variables
 from armwright.program.debugger.breakpoints import Breakpoint, CountError, Watch, counts
 from armwright.program.debugger.execution import Execution, Position, RunToStop
-from armwright.program.debugger.expressions import (
-    ExpressionError,
-    compute,
-    condition,
-    names_at,
-    parse,
-    slot_of,
-    value_for,
-)
+from armwright.program.debugger.expressions import ExpressionError, names_at
 from armwright.program.debugger.history import Path
 from armwright.program.debugger.snapshot import Frame, mover, process_of, stack
 from armwright.program.debugger.step_rules import step_of
@@ -243,7 +235,7 @@ class Debugger:
         if hits:
             counts(hits, 1)
         if text:
-            condition(text, names_at(self.machine, procedure), self.code)
+            expressions.condition(text, names_at(self.machine, procedure), self.code)
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 
@@ -299,13 +291,13 @@ class Debugger:
         types = names_at(view, frame.procedure)
         if text.strip().upper() == "FRAMES" and "FRAMES" not in types:
             return Variable(name="frames", value="\n".join(variables.frames_text(view)))
-        parsed = parse(text, types, self.code)
+        parsed = expressions.parse(text, types, self.code)
         process = self._process(path)
-        slot = slot_of(view, process, frame, parsed)
+        slot = expressions.slot_of(view, process, frame, parsed)
         if slot is not None:
             return attrs.evolve(variables.variable(view, slot, name=text), expression=text)
         kind = "" if parsed.sort is None else parsed.sort.word
-        return variables.result(view, text, compute(view, process, frame, parsed), kind)
+        return variables.result(view, text, expressions.compute(view, process, frame, parsed), kind)
 
     def assign(self, slot: str, text: str, path: Path = (), level: int = 0) -> Variable:
         """Give a variable or a frame another value; the run goes on with it.
@@ -328,7 +320,7 @@ class Debugger:
         moving = mover(view, slot) if kind.kind is VariableKind.FRAME else None
         if moving is not None and not is_arm(slot):
             raise ExpressionError(f"`{view.spelled(slot)}` is being moved; it can be placed when the MOVE is over")
-        value = value_for(view, self._process(path), frame, text, kind.kind)
+        value = expressions.value_for(view, self._process(path), frame, text, kind.kind)
 
         def change(machine: Machine) -> None:
             assert not isinstance(value, Element)  # noqa: S101 - elements have been read

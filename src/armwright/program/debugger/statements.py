@@ -50,10 +50,6 @@ class Statements:
             return Start(index=index, span=step.span, line=self._code.line(step))
         return start
 
-    def begins(self, index: int) -> bool:
-        """Whether a statement begins with an instruction."""
-        return self._code.instructions[index].begins
-
     def procedure(self, index: int) -> str | None:
         """Return the procedure that an instruction stands in; None for the main program."""
         at = bisect_right(self._procedures, index, key=lambda procedure: procedure[0]) - 1

@@ -232,9 +232,8 @@ def _motion(machine: Machine, arm: str) -> str:
 def _run(machine: Machine, process: Process) -> Iterable[Variable]:
     yield Variable(name="clock", value=f"{machine.now:.6g} s")
     yield Variable(name="servo tick", value=str(machine.state.ticks))
-    yield Variable(
-        name="devices on", value=", ".join(map(machine.spelled, sorted(machine.hardware.running()))) or "none"
-    )
+    devices = ", ".join(map(machine.spelled, sorted(machine.hardware.running())))
+    yield Variable(name="devices on", value=devices or "none")
     yield Variable(name="arm used last", value=process.last_arm or "none")
     yield Variable(name="priority", value=f"{process.priority:g}")
     if process.locks:

@@ -266,11 +266,10 @@ class _Maker:
             where = "predeclared" if declared is None and key in PREDECLARED else "imported" if declared is None else ""
             where = f"of {local.node.name.text}" if local is not None and key in own else where
             text = f"{name}[${{1:1}}]" if kind.sizes else name
-            yield self._offer(
-                name, _KINDS.get(kind.kind, Kind.Variable), text, f"{kind} {where}".rstrip(), self._place(key, kind)
-            )
+            item, detail = _KINDS.get(kind.kind, Kind.Variable), f"{kind} {where}".rstrip()
+            yield self._offer(name, item, text, detail, self._parent(key, kind))
 
-    def _place(self, key: str, kind: VariableType) -> str:
+    def _parent(self, key: str, kind: VariableType) -> str:
         frames = self._analysis.frames
         if kind != VariableType(VariableKind.FRAME) or frames is None or key not in frames or self.scope.is_local(key):
             return ""

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from lsprotocol import types as lsp
+from pygls.uris import to_fs_path
 
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
@@ -33,11 +34,11 @@ class Document:
         last: the analysis of the text, or of one before; None before the first.
     """
 
-    def __init__(
-        self, uri: str, path: Path | None, codec: PositionCodec, version: int | None, analyse: "Analyse"
-    ) -> None:
+    def __init__(self, uri: str, codec: PositionCodec, version: int | None, analyse: "Analyse") -> None:
         """Take up a text; it is analysed when somebody asks, or soon."""
-        self.uri, self.path, self.codec, self.version = uri, path, codec, version
+        self.uri, self.codec, self.version = uri, codec, version
+        path = to_fs_path(uri) if uri.startswith("file:") else None
+        self.path = None if path is None else Path(path)
         self.last: Analysis | None = None
         self._analyse = analyse
         self._timer: asyncio.TimerHandle | None = None

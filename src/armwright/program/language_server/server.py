@@ -218,11 +218,10 @@ def _conversation(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
     async def did_open(params: lsp.DidOpenTextDocumentParams) -> None:
         item = params.text_document
-        path = to_fs_path(item.uri) if item.uri.startswith("file:") else None
         if (before := server.documents.get(item.uri)) is not None:
             before.close()
-        file, codec = None if path is None else Path(path), PositionCodec(item.text, server.encoding)
-        server.documents[item.uri] = Document(item.uri, file, codec, item.version, server.analyse)
+        codec = PositionCodec(item.text, server.encoding)
+        server.documents[item.uri] = Document(item.uri, codec, item.version, server.analyse)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
     def did_change(params: lsp.DidChangeTextDocumentParams) -> None:

@@ -14,7 +14,7 @@ from armwright.program.language.source import Source, Span
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.vm.interpreter import advance, due, warnings
 from armwright.program.vm.machine import Limits, Machine
-from armwright.program.vm.process import Activation, Process
+from armwright.program.vm.process import Process
 
 
 def fresh(cell: Cell, source: Source, limits: Limits) -> Machine:
@@ -36,9 +36,7 @@ def with_code(machine: Machine, code: Code, limits: Limits) -> Machine:
     for name, kind in code.types.items():
         if kind == VariableType(VariableKind.FRAME):
             state.tree = state.tree.declare(name)
-    state.program = Process(
-        path=(), priority=0.0, at=0, wake=state.ticks, stack=[Activation(kind="main")], last_arm=state.program.last_arm
-    )
+    state.program = Process(wake=state.ticks, last_arm=state.program.last_arm)
     state.processes = [state.program]
     until = attrs.evolve(limits, time=machine.now + limits.time)
     return Machine(code, copied.cell, copied.hardware, until, state)

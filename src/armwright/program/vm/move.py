@@ -61,8 +61,6 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
         speed=request.speed,
         depth=len(process.stack),
         begun=machine.starts(),
-        since=machine.state.ticks,
-        until=machine.state.ticks,
         guards=request.guards,
     )
     _start(machine, process, process.motion)

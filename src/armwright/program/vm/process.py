@@ -164,9 +164,9 @@ class Motion:
     speed: float
     depth: int
     begun: Start
-    since: int
-    until: int
     guards: list[Guard]
+    since: int = 0
+    until: int = 0
     hands: Array = attrs.field(factory=lambda: np.empty((0, 4, 4)))
     record: int = -1
     rest: int | None = None
@@ -252,11 +252,11 @@ class Process:
         done: whether it has ended.
     """
 
-    path: tuple[int, ...]
-    priority: float
-    at: int
-    wake: int
-    stack: list[Activation]
+    path: tuple[int, ...] = ()
+    priority: float = 0.0
+    at: int = 0
+    wake: int = 0
+    stack: list[Activation] = attrs.field(factory=lambda: [Activation(kind="main")])
     parent: "Process | None" = None
     waiting: Waiting | None = None
     unmet: Waiting | None = None

@@ -10,7 +10,7 @@ from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
-from armwright.program.vm.process import Activation, Process
+from armwright.program.vm.process import Process
 from armwright.program.vm.recording import Effect, Push, Run, RunStage
 
 
@@ -82,7 +82,7 @@ class MachineState:
         for name, kind in code.types.items():
             if kind == VariableType(VariableKind.FRAME):
                 tree = tree.declare(name)
-        program = Process(path=(), priority=0.0, at=0, wake=0, stack=[Activation(kind="main")])
+        program = Process()
         return cls(
             types=dict(code.types),
             tree=tree,
