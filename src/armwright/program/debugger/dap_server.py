@@ -94,7 +94,7 @@ class Adapter:
         if message is None:
             self._connected = False
         elif isinstance(message, Noise):
-            self._answer(0, "", success=False, text=message.text)
+            self._refuse(0, "", message.text)
         else:
             self._handle(message)
 
@@ -113,16 +113,16 @@ class Adapter:
         sequence, command = message.get("seq"), message.get("command")
         number = sequence if isinstance(sequence, int) else 0
         if not isinstance(command, str):
-            self._answer(number, "", success=False, text="a request without a command")
+            self._refuse(number, "", "a request without a command")
             return
         try:
             body = self._body(command, message.get("arguments"))
         except ArmwrightError as error:
-            self._answer(number, command, success=False, text=str(error))
+            self._refuse(number, command, str(error))
         except Exception as error:  # noqa: BLE001 - a slip of ours must not take the session with it
-            self._answer(number, command, success=False, text=f"{type(error).__name__} in the debugger: {error}")
+            self._refuse(number, command, f"{type(error).__name__} in the debugger: {error}")
         else:
-            self._answer(number, command, body=body)
+            self._answer(number, command, body)
         after, self._after = self._after, []
         for event in after:
             event()
@@ -199,15 +199,14 @@ class Adapter:
 
     # ---- answers and events ----------------------------------------------------------------------------------------
 
-    def _answer(
-        self, number: int, command: str, *, success: bool = True, text: str = "", body: Mapping[str, Any] | None = None
-    ) -> None:
-        answer: dict[str, Any] = {"request_seq": number, "command": command, "success": success}
-        if body is not None:
-            answer["body"] = body
-        if not success:
-            answer |= {"message": text, "body": {"error": {"id": 1, "format": _unformatted(text), "showUser": True}}}
-        self._send("response", answer)
+    def _answer(self, number: int, command: str, body: Mapping[str, Any] | None) -> None:
+        answer = {"request_seq": number, "command": command, "success": True}
+        self._send("response", answer if body is None else {**answer, "body": body})
+
+    def _refuse(self, number: int, command: str, text: str) -> None:
+        answer = {"request_seq": number, "command": command, "success": False, "message": text}
+        error = {"id": 1, "format": _unformatted(text), "showUser": True}
+        self._send("response", {**answer, "body": {"error": error}})
 
     def _event(self, event: str, body: Mapping[str, Any]) -> None:
         self._send("event", {"event": event, "body": body})

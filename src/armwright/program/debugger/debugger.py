@@ -144,8 +144,7 @@ class Debugger:
             self._active.close()
             if self._origin is not None:
                 self.execution.land(self._origin, passed=True)
-            process = self.execution.timeline.ready
-            self._arrive(Stop(reason="pause", path=() if process is None else process.path))
+            self._arrive(Stop(reason="pause", path=self.execution.next_process))
         assert self.stop is not None  # noqa: S101 - it stands still
         return self.stop
 

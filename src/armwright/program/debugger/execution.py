@@ -132,7 +132,7 @@ class Execution:
                 self.ticks += 1
                 stop = self._changed(None)
                 if stop is not None or tick:
-                    return stop or Stop(reason="step", path=self._present)
+                    return stop or Stop(reason="step", path=self.next_process)
                 yield
             else:
                 last = wake if until is None or until[0] > self.timeline.done else min(wake, until[1])
@@ -140,7 +140,7 @@ class Execution:
         return None
 
     @property
-    def _present(self) -> Path:
+    def next_process(self) -> Path:
         """The process that comes next."""
         process = self.timeline.ready
         return () if process is None else process.path
@@ -247,7 +247,7 @@ class Execution:
         if not numbers:
             return None
         present = process_of(self.machine, path) if path is not None else None
-        shown = self._present if present is None or path is None else path
+        shown = self.next_process if present is None or path is None else path
         return Stop(reason="data breakpoint", path=shown, text="; ".join(texts), numbers=tuple(numbers))
 
     def _stops_for(self, watch: Watch) -> bool:

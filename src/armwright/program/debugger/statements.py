@@ -35,10 +35,10 @@ class Statements:
         self._code = code
         self._begins = [index for index, step in enumerate(code.instructions) if step.begins]
         self._procedures = sorted((procedure.start, name) for name, procedure in code.procedures.items())
-        self.starts = tuple(self._starts())
-        self._by_index = {start.index: start for start in self.starts}
+        starts = tuple(self._starts())
+        self._by_index = {start.index: start for start in starts}
         # A line is entered by the first statement in it; a FOR has a second beginning for each further pass.
-        self._by_place = sorted(self.starts, key=lambda start: (start.line, start.span.start, start.index))
+        self._by_place = sorted(starts, key=lambda start: (start.line, start.span.start, start.index))
 
     def at(self, index: int) -> Start:
         """Return the statement that an instruction belongs to; behind the last one, the last."""
