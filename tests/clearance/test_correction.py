@@ -11,17 +11,17 @@ from armwright.clearance.correction import (
     contact_forces,
     correct_nodes,
     correct_path,
-    leaning_error,
     lost_contacts,
     shifted,
     tip_at,
     tip_errors,
 )
+from armwright.clearance.ideal import sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path, PickAndPlace, named_path, straight
 from armwright.clearance.predictability import perturbed
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import InvalidValueError, ShapeError
@@ -200,6 +200,13 @@ def test_forces_of_the_ideal_arm() -> None:
     np.testing.assert_allclose(forces[:, 0, 1] + forces[:, 2, 1], -(1.6 * 9.81 + 0.98), rtol=0.01)
 
 
+def leaning_error(task: Scenario, clearances: Array) -> Array:
+    """Return (..., s, 2) errors of the tip while every journal is on its wall along the force without play [m]."""
+    q, force = (x[:: task.stride] for x in (task.ideal.q, task.ideal.reactions))
+    direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
+    return np.einsum("sapb,spb,...p->...sa", sensitivity(task.linkage, q), direction, clearances)
+
+
 def test_leaning_tip() -> None:
     """Where contact lasts and nothing rubs, the error needs no simulation: 10 µm of 0.95 mm are its whole error.
 
@@ -207,7 +214,7 @@ def test_leaning_tip() -> None:
     """
     path, play = straight("slow", (-0.15, -0.7), (-0.15, -0.697), speed=0.02, ramp=0.1), np.full(3, 0.5e-3)
     run = simulate(prepare(linkage(), path, COARSE), play, frictions=0.0)
-    _, predicted = leaning_error(linkage(), path, play, samples=len(run.time))
+    predicted = leaning_error(run.scenario, play)
 
     assert run.depths.min() > -1e-6
     early = run.time <= 0.1
@@ -218,7 +225,7 @@ def test_leaning_tip() -> None:
 def test_leaning_grows_with_play() -> None:
     """Twice the play is twice the leaning, and the errors of the pins add up."""
     clearances = np.array([ARM_A, 2 * ARM_A, *(ARM_A * np.eye(3))])
-    _, predicted = leaning_error(linkage(), named_path("x2"), clearances, samples=31)
+    predicted = leaning_error(prepare(linkage(), named_path("x2"), COARSE), clearances)
 
     np.testing.assert_allclose(predicted[1], 2 * predicted[0], rtol=1e-12)
     np.testing.assert_allclose(predicted[2:].sum(axis=0), predicted[0], rtol=1e-9, atol=1e-15)

@@ -9,17 +9,7 @@ import pytest
 from hypothesis import assume, given, strategies as st
 
 from armwright.clearance import ideal
-from armwright.clearance.five_bar import (
-    ASSEMBLIES,
-    MODES,
-    FiveBar,
-    accelerations,
-    arm_angles,
-    forward,
-    inverse,
-    inverse_all,
-    speeds,
-)
+from armwright.clearance.five_bar import MODES, FiveBar, arm_angles, inverse, inverse_all
 from armwright.clearance.five_bar_parts import configuration
 from armwright.clearance.five_bar_workspace import (
     boundary_distance,
@@ -35,6 +25,7 @@ from armwright.clearance.placement import Vec2
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
+from clearance.five_bar_motion import ASSEMBLIES, accelerations, forward, speeds
 
 # Sums of a few lengths near 1, and angles of them [m, rad].
 ROUNDING = 1e-12
@@ -74,10 +65,8 @@ CRANKS = st.tuples(st.floats(-np.pi, np.pi), st.floats(-np.pi, np.pi))
 
 def well_posed(bar: FiveBar, cranks: Sequence[float], assembly: Any = "below") -> tuple[np.ndarray, np.ndarray]:
     """Return tip and angles, and drop what lies near a singularity."""
-    try:
-        tip, angles = forward(bar, cranks, assembly)
-    except InvalidValueError:
-        assume(False)
+    tip, angles = forward(bar, cranks, assembly)
+    assume(bool(np.isfinite(tip).all()))
     near = singularity(angles)
     assume(min(*np.abs(near.serial), abs(near.parallel)) > WELL)
     return tip, angles
@@ -295,12 +284,8 @@ def test_condition_grows_without_bound(bar: FiveBar) -> None:
     assert near / far == pytest.approx(2.0, rel=1e-2)
 
 
-def test_singular_rows_are_refused(bar: FiveBar) -> None:
-    """Speeds of a stretched arm and the Jacobian of rods in line are refused, with the row and the side."""
-    stretched = inverse(bar, [[0.0, -0.6], bar.motors[1] + 0.95 * DOWN_LEFT])
-    with pytest.raises(InvalidValueError, match="angles 1: the right arm is stretched or folded"):
-        speeds(bar, stretched, [0.0, 1.0])
-
+def test_rods_in_line_are_refused(bar: FiveBar) -> None:
+    """The Jacobian of rods in line is refused."""
     theta = np.arcsin(1 / 3)
     with pytest.raises(InvalidValueError, match="the rods are in one line"):
         jacobian(bar, [theta, 0.4, 0.4, -theta])
@@ -422,26 +407,10 @@ def test_on_a_motor() -> None:
         inverse(FiveBar.symmetric(0.1, 0.4, 0.4), [-0.1, 0.0])
 
 
-def test_rods_that_do_not_meet() -> None:
-    """Elbows too far apart for the rods are refused with the distances."""
-    bar = FiveBar.symmetric(0.5, 0.3, 0.6)
-    with pytest.raises(InvalidValueError, match=r"cranks 1: .* 1600 mm apart, 400 mm too far"):
-        forward(bar, [[0.3, -0.3], [-np.pi / 2, np.pi / 2]])
-
-
-def test_elbows_that_fall_together(bar: FiveBar) -> None:
-    """Where both elbows coincide equal rods may have any angle, and the message says so."""
-    theta = np.arcsin(1 / 3)
-    with pytest.raises(InvalidValueError, match="the elbows coincide"):
-        forward(bar, [theta, -theta])
-
-
 def test_names_and_shapes(bar: FiveBar) -> None:
     """A slip in a name is answered with the nearest; numbers in the wrong shape with the right one."""
     with pytest.raises(UnknownNameError, match="Did you mean 'right'"):
         inverse(bar, [0.0, -0.6], "rigth")  # type: ignore[arg-type]
-    with pytest.raises(UnknownNameError, match="Did you mean 'above'"):
-        forward(bar, [0.0, 0.0], "abov")  # type: ignore[arg-type]
     with pytest.raises(ShapeError, match="two numbers on the last axis"):
         inverse(bar, [0.0, 0.0, 0.0])
     with pytest.raises(ShapeError, match="θ1 to θ4"):

@@ -109,12 +109,6 @@ def deepest(mass: float, stiffness: float, speed: float, chi: float) -> float:
     return float((2.5 * mass * speed**2 / stiffness * part) ** 0.4)
 
 
-def impact_time(mass: float, stiffness: float, speed: float) -> float:
-    """Return the duration of an impact without loss [s]: 2.94328 δ_max / v0; see ``deepest`` for the arguments."""
-    factor = 2 * math.sqrt(math.pi) * math.gamma(0.4) / (2.5 * math.gamma(0.9))
-    return factor * deepest(mass, stiffness, speed, 0.0) / speed
-
-
 def stiffness(clearance: ArrayLike, journal_radius: float, young: float, poisson: float) -> Array:
     """Return K of a journal in a bearing of one material [N/m^1.5].
 

@@ -18,7 +18,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.clearance.ideal import ideal_motion, sensitivity
+from armwright.clearance.ideal import ideal_motion
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path, PickAndPlace, hermite
 from armwright.clearance.predictability import perturbed
@@ -150,8 +150,11 @@ def contact_forces(linkage: Linkage, path: Path, samples: int = 201) -> tuple[Ar
 
     Where a force is small or reverses its direction, the journal leaves its wall: see ``lost_contacts``.
     """
-    times, _, forces = _reactions_along(linkage, path, samples)
-    return times, forces
+    times = np.linspace(0.0, path.duration, samples)
+    state = path.evaluate(times)
+    by_tip = path.follower == "tip"
+    q = closed_along(linkage, state.position, assembly_guess(linkage), by_tip=by_tip)
+    return times, ideal_motion(linkage, q, state.velocity, state.acceleration, by_tip=by_tip).reactions
 
 
 def lost_contacts(
@@ -178,33 +181,7 @@ def lost_contacts(
     return intervals
 
 
-def leaning_error(linkage: Linkage, path: Path, clearances: ArrayLike, samples: int = 201) -> tuple[Array, Array]:
-    """Return times (s,) and the error (..., s, 2) of the tip while all journals stay on their walls [m].
-
-    Every journal is displaced in the direction of the force without clearance: no simulation is needed.
-
-    Args:
-        linkage: with p pins.
-        path: for its tip.
-        clearances: (..., p) [m].
-        samples: number of times.
-    """
-    times, q, force = _reactions_along(linkage, path, samples)
-    direction = force / np.maximum(np.linalg.norm(force, axis=-1, keepdims=True), 1e-12)
-    B = np.einsum("sapb,spb->sap", sensitivity(linkage, q), direction)
-    return times, np.asarray(np.einsum("sap,...p->...sa", B, floats(clearances, "clearances")), dtype=np.float64)
-
-
 # ---- inside --------------------------------------------------------------------------------------------------------
-
-
-def _reactions_along(linkage: Linkage, path: Path, samples: int) -> tuple[Array, Array, Array]:
-    """Return times (s,), closed coordinates (s, n) and reactions (s, p, 2) on a path without clearance [N]."""
-    times = np.linspace(0.0, path.duration, samples)
-    state = path.evaluate(times)
-    by_tip = path.follower == "tip"
-    q = closed_along(linkage, state.position, assembly_guess(linkage), by_tip=by_tip)
-    return times, q, ideal_motion(linkage, q, state.velocity, state.acceleration, by_tip=by_tip).reactions
 
 
 def _corrected(  # noqa: PLR0917 - the inputs that both kinds of correction share

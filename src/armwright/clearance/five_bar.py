@@ -1,4 +1,4 @@
-"""The five-bar without clearance in closed form: the angles of its links for a position of its tip, and vice versa.
+"""The five-bar without clearance in closed form: the angles of its links for a position of its tip.
 
 Two motors drive two cranks; a rod is attached to each, and a pin, the tip, joins the rods. As in the thesis the links
 are numbered from left to right, crank 1, rod 2, rod 3, crank 4; their angles are measured from the downward vertical,
@@ -21,25 +21,17 @@ from armwright.clearance.five_bar_parts import parts_of
 from armwright.clearance.linkage import Linkage, not_negative
 from armwright.clearance.placement import Vec2
 from armwright.errors import InvalidValueError, ShapeError, one_of
-from armwright.tracing.scalar import Scalar, atan2, cos, sin, sqrt
+from armwright.tracing.scalar import Scalar, atan2, sqrt
 
 # The sides of the elbows, with the tip below the motors: both outside, as in the thesis, or both inside, or both to one
 # side. It never changes while no arm is stretched or folded.
 Mode: TypeAlias = Literal["out", "left", "right", "in"]
-# The side of the tip, relative to the line from the left elbow to the right elbow.
-Assembly: TypeAlias = Literal["below", "above"]
 
 # Signs of sin(θ2 - θ1) and sin(θ3 - θ4).
-MODES: Mapping[Mode, tuple[float, float]] = {
-    "out": (1.0, -1.0),
-    "left": (1.0, 1.0),
-    "right": (-1.0, -1.0),
-    "in": (-1.0, 1.0),
-}
-ASSEMBLIES: Mapping[Assembly, float] = {"below": -1.0, "above": 1.0}
+MODES: Mapping[Mode, tuple[float, float]] = {"out": (1, -1), "left": (1, 1), "right": (-1, -1), "in": (-1, 1)}
 SIDES = ("left", "right")
-# A position so little out of reach is in reach but for rounding [m]; on the border rounding bends an elbow so little.
-_ROUNDING, _STRAIGHT = 1e-12, 1e-7
+# A position so little out of reach is in reach but for rounding [m].
+_ROUNDING = 1e-12
 
 
 def _lengths(value: ArrayLike) -> Array:
@@ -114,11 +106,6 @@ class ArmAngles(NamedTuple):
     rod: Scalar
 
 
-def direction(angle: Scalar) -> Vec2:
-    """Return u = (sin θ, -cos θ), along which a link points."""
-    return Vec2(sin(angle), -cos(angle))
-
-
 def arm_angles(reach: Vec2, crank: Scalar, rod: Scalar, sign: Scalar) -> ArmAngles:
     """Return the angles of an arm of two links that reaches from its motor to a point.
 
@@ -134,45 +121,6 @@ def arm_angles(reach: Vec2, crank: Scalar, rod: Scalar, sign: Scalar) -> ArmAngl
     elbow = reach.times(along).plus(reach.perpendicular().times(across))
     rod_vector = reach.minus(elbow)
     return ArmAngles(atan2(elbow.x, -elbow.y), atan2(rod_vector.x, -rod_vector.y))
-
-
-def rod_intersection(elbows: tuple[Vec2, Vec2], rods: tuple[Scalar, Scalar], sign: Scalar) -> Vec2:
-    """Return the point at which two rods meet.
-
-    Args:
-        elbows: left and right starts of the rods [m].
-        rods: their lengths [m].
-        sign: -1 for the point below the line from the left elbow to the right elbow, or 1.
-    """
-    base = elbows[1].minus(elbows[0])
-    square = base.dot(base)
-    along = 0.5 * ((rods[0] * rods[0] - rods[1] * rods[1]) / square + 1.0)
-    across = sign * sqrt(rods[0] * rods[0] / square - along * along)
-    return elbows[0].plus(base.times(along)).plus(base.perpendicular().times(across))
-
-
-def arm_rates(angles: ArmAngles, crank: Scalar, rod: Scalar, target: Vec2) -> ArmAngles:
-    """Return the rates ω of an arm for which crank ω1 u1' + rod ω2 u2' is a target, with u' = (cos θ, sin θ).
-
-    Args:
-        angles: of the arm [rad].
-        crank: length [m].
-        rod: length [m].
-        target: velocity of the tip [m/s]; or its acceleration without the centripetal part [m/s²].
-
-    Source:
-        Thesis eq. (3.11), (3.12): two systems of two equations, with determinant crank · rod · sin(θ2 - θ1).
-    """
-    sine = sin(angles.rod - angles.crank)
-    along_rod, along_crank = direction(angles.rod), direction(angles.crank)
-    return ArmAngles(along_rod.dot(target) / (crank * sine), -along_crank.dot(target) / (rod * sine))
-
-
-def centripetal(angles: ArmAngles, rates: ArmAngles, crank: Scalar, rod: Scalar) -> Vec2:
-    """Return the acceleration of the tip of an arm at constant rates [m/s²]; arguments as of ``arm_rates``."""
-    parts = (direction(angles.crank).times(crank * rates.crank * rates.crank),
-             direction(angles.rod).times(rod * rates.rod * rates.rod))  # fmt: skip
-    return parts[0].plus(parts[1]).times(-1.0)
 
 
 # ---- for batches ---------------------------------------------------------------------------------------------------
@@ -212,81 +160,11 @@ def inverse_all(bar: FiveBar, tip: ArrayLike) -> dict[Mode, Array]:
     return {mode: inverse(bar, tip, mode) for mode in MODES}
 
 
-def forward(bar: FiveBar, cranks: ArrayLike, assembly: Assembly = "below") -> tuple[Array, Array]:
-    """Return the position of the tip and the angles of all links for angles of the cranks.
-
-    Args:
-        bar: the five-bar.
-        cranks: (..., 2) angles θ1, θ4 [rad].
-        assembly: side of the tip, relative to the line through the elbows.
-
-    Returns:
-        (..., 2) positions of the tip [m], and (..., 4) angles θ1 to θ4 [rad].
-
-    Raises:
-        InvalidValueError: the rods do not meet: the elbows are too far from each other, or too near; or they
-            coincide, and equal rods may have any angle.
-        UnknownNameError: there is no such assembly.
-    """
-    sign = ASSEMBLIES[one_of("assembly", assembly, ASSEMBLIES)]  # type: ignore[index]
-    theta = point_array(cranks, "cranks")
-    points = elbows(bar, theta)
-    _check_meeting(bar, points)
-    ends = (_vector(points[..., 0, :]), _vector(points[..., 1, :]))
-    tip = rod_intersection(ends, (float(bar.rods[0]), float(bar.rods[1])), sign)
-    rods = [atan2(tip.x - elbow.x, elbow.y - tip.y) for elbow in ends]
-    return np.stack(tip, axis=-1), np.stack([theta[..., 0], *rods, theta[..., 1]], axis=-1)
-
-
 def elbows(bar: FiveBar, cranks: ArrayLike) -> Array:
     """Return (..., 2, 2) positions of the left and the right elbow [m] for angles (..., 2) of the cranks [rad]."""
     theta = point_array(cranks, "cranks")
     directions = np.stack([np.sin(theta), -np.cos(theta)], axis=-1)
     return np.asarray(bar.motors + bar.cranks[:, None] * directions, dtype=np.float64)
-
-
-def speeds(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike) -> Array:
-    """Return (..., 4) speeds of the links [rad/s].
-
-    Args:
-        bar: the five-bar.
-        angles: (..., 4) of its links [rad].
-        velocity: (..., 2) of its tip [m/s].
-
-    Raises:
-        InvalidValueError: an arm is stretched or folded, so that its tip cannot move along it.
-
-    Source:
-        Thesis eq. (3.11).
-    """
-    theta, goal = link_angles(angles), _vector(point_array(velocity, "velocity"))
-    _check_bent(theta)
-    return _stacked([arm_rates(angle, crank, rod, goal) for angle, crank, rod in _arms(bar, theta)])
-
-
-def accelerations(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> Array:
-    """Return (..., 4) accelerations of the links [rad/s²].
-
-    Args:
-        bar: the five-bar.
-        angles: (..., 4) of its links [rad].
-        velocity: (..., 2) of its tip [m/s].
-        acceleration: (..., 2) of its tip [m/s²].
-
-    Raises:
-        InvalidValueError: an arm is stretched or folded.
-
-    Source:
-        Thesis eq. (3.12).
-    """
-    theta, goal = link_angles(angles), _vector(point_array(acceleration, "acceleration"))
-    rates = _arms(bar, speeds(bar, theta, velocity))
-    return _stacked(
-        [
-            arm_rates(angle, crank, rod, goal.minus(centripetal(angle, rate, crank, rod)))
-            for (angle, crank, rod), (rate, _, _) in zip(_arms(bar, theta), rates, strict=True)
-        ]
-    )
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
@@ -319,12 +197,6 @@ def link_angles(value: ArrayLike) -> Array:
 def _vector(points: Array) -> Vec2:
     """Return (..., 2) numbers as a vector of arrays, without axes for a single point."""
     return Vec2(np.asarray(points[..., 0]), np.asarray(points[..., 1]))
-
-
-def _arms(bar: FiveBar, links: Array) -> list[tuple[ArmAngles, float, float]]:
-    """Return for each arm the angles or rates of crank and rod, and their lengths."""
-    pairs = (ArmAngles(*(np.asarray(links[..., i]) for i in order)) for order in ((0, 1), (3, 2)))
-    return [(pair, float(crank), float(rod)) for pair, crank, rod in zip(pairs, bar.cranks, bar.rods, strict=True)]
 
 
 def _stacked(arms: list[ArmAngles]) -> Array:
@@ -365,39 +237,3 @@ def _point_text(points: Array, row: tuple[Any, ...]) -> str:
 
 def _index(row: tuple[Any, ...]) -> str:
     return f" {', '.join(str(int(i)) for i in row)}" if row else ""
-
-
-def _check_meeting(bar: FiveBar, points: Array) -> None:
-    """Refuse elbows between which the rods do not meet.
-
-    Raises:
-        InvalidValueError: there are some.
-    """
-    apart = np.linalg.norm(points[..., 1, :] - points[..., 0, :], axis=-1)
-    near, far = abs(float(bar.rods[0] - bar.rods[1])), float(bar.rods.sum())
-    out = np.maximum(apart - far, near - apart)
-    if np.any(out > _ROUNDING):
-        row = np.unravel_index(int(out.argmax()), out.shape)
-        word = "far" if apart[row] > far else "near"
-        raise InvalidValueError(
-            f"cranks{_index(row)}: the rods do not meet: the elbows are {apart[row] * 1e3:.6g} mm apart, "
-            f"{out[row] * 1e3:.4g} mm too {word}; the rods meet from {near * 1e3:g} to {far * 1e3:g} mm"
-        )
-    if np.any(apart < _ROUNDING):
-        row = tuple(np.argwhere(apart < _ROUNDING)[0])
-        raise InvalidValueError(f"cranks{_index(row)}: the elbows coincide: the rods may have any angle")
-
-
-def _check_bent(links: Array) -> None:
-    """Refuse arms that are stretched or folded.
-
-    Raises:
-        InvalidValueError: there is one.
-    """
-    sines = np.abs(np.sin(links[..., [1, 2]] - links[..., [0, 3]]))
-    if np.any(sines < _STRAIGHT):
-        *row, side = np.argwhere(sines < _STRAIGHT)[0]
-        raise InvalidValueError(
-            f"angles{_index(tuple(row))}: the {SIDES[int(side)]} arm is stretched or folded, a serial singularity: "
-            f"its tip cannot move along it"
-        )
