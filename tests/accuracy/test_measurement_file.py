@@ -311,10 +311,10 @@ MISTAKES = {
     ),
     "no direction": (f"{HEAD}multidirectional,P1,1,0,0\n", "2: direction: empty; a test of multidirectional has a dir"),
     "no robot": (f"{HEAD}exchangeability,P1,1,0,0\n", "2: robot: empty; a test of exchangeability has a robot in"),
-    "no time of drift": (f"{HEAD}drift,P1,1,0,0\n", "2: t_min: empty; a test of drift has the time of every row"),
+    "no time of drift": (f"{HEAD}drift,P1,1,0,0\n", "2: t: empty; a test of drift has the time of every row"),
     "no load": (
         "test,pose,direction,cycle,x_mm,y_mm\ncompliance,P1,+x,1,0,0\n",
-        "2: load_n: empty; a test of compliance has the load of every row",
+        "2: load: empty; a test of compliance has the load of every row",
     ),
     "three poses": (
         HEAD + "".join(f"distance,{p},{c},0,0\n" for p in "ABC" for c in ("commanded", 1)),

@@ -469,8 +469,8 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
             "1,2,3,4,5,1,a",
             "points.csv:1: name: no such column; to has names of rows; there are",
         ),
-        (f"{HEAD},plane", "1,2,,,,", "points.csv:2: the row tells no point, no plane and no distance"),
-        (f"{HEAD},frame", "1,2,3,4,5,", "points.csv:2: frame: empty; where one point tells its frame all do"),
+        (f"{HEAD},plane", "1,2,,,,", "points.csv:2: the row has no point, no plane and no distance"),
+        (f"{HEAD},frame", "1,2,3,4,5,", "points.csv:2: frame: empty; where one point has a frame all points have one"),
         (
             f"{HEAD},plane,roll_deg,pitch_deg,yaw_deg",
             "1,2,,,,t,1,2,3",
@@ -484,7 +484,7 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
         (
             f"{HEAD},distance_mm,anchor",
             "1,2,3,4,5,,w",
-            "empty; the row tells from where a distance is, and not how far",
+            "empty; the row has the start of a distance, and not its length",
         ),
         (f"{HEAD},distance_mm,anchor", "1,2,3,4,5,-7,w", "expected a distance, got -0.007 m"),
         (

@@ -130,11 +130,7 @@ class Assessment:
 
 
 def assess(
-    tests: Sequence[AnyTest],
-    *,
-    few: bool = False,
-    band: float | None = None,
-    corners: float = 0.0,
+    tests: Sequence[AnyTest], *, few: bool = False, band: float | None = None, corners: float = 0.0
 ) -> Assessment:
     """Return every measure that tests allow.
 

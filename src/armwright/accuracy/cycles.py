@@ -7,21 +7,9 @@ from typing import Literal, TypeAlias
 
 from armwright.errors import TooFewError
 
-Kind: TypeAlias = Literal[
-    "pose",
-    "multidirectional",
-    "distance",
-    "settling",
-    "posing",
-    "drift",
-    "exchangeability",
-    "path",
-    "reorientation",
-    "cornering",
-    "velocity",
-    "compliance",
-    "weaving",
-]
+PoseKind: TypeAlias = Literal["pose", "multidirectional", "distance", "drift", "exchangeability", "compliance"]
+PathKind: TypeAlias = Literal["settling", "posing", "path", "reorientation", "cornering", "velocity", "weaving"]
+Kind: TypeAlias = PoseKind | PathKind
 # Cycles that the standard asks for, by the name of the test.
 REQUIRED_CYCLES: dict[Kind, int] = {
     "pose": 30,
@@ -42,7 +30,7 @@ REQUIRED_CYCLES: dict[Kind, int] = {
 DIRECTIONS, ROBOTS, LOADS = 3, 5, 10
 
 
-def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int, what: str = "cycles") -> int:
+def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int) -> int:
     """Return the smallest number of cycles of a test, if it is enough.
 
     Args:
@@ -50,18 +38,11 @@ def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int, 
         counts: cycles of each of its parts, such as of every direction of approach.
         few: take fewer than the standard asks for.
         least: what no formula can do without.
-        what: how they are called in a message.
 
     Raises:
         TooFewError: there are fewer than ``least``, or than the standard asks for without ``few``.
     """
-    count = min(counts, default=0)
-    if count < least:
-        raise TooFewError(f"{kind}: needs {least} {what} at least, got {count}")
-    required = REQUIRED_CYCLES[kind]
-    if count < required and not few:
-        raise TooFewError(f"{kind}: ISO 9283 asks for {required} {what}, got {count}; few=True takes fewer")
-    return count
+    return _checked(kind, min(counts, default=0), REQUIRED_CYCLES[kind], few=few, least=least, what="cycles")
 
 
 def checked_parts(kind: Kind, count: int, required: int, *, few: bool, what: str) -> None:
@@ -70,7 +51,12 @@ def checked_parts(kind: Kind, count: int, required: int, *, few: bool, what: str
     Raises:
         TooFewError: there are fewer than two, or than the standard asks for without ``few``.
     """
-    if count < 2:
-        raise TooFewError(f"{kind}: needs 2 {what} at least, got {count}")
+    _checked(kind, count, required, few=few, least=2, what=what)
+
+
+def _checked(kind: Kind, count: int, required: int, *, few: bool, least: int, what: str) -> int:
+    if count < least:
+        raise TooFewError(f"{kind}: needs {least} {what} at least, got {count}")
     if count < required and not few:
         raise TooFewError(f"{kind}: ISO 9283 asks for {required} {what}, got {count}; few=True takes fewer")
+    return count

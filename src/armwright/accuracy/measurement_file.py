@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
 import attrs
 import numpy as np
 
-from armwright.accuracy.cycles import Kind
+from armwright.accuracy.cycles import Kind, PoseKind
 from armwright.accuracy.scales import angle_unit_question, length_unit_question
 from armwright.accuracy.table import Row, read_tables
 from armwright.accuracy.trace import Trace
@@ -18,13 +18,19 @@ from armwright.errors import InvalidValueError
 from armwright.files.limits import beyond, limit
 
 # Tests of which every row is one attained pose; of the others a cycle is a run of many rows.
-POSES: frozenset[Kind] = frozenset({"pose", "multidirectional", "distance", "drift", "exchangeability", "compliance"})
+POSES: frozenset[Kind] = frozenset(get_args(PoseKind))
 # Tests that need a commanded pose or path.
 _COMMANDED: frozenset[Kind] = frozenset(
     {"pose", "distance", "drift", "path", "reorientation", "cornering", "velocity", "weaving"}
 )
 # The column that distinguishes the parts of a test, where it is not the name of the pose.
 _LABELS: Mapping[Kind, str] = {"multidirectional": "direction", "compliance": "direction", "exchangeability": "robot"}
+# The columns without empty cells in a test, and what the test has in them.
+_NEEDED: Mapping[Kind, Mapping[str, str]] = {
+    **{kind: {label: f"a {label} in every row"} for kind, label in _LABELS.items()},
+    "drift": {"t": "the time of every row: t_s, t_min or t_h"},
+    "compliance": {"direction": "a direction in every row", "load": "the load of every row: load_n or load_kn"},
+}
 _TIMED: frozenset[Kind] = frozenset({"settling", "posing", "velocity", "weaving"})
 
 
@@ -109,10 +115,7 @@ AnyTest: TypeAlias = PoseTest | PathTest
 
 
 def read_measurements(
-    paths: Path | str | Sequence[Path | str],
-    *,
-    columns: Mapping[str, str] | None = None,
-    skip_incomplete: bool = False,
+    paths: Path | str | Sequence[Path | str], *, columns: Mapping[str, str] | None = None, skip_incomplete: bool = False
 ) -> tuple[AnyTest, ...]:
     """Read the tests of one file or of several that belong together.
 
@@ -136,7 +139,7 @@ def read_measurements(
         for row in table.rows():
             # A distance takes two poses.
             name = "" if row.test == "distance" else row.name
-            groups.setdefault((row.test, name, row.condition), []).append(row)
+            groups.setdefault((row.test, name, row.word("condition")), []).append(row)
     _refuse_many(groups)
     return tuple(_pose_test(rows) if rows[0].test in POSES else _path_test(rows) for rows in groups.values())
 
@@ -179,7 +182,7 @@ def _pose_test(rows: list[Row]) -> PoseTest:
     return PoseTest(
         kind=first.test,
         name=" to ".join(names),
-        condition=first.condition,
+        condition=first.word("condition"),
         clouds=parts,
         angle_names=first.angle_names,
     )
@@ -187,23 +190,19 @@ def _pose_test(rows: list[Row]) -> PoseTest:
 
 def _part(row: Row) -> tuple[str, float | None]:
     """Return the part of its test to which a row belongs: a direction, a robot or a pose, and for drift a time."""
-    return getattr(row, _LABELS.get(row.test, "name")), row.t if row.test == "drift" else None
+    label = row.word(_LABELS[row.test]) if row.test in _LABELS else row.name
+    return label, row.number("t") if row.test == "drift" else None
 
 
 def _refuse_incomplete(row: Row) -> None:
-    needed = _LABELS.get(row.test)
-    if needed and not getattr(row, needed):
-        raise row.error(needed, f"empty; a test of {row.test} has a {needed} in every row")
-    if row.test == "drift" and row.t is None:
-        raise row.error("t_min", "empty; a test of drift has the time of every row: t_s, t_min or t_h")
-    if row.test == "compliance" and row.load is None:
-        raise row.error("load_n", "empty; a test of compliance has the load of every row")
+    for column, content in _NEEDED.get(row.test, {}).items():
+        row.require([column], f"a test of {row.test} has {content}")
 
 
 def _refuse_repeated_cycles(rows: Sequence[Row]) -> None:
     """Refuse two rows of one part of a test that have the same cycle and load."""
     cycles = np.fromiter((row.cycle or 0 for row in rows), dtype=np.int64, count=len(rows))
-    loads = np.fromiter((-np.inf if row.load is None else row.load for row in rows), np.float64, count=len(rows))
+    loads = np.nan_to_num(np.array([row.number("load") for row in rows], dtype=np.float64), nan=-np.inf)
     order = np.lexsort((loads, cycles))
     same = (cycles[order][1:] == cycles[order][:-1]) & (loads[order][1:] == loads[order][:-1])
     if same.any():
@@ -231,7 +230,7 @@ def _cloud(rows: list[Row], commanded: dict[str, Row]) -> Cloud:
         cycles=tuple(row.cycle for row in rows if row.cycle is not None),
         positions=positions,
         angles=angles,
-        loads=np.array([row.load for row in rows]) if first.test == "compliance" else None,
+        loads=np.array([row.number("load") for row in rows]) if first.test == "compliance" else None,
         commanded=None if goal is None else np.array(goal.position),
         commanded_angles=None if goal is None else np.array(goal.angles),
     )
@@ -270,7 +269,7 @@ def _path_test(rows: list[Row]) -> PathTest:
     if commanded is not None:
         for run, trace in zip(runs.values(), traces, strict=True):
             _refuse_different_units(run[0], commanded.positions, trace.positions)
-    speeds = {row.speed for row in rows if row.speed is not None}
+    speeds = {row.number("speed") for row in rows} - {None}
     if len(speeds) > 1:
         raise rows[0].error("speed", f"{first.test} {first.name} has different commanded speeds")
     if not speeds and first.test in {"velocity", "weaving"}:
@@ -278,7 +277,7 @@ def _path_test(rows: list[Row]) -> PathTest:
     return PathTest(
         kind=first.test,
         name=first.name,
-        condition=first.condition,
+        condition=first.word("condition"),
         commanded=commanded,
         runs=traces,
         speed=speeds.pop() if speeds else None,
@@ -308,17 +307,17 @@ def _stacked(rows: Sequence[Row], what: str) -> Array:
 def _times(rows: list[Row]) -> list[float] | None:
     """Return the times of a run; None where it has none and needs none."""
     first = rows[0]
-    if first.t is None:
+    if first.number("t") is None:
         if first.test in _TIMED:
             raise first.error("t_s", f"a test of {first.test} needs the time of every sample")
         return None
     times: list[float] = []
     for row in rows:
-        if row.t is None:
-            raise row.error("t_s", "empty; expected a number, as in the rows before")
-        if times and not row.t > times[-1]:
-            raise row.error("t_s", f"samples are in order of time, and {row.t:g} s does not follow {times[-1]:g} s")
-        times.append(row.t)
+        row.require(["t"], "expected a number, as in the rows before")
+        t = row.number("t") or 0.0
+        if times and not t > times[-1]:
+            raise row.error("t_s", f"samples are in order of time, and {t:g} s does not follow {times[-1]:g} s")
+        times.append(t)
     return times
 
 

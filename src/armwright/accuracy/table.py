@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import attrs
@@ -59,47 +59,17 @@ class Row:
     @property
     def test(self) -> Kind:
         """Name of the test."""
-        return _KINDS[self._word("test").lower() or "pose"]
+        return _KINDS[self.word("test").lower() or "pose"]
 
     @property
     def name(self) -> str:
         """Name of the pose or path."""
-        return self._word("pose") or self._word("path")
-
-    @property
-    def condition(self) -> str:
-        """Such as load and speed, in free words."""
-        return self._word("condition")
+        return self.word("pose") or self.word("path")
 
     @property
     def cycle(self) -> int | None:
         """Number of the cycle, from 1; None for what was commanded."""
         return None if self._nominal else self._table.cycles[self._row] or None
-
-    @property
-    def direction(self) -> str:
-        """Direction of approach, or of a force."""
-        return self._word("direction")
-
-    @property
-    def robot(self) -> str:
-        """Which robot."""
-        return self._word("robot")
-
-    @property
-    def t(self) -> float | None:
-        """Time [s]."""
-        return self._table.columns.number("t", self._row)
-
-    @property
-    def load(self) -> float | None:
-        """Size of a force [N]."""
-        return self._table.columns.number("load", self._row)
-
-    @property
-    def speed(self) -> float | None:
-        """Commanded speed [m/s]."""
-        return self._table.columns.number("speed", self._row)
 
     @property
     def position(self) -> tuple[float, ...]:
@@ -116,8 +86,21 @@ class Row:
         """The axes a, b, c that the angles are about."""
         return self._table.angles
 
-    def _word(self, name: str) -> str:
+    def word(self, name: str) -> str:
+        """Return the word in a column of words; empty where the file has none."""
         return self._table.columns.word(name, self._row)
+
+    def number(self, name: str) -> float | None:
+        """Return the number in a column of numbers, SI; None where the file has none."""
+        return self._table.columns.number(name, self._row)
+
+    def require(self, names: Iterable[str], reason: str) -> None:
+        """Refuse a row whose cells of some columns are empty.
+
+        Raises:
+            FileFormatError: one of them is; the text says ``reason``.
+        """
+        self._table.columns.require(self._row, names, reason)
 
     def _numbers(self, names: tuple[str, ...]) -> tuple[float, ...]:
         suffix = "_nominal" if self._nominal else ""
@@ -154,7 +137,7 @@ class Table:
             row = Row(self, i)
             if self.nominal:
                 goal = Row(self, i, nominal=True)
-                first = commanded.setdefault((row.test, row.name, row.condition), goal)
+                first = commanded.setdefault((row.test, row.name, row.word("condition")), goal)
                 if first is goal:
                     yield goal
                 elif (goal.position, goal.angles) != (first.position, first.angles):
@@ -206,18 +189,13 @@ def _name(header: Header) -> str:
     Raises:
         FileFormatError: neither does, or both; or a path has nominal columns.
     """
-    names = header.present(("pose", "path"))
-    if len(names) != 1:
-        there = "both" if names else "neither"
-        raise header.error(
-            "pose", f"expected a column pose or a column path, and the file has {there}: {header.listing}"
-        )
+    name = header.exactly_one("pose", "path")
     nominal = header.present(f"{name}_nominal" for name in _COORDINATES)
-    if names[0] == "path" and nominal:
+    if name == "path" and nominal:
         raise header.error(
             nominal[0], f"only poses have nominal columns; a path is commanded by rows of cycle {COMMANDED}"
         )
-    return names[0]
+    return name
 
 
 def _cycles(columns: UnitTable) -> array[int]:

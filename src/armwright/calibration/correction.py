@@ -167,9 +167,7 @@ def _uncertainty(calibration: Calibration, corrected: Arm) -> Uncertainty:
     N = M[rows][:, columns]
     covariance = N @ calibration.covariance[np.ix_(fitted, fitted)] @ N.T
     return Uncertainty(
-        errors=[now.names[i] for i in rows],
-        covariance=(covariance + covariance.T) / 2,
-        noise=calibration.noise.length,
+        errors=[now.names[i] for i in rows], covariance=(covariance + covariance.T) / 2, noise=calibration.noise.length
     )
 
 

@@ -28,11 +28,7 @@ _MAX_ANGLE = 0.5
 _ANOTHER = 0.05
 # Points whose second width is a smaller part of the first lie on a line, and leave a rotation about it free.
 _LINE = 1e-3
-_UNITS = (
-    (1e3, "millimetres read as metres"),
-    (1e-3, "metres read as millimetres"),
-    (39.37, "inches read as metres"),
-)
+_UNITS = ((1e3, "millimetres read as metres"), (1e-3, "metres read as millimetres"), (39.37, "inches read as metres"))
 
 
 def initial_guess(

@@ -150,10 +150,7 @@ class MeasurementModel:
             measured = readings.points[rows] @ R.T + origin
             J = tool.position_jacobian[rows]
             levers = np.concatenate(
-                [
-                    np.tile(X[:3, :3], (len(rows), 1, 1)),
-                    np.cross(axes.T, (measured - origin)[:, None]).swapaxes(1, 2),
-                ],
+                [np.tile(X[:3, :3], (len(rows), 1, 1)), np.cross(axes.T, (measured - origin)[:, None]).swapaxes(1, 2)],
                 axis=2,
             )
             yield Residuals(

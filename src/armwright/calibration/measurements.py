@@ -26,7 +26,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array, Flags, read_only
 from armwright.calibration.columns import DEVIATIONS, DISTANCE, NAMES, NOMINAL, RPY, joint_columns, read_columns
-from armwright.calibration.readings import Numbers, Readings
+from armwright.calibration.readings import Readings, numbered
 from armwright.errors import FileFormatError, closest
 from armwright.files.column_names import Heading, units_of
 from armwright.files.unit_table import UnitTable, in_lines
@@ -128,50 +128,24 @@ def _names(table: UnitTable) -> tuple[str, ...]:
 
 
 def _readings(table: UnitTable, q: Array, position: Sequence[str], orientation: Sequence[str]) -> Readings:
-    m = len(q)
-    points = np.full((m, 3), np.nan)
+    points = np.full((len(q), 3), np.nan)
     if DEVIATIONS[0] in position:
         points = table.numbers(NOMINAL) + table.numbers(DEVIATIONS)
     elif position:
         points = table.numbers(position)
     rotations = _rotations(table, points, orientation)
-    frame, frames = _numbered(table.words("frame"), np.isfinite(points[:, 0]), named="frame" in table)
-    plane, planes = _numbered(table.words("plane"))
-    distances = table.numbers([DISTANCE])[:, 0] if DISTANCE in table else np.full(m, np.nan)
-    anchor, anchors = _numbered(table.words("anchor"))
-    for i, word in enumerate(table.words("frame") if "frame" in table else ()):
-        if not word and np.isfinite(points[i, 0]):
-            raise table.error(i, "frame", "empty; where one point tells its frame all do")
-    other = _others(table, q, distances, anchor)
-    told = np.isfinite(points[:, 0]) | (plane >= 0) | np.isfinite(distances)
-    if not told.all():
-        raise table.error(int(np.argmin(told)), "", "the row tells no point, no plane and no distance")
-    return Readings(
-        q=q,
-        points=points,
-        rotations=rotations,
-        frame=frame,
-        plane=plane,
-        distances=distances,
-        anchor=anchor,
-        other=other,
-        frames=frames,
-        planes=planes,
-        anchors=anchors,
-    )
-
-
-def _numbered(
-    words: Sequence[str], which: Flags | None = None, *, named: bool = True
-) -> tuple[Numbers, tuple[str, ...]]:
-    """Return by number which word each row has, -1 for none, and the words in order."""
-    there = [bool(word) for word in words] if which is None else which.tolist()
-    order: dict[str, int] = {}
-    for word, one in zip(words, there, strict=True):
-        if one and (word or not named):
-            order.setdefault(word, len(order))
-    numbers = [order.get(word, -1) if one else -1 for word, one in zip(words, there, strict=True)]
-    return np.array(numbers, dtype=np.intp), tuple(order)
+    has_point = np.isfinite(points[:, 0])
+    frames = [word if known else None for word, known in zip(table.words("frame"), has_point.tolist(), strict=True)]
+    if "" in frames and "frame" in table:
+        raise table.error(frames.index(""), "frame", "empty; where one point has a frame all points have one")
+    planes, anchors = ([word or None for word in table.words(name)] for name in ("plane", "anchor"))
+    labels = numbered(frame=frames, plane=planes, anchor=anchors)
+    distances = table.numbers([DISTANCE])[:, 0] if DISTANCE in table else np.full(len(q), np.nan)
+    other = _others(table, q, distances)
+    is_measured = has_point | (labels["plane"] >= 0) | np.isfinite(distances)
+    if not is_measured.all():
+        raise table.error(int(np.argmin(is_measured)), "", "the row has no point, no plane and no distance")
+    return Readings(q=q, points=points, rotations=rotations, distances=distances, other=other, **labels)
 
 
 def _rotations(table: UnitTable, points: Array, orientation: Sequence[str]) -> Array:
@@ -194,20 +168,20 @@ def _rotations(table: UnitTable, points: Array, orientation: Sequence[str]) -> A
     return rotations
 
 
-def _others(table: UnitTable, q: Array, distances: Array, anchor: Numbers) -> Array:
-    """Return (m, n) the postures that distances are from; NaN where they are from an anchor, or none are told."""
+def _others(table: UnitTable, q: Array, distances: Array) -> Array:
+    """Return (m, n) the joint configurations that distances are from; NaN where they are from an anchor or absent."""
     if DISTANCE not in table:
         return np.broadcast_to(np.nan, q.shape)
     other, names = np.full(q.shape, np.nan), _names(table)
-    called: dict[str, list[int]] = {to: [] for to in table.words("to")}
+    rows_by_name: dict[str, list[int]] = {to: [] for to in table.words("to")}
     for k, name in enumerate(names):
-        if name in called:
-            called[name].append(k)
-    for i, to in enumerate(table.words("to")):
-        _refuse_half_a_distance(table, i, float(distances[i]), to=bool(to), anchor=bool(anchor[i] >= 0))
+        if name in rows_by_name:
+            rows_by_name[name].append(k)
+    for i, (to, anchor) in enumerate(zip(table.words("to"), table.words("anchor"), strict=True)):
+        _refuse_half_a_distance(table, i, float(distances[i]), to=bool(to), anchor=bool(anchor))
         if not to:
             continue
-        rows = called[to]
+        rows = rows_by_name[to]
         if len(rows) != 1:
             near = closest(to, names)
             hint = f"; did you mean {near}?" if near and not rows else ""
@@ -222,7 +196,7 @@ def _refuse_half_a_distance(table: UnitTable, row: int, distance: float, *, to: 
     """Refuse a distance from nothing or from two places, no distance from one, and one below 0."""
     if math.isnan(distance):
         if to or anchor:
-            raise table.error(row, DISTANCE, "empty; the row tells from where a distance is, and not how far")
+            table.require(row, [DISTANCE], "the row has the start of a distance, and not its length")
         return
     if to == anchor:
         both = "both an anchor and another row" if to else "neither an anchor nor another row"

@@ -7,7 +7,8 @@ to several frames, such as those of a board that was set up three times; the pos
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import attrs
 import numpy as np
@@ -17,6 +18,8 @@ from armwright.arrays import Array, ArrayLike, Flags, floats, read_only
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.spatial.rotations import orthonormality_error
 
+# What is measured in each reading, and its labels, whose names are in the plural.
+_MEASURED, _LABELS = ("q", "points", "rotations", "distances", "other"), ("frame", "plane", "anchor")
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
 # Rotations that are written with four digits.
@@ -27,7 +30,7 @@ def _no_numbers(m: int, *shape: int) -> Array:
     return np.full((m, *shape), np.nan)
 
 
-def _told(array: Array) -> Array:
+def _known(array: Array) -> Array:
     """Return a copy that cannot be written to; of what no reading tells there is one NaN, which takes no room."""
     return np.broadcast_to(np.nan, array.shape) if np.isnan(array).all() else read_only(array)
 
@@ -51,13 +54,13 @@ class Readings:
     """
 
     q: Array = attrs.field(converter=read_only)
-    points: Array = attrs.field(converter=_told)
-    rotations: Array = attrs.field(converter=_told)
+    points: Array = attrs.field(converter=_known)
+    rotations: Array = attrs.field(converter=_known)
     frame: Numbers = attrs.field(converter=read_only)
     plane: Numbers = attrs.field(converter=read_only)
-    distances: Array = attrs.field(converter=_told)
+    distances: Array = attrs.field(converter=_known)
     anchor: Numbers = attrs.field(converter=read_only)
-    other: Array = attrs.field(converter=_told)
+    other: Array = attrs.field(converter=_known)
     frames: tuple[str, ...] = ()
     planes: tuple[str, ...] = ()
     anchors: tuple[str, ...] = ()
@@ -68,11 +71,7 @@ class Readings:
 
     def take(self, which: Flags | Numbers) -> Readings:
         """Return some of them."""
-        rows = {
-            key: getattr(self, key)[which]
-            for key in ("q", "points", "rotations", "frame", "plane", "distances", "anchor", "other")
-        }
-        return attrs.evolve(self, **rows)
+        return attrs.evolve(self, **{key: getattr(self, key)[which] for key in (*_MEASURED, *_LABELS)})
 
     @property
     def with_point(self) -> Flags:
@@ -83,11 +82,6 @@ class Readings:
     def with_rotation(self) -> Flags:
         """(m,) which tell a rotation."""
         return np.isfinite(self.rotations[:, 0, 0])
-
-    @property
-    def with_distance(self) -> Flags:
-        """(m,) which tell a distance."""
-        return np.isfinite(self.distances)
 
 
 def readings(
@@ -100,7 +94,7 @@ def readings(
     anchor: ArrayLike | None = None,
     other: ArrayLike | None = None,
 ) -> Readings:
-    """Return readings, one for each posture, that all tell the same kind of thing; ``together`` joins several.
+    """Return readings of one kind, one for each joint configuration; ``concatenate`` joins those of several kinds.
 
     Args:
         q: (m, n) joint positions [rad] or [m].
@@ -115,40 +109,40 @@ def readings(
         ShapeError: they are not as many.
         InvalidValueError: nothing was measured, or a distance from nothing; a pose has no rotation in it.
     """
-    places = np.atleast_2d(floats(q, "q"))
-    m, n = places.shape
-    seen, turned = _no_numbers(m, 3), _no_numbers(m, 3, 3)
+    configurations = np.atleast_2d(floats(q, "q"))
+    m, n = configurations.shape
+    positions, rotations = _no_numbers(m, 3), _no_numbers(m, 3, 3)
     if points is not None:
-        given = floats(points, "points")
-        given = given[None] if given.shape in {(3,), (4, 4)} else given
-        if given.shape == (m, 4, 4):
-            seen, turned = given[:, :3, 3], given[:, :3, :3]
-            _refuse_no_poses(given)
-        elif given.shape == (m, 3):
-            seen = given
+        measured = floats(points, "points")
+        measured = measured[None] if measured.shape in {(3,), (4, 4)} else measured
+        if measured.shape == (m, 4, 4):
+            positions, rotations = measured[:, :3, 3], measured[:, :3, :3]
+            _refuse_no_poses(measured)
+        elif measured.shape == (m, 3):
+            positions = measured
         else:
-            raise ShapeError(f"points: expected ({m}, 3) points or ({m}, 4, 4) poses for as many q, got {given.shape}")
-    away = _no_numbers(m) if distances is None else _as_many(floats(distances, "distances"), (m,), "distances")
+            raise ShapeError(
+                f"points: expected ({m}, 3) points or ({m}, 4, 4) poses for as many q, got {measured.shape}"
+            )
+    lengths = _no_numbers(m) if distances is None else _as_many(floats(distances, "distances"), (m,), "distances")
     if points is None and plane is None and distances is None:
         raise InvalidValueError("expected points, poses, planes or distances, got none of them")
     if (distances is not None) != ((anchor is not None) or (other is not None)) or None not in (anchor, other):
         raise InvalidValueError("distances: tell from which anchor they are, or from which other configuration")
-    in_frame, frames = _numbered([""] * m if frame is None and points is not None else frame, m, "frame")
-    on_plane, planes = _numbered(plane, m, "plane")
-    from_anchor, anchors = _numbered(anchor, m, "anchor")
-    return Readings(
-        q=places,
-        points=seen,
-        rotations=turned,
-        frame=in_frame,
-        plane=on_plane,
-        distances=away,
-        anchor=from_anchor,
-        other=_no_numbers(m, n) if other is None else _as_many(np.atleast_2d(floats(other, "other")), (m, n), "other"),
-        frames=frames,
-        planes=planes,
-        anchors=anchors,
-    )
+    others = _no_numbers(m, n) if other is None else _as_many(np.atleast_2d(floats(other, "other")), (m, n), "other")
+    frames = [""] * m if frame is None and points is not None else _labels(frame, m, "frame")
+    labels = numbered(frame=frames, plane=_labels(plane, m, "plane"), anchor=_labels(anchor, m, "anchor"))
+    return Readings(q=configurations, points=positions, rotations=rotations, distances=lengths, other=others, **labels)
+
+
+def numbered(**labels: Sequence[str | None]) -> dict[str, Any]:
+    """Return by key the numbers (m,) of labels, -1 for none, and by its plural the different labels in order."""
+    columns: dict[str, Any] = {}
+    for key, words in labels.items():
+        order = {word: i for i, word in enumerate(dict.fromkeys(word for word in words if word is not None))}
+        columns[key] = np.array([-1 if word is None else order[word] for word in words], dtype=np.intp)
+        columns[f"{key}s"] = tuple(order)
+    return columns
 
 
 def concatenate(*parts: Readings) -> Readings:
@@ -161,30 +155,12 @@ def concatenate(*parts: Readings) -> Readings:
         raise ShapeError(
             f"readings of arms with {sorted({part.q.shape[1] for part in parts})} joints are not of one arm"
         )
-
-    def joined(key: str) -> Array:
-        return np.concatenate([getattr(part, key) for part in parts])
-
-    def renumbered(key: str, many: str) -> tuple[Numbers, tuple[str, ...]]:
-        names = tuple(dict.fromkeys(name for part in parts for name in getattr(part, many)))
-        return np.concatenate([_placed(getattr(part, key), getattr(part, many), names) for part in parts]), names
-
-    (frame, frames), (plane, planes), (anchor, anchors) = (
-        renumbered(key, many) for key, many in (("frame", "frames"), ("plane", "planes"), ("anchor", "anchors"))
-    )
-    return Readings(
-        q=joined("q"),
-        points=joined("points"),
-        rotations=joined("rotations"),
-        frame=frame,
-        plane=plane,
-        distances=joined("distances"),
-        anchor=anchor,
-        other=joined("other"),
-        frames=frames,
-        planes=planes,
-        anchors=anchors,
-    )
+    columns: dict[str, Any] = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _MEASURED}
+    for key in _LABELS:
+        names = tuple(dict.fromkeys(name for part in parts for name in getattr(part, f"{key}s")))
+        columns[key] = np.concatenate([_renumbered(getattr(x, key), getattr(x, f"{key}s"), names) for x in parts])
+        columns[f"{key}s"] = names
+    return Readings(**columns)
 
 
 def refuse_not_fitted(fitted: Readings, others: Readings) -> None:
@@ -193,12 +169,13 @@ def refuse_not_fitted(fitted: Readings, others: Readings) -> None:
     Raises:
         InvalidValueError: there are some.
     """
-    for what, names in (("frame", others.frames), ("plane", others.planes), ("anchor", others.anchors)):
-        unknown = sorted(set(getattr(others, what).tolist()) - set(getattr(fitted, what).tolist()) - {-1})
+    for what in _LABELS:
+        numbers, names = getattr(others, what), getattr(others, f"{what}s")
+        unknown = sorted(set(numbers.tolist()) - set(getattr(fitted, what).tolist()) - {-1})
         if unknown:
             raise InvalidValueError(
                 f"{what} {names[unknown[0]]}: no reading that is fitted tells where it is, so that the "
-                f"{int((getattr(others, what) == unknown[0]).sum())} others in it cannot be held against the arm"
+                f"{int((numbers == unknown[0]).sum())} others in it cannot be held against the arm"
             )
 
 
@@ -213,18 +190,15 @@ def _refuse_no_poses(given: Array) -> None:
         )
 
 
-def _numbered(names: ArrayLike | None, m: int, what: str) -> tuple[Numbers, tuple[str, ...]]:
-    """Return by number which of some names each reading has."""
-    if names is None:
-        return np.full(m, -1), ()
-    given = [str(name) for name in np.atleast_1d(np.asarray(names))]
-    if len(given) != m:
-        raise ShapeError(f"{what}: expected {m} names for as many q, got {len(given)}")
-    order = tuple(dict.fromkeys(given))
-    return np.array([order.index(name) for name in given], dtype=np.intp), order
+def _labels(names: ArrayLike | None, m: int, what: str) -> list[str | None]:
+    """Return the label of each of m readings; None where the readings have none."""
+    labels = [None] * m if names is None else [str(name) for name in np.atleast_1d(np.asarray(names))]
+    if len(labels) != m:
+        raise ShapeError(f"{what}: expected {m} names for as many q, got {len(labels)}")
+    return [*labels]
 
 
-def _placed(numbers: Numbers, names: tuple[str, ...], order: tuple[str, ...]) -> Numbers:
+def _renumbered(numbers: Numbers, names: tuple[str, ...], order: tuple[str, ...]) -> Numbers:
     """Return numbers of names as numbers in another order; -1 stays."""
     table = np.array([*(order.index(name) for name in names), -1], dtype=np.intp)
     return np.asarray(table[numbers], dtype=np.intp)

@@ -14,7 +14,7 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -59,21 +59,16 @@ def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str
         OutputError: the folder or a file cannot be written; the text says which and why.
     """
     named, folder = folder, _resolved(folder)
-    made = _make_parents(folder)
     left: dict[str, str] = {}
-    try:
-        with staging(_staged_in(folder), folder, lambda dead: left.update(recorded(dead))) as new:
-            hashes = {name: _write(new / name, content) for name, content in files.items()}
-            _write(new / RECORD, record_text(hashes, record or {}))
-            with signals_held():
-                _replace(folder, new, [*files, RECORD], left)
-                WRITTEN[named] = None
-    except OSError as error:
-        _remove(made)
-        raise OutputError(f"cannot write to '{folder}': {reason(error, folder)}; nothing was written") from error
-    except BaseException:
-        _remove(made)
-        raise
+    with (
+        _parents(folder, lambda error: f"cannot write to '{folder}': {reason(error, folder)}"),
+        staging(_staged_in(folder), folder, lambda dead: left.update(recorded(dead))) as new,
+    ):
+        hashes = {name: _write(new / name, content) for name, content in files.items()}
+        _write(new / RECORD, record_text(hashes, record or {}))
+        with signals_held():
+            _replace(folder, new, [*files, RECORD], left)
+            WRITTEN[named] = None
 
 
 def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> None:
@@ -97,8 +92,7 @@ def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> 
     named, path = path, _resolved(path)
     if not back and is_source(path):
         raise OutputError(f"cannot write '{named}': it was read by this command, and would be lost; name another file")
-    made = _make_parents(path)
-    try:
+    with _parents(path, lambda error: f"cannot write '{path}': {error.strerror or error}"):
         there = path.stat() if path.exists() else None
         if there is not None and not stat.S_ISREG(there.st_mode) and not stat.S_ISDIR(there.st_mode):
             with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as stream:
@@ -110,12 +104,6 @@ def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> 
                 WRITTEN[named] = None
         else:
             _write_beside(path, named, text, there)
-    except OSError as error:
-        _remove(made)
-        raise OutputError(f"cannot write '{path}': {error.strerror or error}; nothing was written") from error
-    except BaseException:
-        _remove(made)
-        raise
 
 
 def descriptor(path: Path) -> int | None:
@@ -352,17 +340,28 @@ def _encoded(content: Content) -> Iterator[bytes]:
         yield piece if isinstance(piece, bytes) else piece.encode("utf-8", errors="backslashreplace")
 
 
-def _make_parents(folder: Path) -> list[Path]:
-    """Make the missing folders above ``folder`` and return them, the deepest first."""
-    missing = [parent for parent in folder.parents if not parent.exists()]
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        _remove(missing)
-        raise OutputError(
-            f"cannot make '{folder.parent}': {reason(error, folder.parent)}; nothing was written"
-        ) from error
-    return missing
+@contextlib.contextmanager
+def _parents(path: Path, message: Callable[[OSError], str]) -> Iterator[None]:
+    """Make the missing folders above a path, and remove them again where writing it fails."""
+    with contextlib.ExitStack() as made:
+        for folder in [parent for parent in path.parents if not parent.exists()][::-1]:
+            made.callback(_remove_empty, folder)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(
+                f"cannot make '{path.parent}': {reason(error, path.parent)}; nothing was written"
+            ) from error
+        try:
+            yield
+        except OSError as error:
+            raise OutputError(f"{message(error)}; nothing was written") from error
+        made.pop_all()
+
+
+def _remove_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def _refuse_what_cannot_be_replaced(folder: Path, files: Iterable[str]) -> None:
@@ -392,9 +391,3 @@ def _refuse_sources(folder: Path, names: Iterable[str]) -> None:
     for name in sorted(names):
         if is_source(folder / name):
             raise FileExistsError(errno.EEXIST, f"'{name}' in it was read, and would be lost: name another folder")
-
-
-def _remove(folders: Iterable[Path]) -> None:
-    for folder in folders:
-        with contextlib.suppress(OSError):
-            folder.rmdir()

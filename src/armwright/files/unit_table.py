@@ -80,6 +80,16 @@ class UnitTable:
             raise self.error(row, name, f"expected {expected}, got {shown(word)}{hint}")
         return word.lower()
 
+    def require(self, row: int, names: Iterable[str], reason: str) -> None:
+        """Refuse a row whose cells of some columns are empty.
+
+        Raises:
+            FileFormatError: one of them is; the text says ``reason``.
+        """
+        for name in names:
+            if not self.word(name, row) and self.number(name, row) is None:
+                raise self.error(row, name, f"empty; {reason}")
+
     def error(self, row: int, name: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a cell; of a whole row where the name is empty."""
         return FileFormatError(self.path, self.lines[row], _text(self.headings, name), message)
@@ -135,6 +145,19 @@ class Header:
                 column = next(column for column in self.schema.columns if column.name == name)
                 reason = f"{because}; " if because else ""
                 raise self.error(column.proposed, f"no such column; {reason}there are {self.listing}")
+
+    def exactly_one(self, first: str, second: str) -> str:
+        """Return which of two columns the file has.
+
+        Raises:
+            FileFormatError: it has both, or neither.
+        """
+        names = self.present((first, second))
+        if len(names) != 1:
+            there = "both" if names else "neither"
+            text = f"expected a column {first} or a column {second}, and the file has {there}: {self.listing}"
+            raise self.error(first, text)
+        return names[0]
 
     def rows(
         self, *, filled: Iterable[str], together: Sequence[Sequence[str]] = (), skip_incomplete: bool = False

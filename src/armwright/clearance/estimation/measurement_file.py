@@ -152,16 +152,13 @@ def read_measured(
             farther from its commanded position than any clearance allows. The text has file and line.
     """
     header = read_header(path, _SCHEMA, columns=columns)
-    names = header.present(("pose", "path"))
-    if len(names) != 1:
-        there = "both" if names else "neither"
-        raise header.error("pose", f"expected a column pose or a column path, and there are {there}: {header.listing}")
-    expected = _AT_REST if names[0] == "pose" else _ON_PATHS
+    column = header.exactly_one("pose", "path")
+    expected = _AT_REST if column == "pose" else _ON_PATHS
     header.require(expected)
     table = header.rows(filled=expected, skip_incomplete=skip_incomplete)
-    groups = _rows_by_name(table, names[0])
+    groups = _rows_by_name(table, column)
     numbers = table.numbers(expected[1:])
-    return _at_rest(table, numbers, groups) if names[0] == "pose" else _on_paths(table, numbers, groups)
+    return _at_rest(table, numbers, groups) if column == "pose" else _on_paths(table, numbers, groups)
 
 
 def _rows_by_name(table: UnitTable, column: str) -> dict[str, list[int]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -21,7 +21,7 @@ from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.estimation.misfit import CONTRADICTION
 from armwright.clearance.estimation.static import Estimate, closed_at_poses, matrix_at
 from armwright.clearance.ideal import closed
-from armwright.clearance.linkage import Body, Linkage
+from armwright.clearance.linkage import Body, Linkage, Load
 from armwright.clearance.rest import at_rest
 from armwright.clearance.settings import contact_stiffness
 from armwright.errors import InvalidValueError, one_of
@@ -199,39 +199,40 @@ def _kinds(linkage: Linkage) -> Iterator[_Kind]:
     exact = np.zeros(len(linkage.drives))
     for i, load in enumerate(linkage.loads):
         if np.any(load.force):
-            yield _Kind(f"load at {load.point}", "1", 1.0, partial(_with_load, linkage, i), exact)
+            yield _Kind(f"load at {load.point}", "1", 1.0, partial(_with, linkage, "loads", i, _stronger), exact)
     for i, body in enumerate(linkage.bodies):
-        yield _Kind(f"mass of {body.name}", "1", 1.0, partial(_with_mass, linkage, i), exact)
+        yield _Kind(f"mass of {body.name}", "1", 1.0, partial(_with, linkage, "bodies", i, _heavier), exact)
         if _length(body) > 0:
-            yield _Kind(f"length of {body.name}", "m", _length(body), partial(_with_length, linkage, i), exact)
+            yield _Kind(
+                f"length of {body.name}", "m", _length(body), partial(_with, linkage, "bodies", i, _scaled), exact
+            )
     ground = linkage.ground
     if _length(ground) > 0:
-        yield _Kind("distances on the ground", "m", _length(ground), partial(_with_ground, linkage), exact)
+        yield _Kind(
+            "distances on the ground",
+            "m",
+            _length(ground),
+            lambda change: attrs.evolve(linkage, ground=_scaled(ground, change)),
+            exact,
+        )
     for drive, number, zeros in zip(linkage.drives, linkage.driven, np.eye(len(exact)), strict=True):
         unit = "rad" if linkage.coordinates[number].kind == "angle" else "m"
         yield _Kind(f"zero of {drive.body}", unit, 1.0, lambda _: linkage, zeros)
 
 
-def _with_load(linkage: Linkage, number: int, change: float) -> Linkage:
-    loads = list(linkage.loads)
-    loads[number] = attrs.evolve(loads[number], force=loads[number].force * (1 + change))
-    return attrs.evolve(linkage, loads=loads)
+def _with(linkage: Linkage, field: str, number: int, altered: Callable[[Any, float], Any], change: float) -> Linkage:
+    """Return a linkage one of whose bodies or loads is altered."""
+    parts: dict[str, Any] = {field: list(getattr(linkage, field))}
+    parts[field][number] = altered(parts[field][number], change)
+    return attrs.evolve(linkage, **parts)
 
 
-def _with_mass(linkage: Linkage, number: int, change: float) -> Linkage:
-    bodies = list(linkage.bodies)
-    bodies[number] = attrs.evolve(bodies[number], mass=bodies[number].mass * (1 + change))
-    return attrs.evolve(linkage, bodies=bodies)
+def _stronger(load: Load, change: float) -> Load:
+    return attrs.evolve(load, force=load.force * (1 + change))
 
 
-def _with_length(linkage: Linkage, number: int, change: float) -> Linkage:
-    bodies = list(linkage.bodies)
-    bodies[number] = _scaled(bodies[number], change)
-    return attrs.evolve(linkage, bodies=bodies)
-
-
-def _with_ground(linkage: Linkage, change: float) -> Linkage:
-    return attrs.evolve(linkage, ground=_scaled(linkage.ground, change))
+def _heavier(body: Body, change: float) -> Body:
+    return attrs.evolve(body, mass=body.mass * (1 + change))
 
 
 def _scaled(body: Body, change: float) -> Body:
