@@ -210,7 +210,7 @@ def path_slip(change: Callable[[list[str]], list[str]]) -> list[str]:
         (path_slip(lambda rows: [rows[0], "y1,nan,1,1", *rows[2:]]), ":2: t_s: every number must be finite"),
         (
             path_slip(lambda rows: [row.replace("path,", "").replace("y1,", "") for row in rows]),
-            "a column path, and there are neither: t_s, x_mm",
+            "a column path, and the file has neither: t_s, x_mm",
         ),
     ],
 )
