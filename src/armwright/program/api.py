@@ -76,7 +76,7 @@ class ProgramError(ArmwrightError, ValueError):
     exit_status = ExitStatus.PROGRAM_ERRORS
 
     def __init__(self, compilation: Compilation) -> None:
-        """Say the first error, and how many there are."""
+        """Name the first error, and how many there are."""
         self.compilation = compilation
         errors = [diagnostic for diagnostic in compilation.diagnostics if diagnostic.is_error]
         first, source = errors[0], compilation.source
@@ -116,13 +116,13 @@ def compile(  # noqa: A001 - what a translator does
     else:
         path = Path(program)
         source, read_import = Source(path.name, read_program(path)), read_import or import_reader(path.parent)
-    place = read_cell(Path(cell)) if isinstance(cell, str | Path) else cell
-    known = known_cell(place) if isinstance(place, Cell) else place
+    model = read_cell(Path(cell)) if isinstance(cell, str | Path) else cell
+    known = known_cell(model) if isinstance(model, Cell) else model
     with no_collection():
         compiled = _compile(source, known, strict=strict, std=std, read_import=read_import, generate_code=generate_code)
-    if place is None:
-        place = next((one.cell for one in compiled.imports if one.cell and one.cell.arms), None)
-    return attrs.evolve(compiled, cell=with_imports(place, compiled.imports) if isinstance(place, Cell) else None)
+    if model is None:
+        model = next((imported.cell for imported in compiled.imports if imported.cell and imported.cell.arms), None)
+    return attrs.evolve(compiled, cell=with_imports(model, compiled.imports) if isinstance(model, Cell) else None)
 
 
 def run(
@@ -242,24 +242,24 @@ def _compile(
     read_import: ReadImport | None,
     generate_code: bool,
 ) -> Compilation:
-    text, found = without_numbers(source)
+    text, diagnostics = without_numbers(source)
     scanned = scan(source, text, std)
-    program, slips = parse(source, scanned.tokens, std)
+    program, syntax_errors = parse(source, scanned.tokens, std)
     if read_import is not None:
         read_import = cache(_bounded(read_import))
         cell = _imported(program, read_import) if cell is None else cell
-    symbols, wrong, imports = check.check(program, cell, std=std, read_import=read_import)
+    symbols, name_errors, imports = check.check(program, cell, std=std, read_import=read_import)
     spelling = {token.key: token.text for token in reversed(scanned.tokens) if token.kind is TokenKind.NAME}
-    found += [*scanned.found, *slips]
-    guessed = any(one.is_syntax for one in found)
-    # Where the parser had to guess, a name may seem unused, and what the statements do cannot be told.
-    found += [one for one in wrong if not (guessed and one.code == "L304")]
-    code = course = None
+    diagnostics += [*scanned.found, *syntax_errors]
+    guessed = any(diagnostic.is_syntax for diagnostic in diagnostics)
+    # Where the parser had to guess, a name may seem unused, and the effect of the statements is unknown.
+    diagnostics += [error for error in name_errors if not (guessed and error.code == "L304")]
+    code = flow = None
     if not guessed:
-        course, odd_course = analysis.check(program, symbols, spelling, cell, strict=strict, source=source)
-        found += odd_course
-        if generate_code and not any(one.is_error for one in found):
-            code = attrs.evolve(generate(source, program, symbols, course, spelling), standard=std)
+        flow, flow_errors = analysis.check(program, symbols, spelling, cell, strict=strict, source=source)
+        diagnostics += flow_errors
+        if generate_code and not any(diagnostic.is_error for diagnostic in diagnostics):
+            code = attrs.evolve(generate(source, program, symbols, flow, spelling), standard=std)
     return Compilation(
         source=source,
         standard=std,
@@ -268,7 +268,7 @@ def _compile(
         tree=program,
         symbols=symbols,
         imports=imports,
-        flow=course,
-        diagnostics=in_order(found),
+        flow=flow,
+        diagnostics=in_order(diagnostics),
         code=code,
     )

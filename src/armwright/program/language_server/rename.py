@@ -1,4 +1,4 @@
-"""Giving a name of a program another one, everywhere, so that the program goes on meaning the same."""
+"""Renaming of a variable or a procedure everywhere in a program, so that the program goes on meaning the same."""
 
 import re
 
@@ -23,31 +23,31 @@ _NO_NAMES = {
 
 
 def nameable(analysis: Analysis, offset: int) -> Occurrence:
-    """Return the name at a place that can be given another one.
+    """Return the name at a position, which can be changed.
 
     Raises:
         InvalidValueError: there is none; the text says what is there.
     """
-    one = analysis.at(offset)
-    if one is None:
+    occurrence = analysis.at(offset)
+    if occurrence is None:
         token = analysis.token_at(offset)
         what = f"`{token.text}` is no name" if token is not None else "here is no name"
         raise InvalidValueError(f"{what}; only variables and procedures can be renamed")
-    text = analysis.text[one.start : one.end]
-    if one.what in _NO_NAMES:
-        raise InvalidValueError(f"`{text}` is {_NO_NAMES[one.what]}, and cannot be renamed")
-    undeclared = one.what is What.UNKNOWN or analysis.declaration(one) is None
-    if undeclared or (one.what is What.VARIABLE and one.owner is None):
-        if one.key in analysis.compiled.symbols.imported:
+    text = analysis.text[occurrence.start : occurrence.end]
+    if occurrence.what in _NO_NAMES:
+        raise InvalidValueError(f"`{text}` is {_NO_NAMES[occurrence.what]}, and cannot be renamed")
+    undeclared = occurrence.what is What.UNKNOWN or analysis.declaration(occurrence) is None
+    if undeclared or (occurrence.what is What.VARIABLE and occurrence.owner is None):
+        if occurrence.key in analysis.compiled.symbols.imported:
             raise InvalidValueError(f"`{text}` is imported, and cannot be renamed here")
-        if one.key in PREDECLARED:
+        if occurrence.key in PREDECLARED:
             raise InvalidValueError(f"`{text}` is predeclared, and cannot be renamed")
         if undeclared:
             raise InvalidValueError(f"`{text}` is not declared, so it is unknown what it is")
-        source = _known_by(analysis, one.key)
+        source = _known_by(analysis, occurrence.key)
         if source is not None:
             raise InvalidValueError(f"`{text}` {source} by this name; rename it there first")
-    return one
+    return occurrence
 
 
 def _known_by(analysis: Analysis, key: str) -> str | None:
@@ -59,7 +59,7 @@ def _known_by(analysis: Analysis, key: str) -> str | None:
 
 
 def rename(analysis: Analysis, offset: int, new: str) -> tuple[Edit, ...]:
-    """Return the changes that give the name at a place another one.
+    """Return the changes that rename what stands at a position.
 
     Args:
         analysis: the program.
@@ -69,12 +69,12 @@ def rename(analysis: Analysis, offset: int, new: str) -> tuple[Edit, ...]:
     Raises:
         InvalidValueError: the name cannot be changed, the new one is none, or it has another meaning somewhere.
     """
-    one = nameable(analysis, offset)
+    occurrence = nameable(analysis, offset)
     _require_name(analysis, new)
     key = new.upper()
-    if key != one.key:
-        _require_unused(analysis, one, new)
-    return tuple(Edit(other.span, new) for other in analysis.same(one))
+    if key != occurrence.key:
+        _require_unused(analysis, occurrence, new)
+    return tuple(Edit(other.span, new) for other in analysis.same(occurrence))
 
 
 def _require_name(analysis: Analysis, new: str) -> None:
@@ -92,13 +92,13 @@ def _require_name(analysis: Analysis, new: str) -> None:
         raise InvalidValueError(f"'{new}' is a reserved word{later}")
 
 
-def _require_unused(analysis: Analysis, one: Occurrence, new: str) -> None:
+def _require_unused(analysis: Analysis, occurrence: Occurrence, new: str) -> None:
     """Refuse a name that has a meaning where the renamed thing is known."""
     symbols, key = analysis.compiled.symbols, new.upper()
-    if one.owner is None:
-        _require_unused_globally(analysis, one, new)
+    if occurrence.owner is None:
+        _require_unused_globally(analysis, occurrence, new)
         return
-    procedure = symbols.procedures[one.owner]
+    procedure = symbols.procedures[occurrence.owner]
     if key in PREDECLARED:
         raise InvalidValueError(f"'{new}' is a frame that is predeclared")
     if key in procedure.types:
@@ -109,7 +109,7 @@ def _require_unused(analysis: Analysis, one: Occurrence, new: str) -> None:
         raise InvalidValueError(f"procedure `{name}` uses the '{new}' of the program, which would then be hidden")
 
 
-def _require_unused_globally(analysis: Analysis, one: Occurrence, new: str) -> None:
+def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: str) -> None:
     symbols, key = analysis.compiled.symbols, new.upper()
     cell = analysis.cell
     if key in PREDECLARED or key in symbols.imported:
@@ -118,11 +118,11 @@ def _require_unused_globally(analysis: Analysis, one: Occurrence, new: str) -> N
         raise InvalidValueError(f"the program has a name '{new}' already")
     if key in FUNCTIONS:
         raise InvalidValueError(f"'{new}' is a function of the language")
-    if cell is not None and one.what is What.VARIABLE and (key in cell.frames or key in cell.visions):
+    if cell is not None and occurrence.what is What.VARIABLE and (key in cell.frames or key in cell.visions):
         raise InvalidValueError(f"{cell.name} has a frame '{new}', which this would become")
     if any(other.key == key and other.owner is None for other in _meant(analysis)):
         raise InvalidValueError(f"the program uses '{new}' already, though it is not declared")
-    for other in analysis.same(one):
+    for other in analysis.same(occurrence):
         procedure = analysis.extents.scope(other.start).procedure
         if procedure is not None and key in procedure.types:
             name = procedure.node.name.text

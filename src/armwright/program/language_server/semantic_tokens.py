@@ -76,26 +76,26 @@ def _plain(token: Token) -> tuple[int, int] | None:
 _OPERATORS = frozenset(("+", "-", "*", "/", "=", "<", ">", "<=", ">=", "<>"))
 
 
-def _named(one: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
-    own = _BIT["declaration"] * one.declares | _BIT["modification"] * (one.writes and not one.declares)
-    if one.what in _WHATS:
-        kind, bits = _WHATS[one.what]
+def _named(name: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
+    own = _BIT["declaration"] * name.declares | _BIT["modification"] * (name.writes and not name.declares)
+    if name.what in _WHATS:
+        kind, bits = _WHATS[name.what]
         return KINDS.index(kind), bits | own
-    if one.what is not What.VARIABLE:
+    if name.what is not What.VARIABLE:
         return None
     symbols = analysis.compiled.symbols
     word = "variable"
     bits = own
-    if one.owner is not None and one.key in symbols.procedures[one.owner].parameters:
+    if name.owner is not None and name.key in symbols.procedures[name.owner].parameters:
         word = "parameter"
-    elif one.owner is None and one.key not in symbols.declared:
+    elif name.owner is None and name.key not in symbols.declared:
         bits |= _BIT["defaultLibrary"]
-    if one.type is not None:
-        if one.type.kind is VariableKind.EVENT:
+    if name.type is not None:
+        if name.type.kind is VariableKind.EVENT:
             word = "event" if word == "variable" else word
         else:
-            bits |= _BIT[one.type.kind.value.lower()]
-        bits |= _BIT["array"] * bool(one.type.sizes)
+            bits |= _BIT[name.type.kind.value.lower()]
+        bits |= _BIT["array"] * bool(name.type.sizes)
     return KINDS.index(word), bits
 
 
