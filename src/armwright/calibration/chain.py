@@ -11,6 +11,7 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
 
 import attrs
@@ -94,7 +95,7 @@ class Chain:
     target_rotation: Array
     joint_errors: tuple[JointErrorModel, ...] = ()
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The errors, in order: those of the elements, then those of the joints."""
         return (

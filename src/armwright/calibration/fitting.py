@@ -11,7 +11,7 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import lru_cache, partial
 
 import attrs
 import numpy as np
@@ -31,7 +31,7 @@ from armwright.calibration.identifiability import (
     select_identifiable,
 )
 from armwright.calibration.initial_guess import initial_guess
-from armwright.calibration.measurement_model import MeasurementModel, PoseError
+from armwright.calibration.measurement_model import MeasurementModel, PoseError, Residuals
 from armwright.calibration.noise import (
     TYPICAL,
     Noise,
@@ -335,17 +335,21 @@ def _fit(
     prior = noise.length * np.diag(1 / _prior_sigma(model)[fitted])
     scales = weights = length_scales(model.residuals(measured, errors), noise)
 
+    # Residuals, weights and the Jacobian are asked for at the same errors, one after the other.
+    @lru_cache(maxsize=2)
+    def residuals_at(fitted_errors: bytes) -> Residuals:
+        errors[fitted] = np.frombuffer(fitted_errors)
+        return model.residuals(measured, errors)
+
     def cost_residuals(x: Array) -> Array:
-        errors[fitted] = x
-        return np.concatenate([model.residuals(measured, errors).values * weights, prior @ x])
+        return np.concatenate([residuals_at(x.tobytes()).values * weights, prior @ x])
 
     def cost_jacobian(x: Array) -> Array:
-        errors[fitted] = x
-        return np.vstack([model.residuals(measured, errors).jacobian[:, fitted] * weights[:, None], prior])
+        return np.vstack([residuals_at(x.tobytes()).jacobian[:, fitted] * weights[:, None], prior])
 
     for _ in range(_REWEIGHTINGS):
         if robust:
-            weights = scales * robust_weights(model.residuals(measured, errors), noise, strict=strict)
+            weights = scales * robust_weights(residuals_at(errors[fitted].tobytes()), noise, strict=strict)
         solution = least_squares(
             cost_residuals,
             errors[fitted].copy(),
@@ -359,7 +363,7 @@ def _fit(
         errors[fitted] = solution.x
         if not robust:
             break
-        reweighted = scales * robust_weights(model.residuals(measured, errors), noise, strict=strict)
+        reweighted = scales * robust_weights(residuals_at(solution.x.tobytes()), noise, strict=strict)
         if np.all(np.abs(reweighted - weights) <= _WEIGHTS_SETTLED * scales):
             break
     return errors

@@ -7,6 +7,7 @@ that was touched, and three coordinates for each anchor.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import NamedTuple
 
 import attrs
@@ -84,7 +85,7 @@ class MeasurementModel:
     plane_names: tuple[str, ...] = ()
     anchor_names: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The errors, in order: those of the arm come first."""
         return (
@@ -204,6 +205,8 @@ class MeasurementModel:
     def _of_displacements(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the distances between the positions of the tool in two configurations."""
         rows = np.flatnonzero(np.isfinite(readings.other[:, 0]))
+        if not len(rows):
+            return
         other = self.chain.forward(readings.other[rows], x[: len(self.chain.names)])
         distance, direction = _polar(tool.position[rows] - other.position)
         J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows] - other.position_jacobian)
