@@ -59,7 +59,8 @@ def analyse(name: str, text: str, folder: Path | None, cells: Cells, settings: S
     if around.file is not None:
         files.append(around.file)
     lines = {name: (file.path.absolute().as_uri(), line) for file in files for name, line in file.lines.items()}
-    cell = with_imports(cell or next((one.cell for one in compiled.imports if one.cell), None), compiled.imports)
+    imported = (imported.cell for imported in compiled.imports)
+    cell = with_imports(cell or next(filter(None, imported), None), compiled.imports)
     frames = None if cell is None else cell.tree()
     if around.file is not None and around.file.cell is cell:
         frames = around.file.frames

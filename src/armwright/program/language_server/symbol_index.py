@@ -124,13 +124,13 @@ def occurrences(tokens: Sequence[Token], extents: Extents) -> tuple[Occurrence, 
                 found.append(Occurrence(token.start, token.end, key, What.ARM))
             else:
                 found.append(_name(token, scope, before, follows, in_units=in_units))
-            one = found[-1]
+            name = found[-1]
             if (in_read and before in ("(", ",")) or before == "FOR":
-                one.writes = True
+                name.writes = True
             elif before in OPENERS or not before:
-                one.writes = follows == "=" or (follows == "[" and _assigned(tokens, at + 1))
+                name.writes = follows == "=" or (follows == "[" and _assigned(tokens, at + 1))
             elif before == "(" and key in AXES and at > 1 and tokens[at - 2].key == "FORCE":
-                one.what, one.owner, one.type = What.AXIS, None, None
+                name.what, name.owner, name.type = What.AXIS, None, None
         elif kind is _KEYWORD or key in (";", ")"):
             in_units = key == "UNITS"
             in_read = key == "READ" or (in_read and key not in (";", ")") and kind is not _KEYWORD)

@@ -240,7 +240,7 @@ class Machine:
 
     def mover(self, arm: str) -> Process | None:
         """Return the process that moves an arm; None where the arm is at rest."""
-        return next((one for one in self.state.processes if one.motion is not None and one.motion.arm == arm), None)
+        return next((owner for owner in self.state.processes if owner.motion and owner.motion.arm == arm), None)
 
     def origin(self, name: str, text: str) -> list[Label]:
         """Return a text about the statement that gave a frame its pose or its parent; nothing where none did."""
