@@ -9,8 +9,8 @@ import numpy as np
 
 from armwright.accuracy.cycles import checked_cycles
 from armwright.accuracy.planes import Legs, legs_of
-from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
-from armwright.arrays import Array, number, reduce_by_fields
+from armwright.accuracy.trace import Trace, frozen_array, positive, refuse_mixed_dimensions
+from armwright.arrays import Array, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # Of a leg that ends in another corner, so much belongs to the corner it comes from.
@@ -65,8 +65,8 @@ def corner_deviations(
     """
     count = checked_cycles("cornering", [len(runs)], few=few, least=1)
     refuse_mixed_dimensions([commanded.positions, *(run.positions for run in runs)], "cornering")
-    if band is not None and not 0 < number(band, "cornering: band") < np.inf:
-        raise InvalidValueError(f"cornering: the band must be above 0 m, got {band:g}")
+    if band is not None:
+        positive(band, "cornering: the band", "m")
     legs = legs_of(commanded)
     corners = np.flatnonzero(legs.corners)
     if not len(corners):

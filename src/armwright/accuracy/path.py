@@ -10,7 +10,7 @@ import numpy as np
 from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrapped
 from armwright.accuracy.cycles import Kind, checked_cycles
 from armwright.accuracy.planes import ENDS, Legs, legs_of, middles, passages
-from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
+from armwright.accuracy.trace import Trace, frozen_array, positive, refuse_mixed_dimensions
 from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
@@ -162,9 +162,7 @@ def path_velocity(
         ISO 9283:1998, 8.6.
     """
     count = _checked("velocity", commanded, runs, few=few)
-    speed = number(speed, "velocity: commanded speed")
-    if not 0 < speed < np.inf:
-        raise InvalidValueError(f"velocity: the commanded speed must be above 0 m/s, got {speed:g}")
+    speed = positive(speed, "velocity: the commanded speed", "m/s")
     start, end = part
     if not (0 <= start < end <= 1 and stretches >= 1):
         raise InvalidValueError(f"velocity: expected a part within 0 to 1 and a stretch at least, got {part}")

@@ -8,8 +8,8 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.cycles import Kind, checked_cycles
-from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
-from armwright.arrays import Array, number, reduce_by_fields
+from armwright.accuracy.trace import Trace, frozen_array, positive, refuse_mixed_dimensions
+from armwright.arrays import Array, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # The attained pose is the mean over this last part of a record, in which nothing may happen any more.
@@ -137,10 +137,7 @@ def attained_position(run: Trace) -> Array:
 def _checked(kind: Kind, runs: Sequence[Trace], band: float, *, few: bool) -> float:
     checked_cycles(kind, [len(runs)], few=few, least=1)
     refuse_mixed_dimensions([run.positions for run in runs], kind)
-    band = number(band, f"{kind}: band")
-    if not 0 < band < np.inf:
-        raise InvalidValueError(f"{kind}: the band must be above 0 m, got {band:g}")
-    return band
+    return positive(band, f"{kind}: the band", "m")
 
 
 def _arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, read_only, reduce_by_fields
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 # Three angles have names; a measurement may hold fewer.
@@ -57,6 +57,18 @@ def angles_of(value: ArrayLike | None, rows: int, what: str = "angles") -> Array
         raise ShapeError(f"{what}: expected shape ({rows}, k) with k up to 3, one row per position, got {array.shape}")
     array.setflags(write=False)
     return array
+
+
+def positive(value: float, what: str, unit: str) -> float:
+    """Return a number above 0.
+
+    Raises:
+        InvalidValueError: it is not.
+    """
+    checked = number(value, what)
+    if not 0 < checked < np.inf:
+        raise InvalidValueError(f"{what} must be above 0 {unit}, got {checked:g}")
+    return checked
 
 
 def refuse_mixed_dimensions(parts: Sequence[Array], what: str) -> None:

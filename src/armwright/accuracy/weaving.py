@@ -8,8 +8,8 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.cycles import checked_cycles
-from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
-from armwright.arrays import Array, number, reduce_by_fields
+from armwright.accuracy.trace import Trace, frozen_array, positive, refuse_mixed_dimensions
+from armwright.arrays import Array, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # A swing turns round where it has come back by this part of the whole width: more than from the middle to a side.
@@ -63,9 +63,7 @@ def weaving_deviation(commanded: Trace, runs: Sequence[Trace], speed: float, *, 
     """
     count = checked_cycles("weaving", [len(runs)], few=few, least=1)
     refuse_mixed_dimensions([commanded.positions, *(run.positions for run in runs)], "weaving")
-    speed = number(speed, "weaving: commanded speed")
-    if not 0 < speed < np.inf:
-        raise InvalidValueError(f"weaving: the commanded speed must be above 0 m/s, got {speed:g}")
+    speed = positive(speed, "weaving: the commanded speed", "m/s")
     line = commanded.positions[-1] - commanded.positions[0]
     if not np.linalg.norm(line) > 0:
         raise InvalidValueError("weaving: the commanded weave ends where it begins, so it has no middle line")

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import attrs
@@ -43,7 +44,6 @@ _MAX_POINTS = 300
 # Bounds of length scales in sines and cosines of the joints, of the amplitude, and of the noise, as parts of the
 # variance of the residuals.
 _LENGTH_SCALES, _AMPLITUDE, _NOISE = (0.1, 100.0), (1e-4, 10.0), (1e-3, 10.0)
-_HARMONICS = ("first", "second")
 
 
 class ModelComparison(NamedTuple):
@@ -156,8 +156,8 @@ class _Folds:
         self.folds = random_folds(measured.q, folds, seed)
         self.points = measured.with_point & (measured.frame == 0)
         self.configuration = distinct_configurations(measured.q)
-        self._calibrations: dict[tuple[frozenset[int], tuple[str, ...]], Calibration] = {}
-        self._residual_models: dict[tuple[frozenset[int], tuple[str, ...]], ResidualModel] = {}
+        self._calibrations: dict[Any, Calibration] = {}
+        self._residual_models: dict[Any, ResidualModel] = {}
 
     def without(self, out: frozenset[int]) -> Flags:
         """Return (m,) which readings are not in some folds."""
@@ -170,13 +170,8 @@ class _Folds:
         key = (out, tuple(error.name for error in joints))
         if key not in self._calibrations:
             called = f"part {' and '.join(str(fold + 1) for fold in sorted(out))} of {len(self.folds)}"
-            self._calibrations[key] = (
-                calibrate_without(
-                    self.arm, self.measured, ~self.without(out), called, base=self.base, joint_errors=joints
-                )
-                if out
-                else calibrate(self.arm, self.measured, base=self.base, joint_errors=joints)
-            )
+            fit = calibrate if not out else partial(calibrate_without, held_out=~self.without(out), called=called)
+            self._calibrations[key] = fit(self.arm, self.measured, base=self.base, joint_errors=joints)
         return self._calibrations[key]
 
     def residual_model(self, out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> ResidualModel:
@@ -331,14 +326,11 @@ def _select_joint_errors(
         comparisons: grows by what is tried here.
         report: called with what is being done.
     """
-    candidates = [("joint compliance under gravity", compliances(arm), f"{arm.name} has no masses")]
-    candidates += [
-        (
-            f"transmission error, {harmonic} harmonic",
-            transmission_errors(arm, order),
-            f"no joint of {arm.name} is revolute",
-        )
-        for order, harmonic in enumerate(_HARMONICS, 1)
+    fixed = f"no joint of {arm.name} is revolute"
+    candidates = [
+        ("joint compliance under gravity", compliances(arm), f"{arm.name} has no masses"),
+        ("transmission error, first harmonic", transmission_errors(arm, 1), fixed),
+        ("transmission error, second harmonic", transmission_errors(arm, 2), fixed),
     ]
     joints: tuple[JointErrorModel, ...] = ()
     accepted: list[tuple[int, tuple[JointErrorModel, ...]]] = []

@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.contact import damping
-from armwright.clearance.equations import WORKS, FrictionModel
+from armwright.clearance.equations import WORKS
 from armwright.clearance.ideal import gaps_of, tip_of
-from armwright.clearance.kernel import Control, Integrator, Layout, emit_simulation
+from armwright.clearance.kernel import Integrator, Layout, emit_simulation
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.rest import at_rest
 from armwright.clearance.scenario import Scenario
@@ -178,47 +178,36 @@ def _run(scenario: Scenario, layout: Layout, start: Array, contacts: Array, thre
         peaks=np.zeros((runs, pins)),
     )
     gains = np.tile(scenario.settings.gains, (runs, len(scenario.linkage.drives) if layout.gains else 0))
-    run = _compiled(
-        _LinkageKey(layout.linkage), layout.friction, layout.control, layout.located, scenario.settings.integrator
-    )
+    key = (_key_of(layout.linkage), layout.friction, layout.control, layout.located)
+    run = _compiled(_Simulated(key, layout), scenario.settings.integrator)
     lengths = scenario.lengths[:rows]
     inputs = (start, contacts, gains, scenario.table, lengths, samples, *record)
     on_cores_for_long(lambda first, last, cancelled: run(first, last, *inputs, cancelled), runs, threads)
     return record
 
 
-class _LinkageKey:
-    """A linkage as a key: two are equal if their compiled simulations are, whatever their clearances and materials."""
+def _key_of(linkage: Linkage) -> tuple[Any, ...]:
+    """Return what the compiled simulations of two linkages share, whatever their clearances and materials."""
+    bodies = (linkage.ground, *linkage.bodies)
+    points = tuple((name, *p) for b in bodies for name, p in b.points.items())
+    masses = tuple((b.name, b.mass, b.inertia, len(b.points), *b.centre) for b in bodies)
+    pins = tuple((pin.bearing, pin.journal, pin.journal_radius) for pin in linkage.pins)
+    loads = tuple((load.point, *load.force) for load in linkage.loads)
+    return points, masses, pins, loads, linkage.joints, linkage.drives, linkage.tip, *linkage.gravity, linkage.zero
 
-    def __init__(self, linkage: Linkage) -> None:
-        self.linkage = linkage
-        bodies = [
-            (b.name, b.mass, b.inertia, *b.centre, *((name, *p) for name, p in b.points.items()))
-            for b in linkage.bodies
-        ]
-        ground = tuple((name, *p) for name, p in linkage.ground.points.items())
-        pins = [(pin.bearing, pin.journal, pin.journal_radius) for pin in linkage.pins]
-        loads = [(load.point, *load.force) for load in linkage.loads]
-        others = (linkage.joints, linkage.drives, linkage.tip, *linkage.gravity, linkage.zero)
-        self._key = (tuple(bodies), ground, tuple(pins), tuple(loads), others)
 
-    def __hash__(self) -> int:
-        return hash(self._key)
+@attrs.frozen
+class _Simulated:
+    """The layout of a simulation, of which the key alone is compared."""
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _LinkageKey) and self._key == other._key
+    key: tuple[Any, ...]
+    layout: Layout = attrs.field(eq=False)
 
 
 @cache
-def _compiled(
-    key: _LinkageKey,
-    friction: FrictionModel,
-    control: Control,
-    located: bool,  # noqa: FBT001 - a part of the key
-    integrator: Integrator,
-) -> Any:
-    layout = Layout(linkage=key.linkage, friction=friction, control=control, located=located)
-    return compiled(emit_simulation(layout, integrator), "simulate", f"the simulation of {key.linkage.name}")
+def _compiled(simulated: _Simulated, integrator: Integrator) -> Any:
+    layout = simulated.layout
+    return compiled(emit_simulation(layout, integrator), "simulate", f"the simulation of {layout.linkage.name}")
 
 
 def _simulation(scenario: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:

@@ -16,7 +16,7 @@ from armwright.clearance.estimation.measurement_file import PathMeasurement, Res
 from armwright.clearance.estimation.misfit import refuse_contradiction
 from armwright.clearance.estimation.model_errors import ModelError, model_errors
 from armwright.clearance.estimation.on_paths import SweepSurrogate, surrogate_from_sweep
-from armwright.clearance.estimation.posterior import posterior
+from armwright.clearance.estimation.posterior import Posterior, posterior
 from armwright.clearance.estimation.static import Estimate
 from armwright.clearance.linkage import Linkage
 from armwright.errors import FileFormatError, InvalidValueError, TooFewError
@@ -168,15 +168,10 @@ def assess_rest(linkage: Linkage, measured: RestMeasurement, noise: float | None
         for name, at_bound in zip(estimate.names, estimate.at_bound, strict=True)
         if at_bound
     ]
+    identifiable = dict(zip(estimate.names, estimate.identifiable(largest), strict=True))
     return EstimateAssessment(
         method="rest",
-        parameters=_parameters(
-            estimate.names,
-            estimate.values,
-            estimate.deviations,
-            estimate.interval(_LEVEL),
-            dict(zip(estimate.names, estimate.identifiable(largest), strict=True)),
-        ),
+        parameters=_parameters(estimate, estimate.values, identifiable),
         correlation=estimate.correlation,
         misfit=misfit,
         widening=widening,
@@ -224,13 +219,7 @@ def assess_paths(
         )
     return EstimateAssessment(
         method="paths",
-        parameters=_parameters(
-            distribution.names,
-            distribution.mean,
-            distribution.deviations,
-            distribution.interval(_LEVEL),
-            distribution.identifiable,
-        ),
+        parameters=_parameters(distribution, distribution.mean, distribution.identifiable),
         correlation=distribution.correlation,
         misfit=distribution.misfit,
         widening=distribution.widening,
@@ -278,18 +267,12 @@ def _check_noise(noise: float) -> None:
         raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise * 1e6:g} µm")
 
 
-def _parameters(
-    names: tuple[str, ...], mean: Array, deviations: Array, intervals: Array, identifiable: Mapping[str, bool]
-) -> dict[str, dict[str, Any]]:
+def _parameters(fit: Estimate | Posterior, mean: Array, identifiable: Mapping[str, bool]) -> dict[str, dict[str, Any]]:
     """Return estimated parameters by the names of their pins, as plain data."""
+    columns = zip(fit.names, mean.tolist(), fit.deviations.tolist(), fit.interval(_LEVEL).tolist(), strict=True)
     return {
-        name.removeprefix("c_"): {
-            "mean": float(mean[i]),
-            "deviation": float(deviations[i]),
-            "interval": intervals[i].tolist(),
-            "identifiable": identifiable[name],
-        }
-        for i, name in enumerate(names)
+        name.removeprefix("c_"): {"mean": m, "deviation": s, "interval": ends, "identifiable": identifiable[name]}
+        for name, m, s, ends in columns
     }
 
 
