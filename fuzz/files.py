@@ -52,7 +52,7 @@ VALUES = (
 )
 _NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-LONGEST_S, LARGEST_MB = 5, 1000
+MAX_S_LENGTH, LARGEST_MB = 5, 1000
 
 
 def _some(text: str, pattern: re.Pattern[str], rng: random.Random) -> tuple[int, int]:
@@ -216,13 +216,13 @@ def main() -> None:
         for number in range(count):
             text = changed(valid, random.Random(f"{seed} {number}"))  # noqa: S311 - chance, not secrets
             start = time.process_time()
-            signal.setitimer(signal.ITIMER_REAL, 60 * LONGEST_S)
+            signal.setitimer(signal.ITIMER_REAL, 60 * MAX_S_LENGTH)
             said = fails(target, path, text)
             signal.setitimer(signal.ITIMER_REAL, 0)
             taken = time.process_time() - start
             slowest = max(slowest, taken)
             memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-            if said or taken > LONGEST_S or memory > LARGEST_MB:
+            if said or taken > MAX_S_LENGTH or memory > LARGEST_MB:
                 failures += 1
                 kept = ROOT / "out" / "fuzz" / f"{target}-{seed}-{number}{suffix}"
                 kept.parent.mkdir(parents=True, exist_ok=True)

@@ -7,8 +7,8 @@ import lazy_loader
 
 from armwright.errors import closest
 
-LONGEST_SIGNATURE = 200
-LONGEST_DEFAULT = 40
+MAX_SIGNATURE_LENGTH = 200
+MAX_DEFAULT_LENGTH = 40
 
 
 def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
@@ -48,7 +48,7 @@ def readable(value: Any) -> Any:
     shown_as: Any = value
     signature = inspect.signature(value.__init__ if inspect.isclass(value) else value)
     parameters = list(signature.parameters.values())[inspect.isclass(value) :]
-    if len(str(signature.replace(parameters=parameters))) > LONGEST_SIGNATURE:
+    if len(str(signature.replace(parameters=parameters))) > MAX_SIGNATURE_LENGTH:
         shown = [
             p.replace(annotation=p.empty, default=_LongDefault() if _is_long(p.default, p.empty) else p.default)
             for p in parameters
@@ -58,4 +58,4 @@ def readable(value: Any) -> Any:
 
 
 def _is_long(default: Any, empty: Any) -> bool:
-    return default is not empty and (len(repr(default)) > LONGEST_DEFAULT or repr(default) == "NOTHING")
+    return default is not empty and (len(repr(default)) > MAX_DEFAULT_LENGTH or repr(default) == "NOTHING")

@@ -12,11 +12,11 @@ from typing import ClassVar
 # Glyphs that are easily confused in a scan or a listing.
 _CONFUSABLE = str.maketrans({"I": "1", "L": "1", "O": "0", "-": "_", "S": "5", "B": "8"})
 # A longer word is not compared with names, as this takes time quadratic in the length.
-_LONGEST_NAME = 100
+_MAX_NAME_LENGTH = 100
 # Known names that a message lists at most.
-_MOST_LISTED = 100
+_MAX_LISTED = 100
 # Characters of an invalid value that a message shows at most.
-_LONGEST_SHOWN = 60
+_MAX_SHOWN_LENGTH = 60
 # Characters at the beginning and at the end of a message that is shortened.
 _BEGINNING, _ENDING = 4000, 500
 
@@ -97,9 +97,9 @@ class UnknownNameError(ArmwrightError, LookupError):
         name, choices = str(name), sorted(known)
         near = closest(name, choices)
         hint = f" Did you mean '{near}'?" if near else ""
-        more = f" and {len(choices) - _MOST_LISTED:,} more" if len(choices) > _MOST_LISTED else ""
-        listing = f" Known: {', '.join(choices[:_MOST_LISTED])}{more}." if choices else " There is none."
-        name = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}..."
+        more = f" and {len(choices) - _MAX_LISTED:,} more" if len(choices) > _MAX_LISTED else ""
+        listing = f" Known: {', '.join(choices[:_MAX_LISTED])}{more}." if choices else " There is none."
+        name = name if len(name) <= _MAX_NAME_LENGTH else f"{name[:_MAX_NAME_LENGTH]}..."
         super().__init__(f"no {kind} '{name}'.{hint}{listing}")
 
 
@@ -183,7 +183,7 @@ def one_of(kind: str, name: str, known: Iterable[str]) -> str:
 def shown(value: object) -> str:
     """Return the text of a value for a message: on a single line and of limited length."""
     text = " ".join(repr(value).split())
-    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+    return text if len(text) <= _MAX_SHOWN_LENGTH else f"{text[:_MAX_SHOWN_LENGTH]}..."
 
 
 def counted(count: int, thing: str) -> str:
@@ -212,7 +212,7 @@ def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
     Returns:
         The nearest name, or None when none is near.
     """
-    if len(name) > _LONGEST_NAME:
+    if len(name) > _MAX_NAME_LENGTH:
         return None
     word = name.upper()
     glyphs = word.translate(_CONFUSABLE)

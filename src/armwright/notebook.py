@@ -5,13 +5,13 @@ from html import escape
 from itertools import islice
 
 # More rows than this are counted, not shown.
-_MOST_ROWS = 100
+_MAX_ROWS = 100
 
 
 def html_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str | float]]) -> str:
     """Return a table with a caption; numbers with six digits, of very many rows the first."""
     every = iter(rows)
-    shown = ["".join(f"<td>{_text(cell)}</td>" for cell in row) for row in islice(every, _MOST_ROWS)]
+    shown = ["".join(f"<td>{_text(cell)}</td>" for cell in row) for row in islice(every, _MAX_ROWS)]
     if more := sum(1 for _ in every):
         shown.append(f'<td colspan="{len(columns)}">and {more} more</td>')
     head = "".join(f"<th>{escape(column)}</th>" for column in columns)

@@ -21,7 +21,7 @@ CELL = cell_of("cell2")
 CERTAIN = {"E301", "E303", "E304", "E305", "E306", "E307", "E310"}
 SHORT = Limits(steps=3000, depth=30, time=200)
 SEEDS = 45
-MOST_REPAIRS = 8
+MAX_REPAIRS = 8
 
 
 def compiled(text: str) -> Compilation:
@@ -87,7 +87,7 @@ def without(text: str, line: int) -> str | None:
 def test_certain_errors_are_errors_of_runs(seed: int) -> None:
     """A run that comes to a statement of which an error was said fails there; arms that were named do the work."""
     text: str | None = Wandering(seed).program()
-    for _ in range(MOST_REPAIRS):
+    for _ in range(MAX_REPAIRS):
         assert text is not None
         compilation = compiled(text)
         if {one.code for one in compilation.diagnostics if one.is_error} - CERTAIN:

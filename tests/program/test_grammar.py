@@ -12,7 +12,7 @@ from armwright.program.language.words import Standard
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import scan
 from armwright.program.syntax.parser import parse
-from armwright.program.syntax.token_stream import DEEPEST
+from armwright.program.syntax.token_stream import MAX_DEPTH
 
 # So often a thing is repeated that no sound program would.
 MANY = 10_000
@@ -195,8 +195,8 @@ def test_depth(text: str) -> None:
     program, found = read(f"BEGIN {text} ; n = 2 END.")
 
     assert found
-    assert depth(program) <= 2 * DEEPEST
-    assert depth(program.statements) < DEEPEST + 20
+    assert depth(program) <= 2 * MAX_DEPTH
+    assert depth(program.statements) < MAX_DEPTH + 20
 
 
 @pytest.mark.parametrize("text", [f"1{' + x' * MANY}", f"{'(' * 90}1{(' + x' * 80 + ')') * 90}"])
@@ -207,12 +207,12 @@ def test_long_is_not_deep(text: str) -> None:
     assert found == []
 
 
-@pytest.mark.parametrize("terms", [DEEPEST // 2 - 1, DEEPEST // 2 + 1])
+@pytest.mark.parametrize("terms", [MAX_DEPTH // 2 - 1, MAX_DEPTH // 2 + 1])
 def test_deepest(terms: int) -> None:
     """Sums inside of sums, each in its parentheses, may be nearly fifty deep, and no deeper."""
     _, found = read(f"BEGIN n = {'(1 + ' * terms}x{')' * terms} END.")
 
-    assert [one.code for one in found] == (["E119"] if terms > DEEPEST // 2 else [])
+    assert [one.code for one in found] == (["E119"] if terms > MAX_DEPTH // 2 else [])
 
 
 def test_linear_time() -> None:

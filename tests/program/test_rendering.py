@@ -6,7 +6,7 @@ import time
 import pytest
 
 from armwright.program import Source, compile as translate
-from armwright.program.diagnostics.render import MOST_SHOWN, render, render_rich
+from armwright.program.diagnostics.render import MAX_SHOWN, render, render_rich
 from armwright.program.language.diagnostic import Diagnostic, Fix, Label, Severity, to_json
 from armwright.program.language.source import Span
 
@@ -177,7 +177,7 @@ def test_thousands_in_one_line() -> None:
         for at in range(0, len(text), len(text) // 2000)
     ]
     started = time.process_time()
-    several = [diagnostics[at : at + MOST_SHOWN] for at in range(0, len(diagnostics), MOST_SHOWN)]
+    several = [diagnostics[at : at + MAX_SHOWN] for at in range(0, len(diagnostics), MAX_SHOWN)]
     rows = [row for some in several for row in render(some, Source("t.rlo", text)).splitlines()]
 
     assert len(rows) > 10_000

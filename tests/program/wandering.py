@@ -25,7 +25,7 @@ _SIMPLE = (
     (16, "MOVE {frame} TO {frame}"),
 )
 _WEIGHTS, _TEXTS = [weight for weight, _ in _SIMPLE], [text for _, text in _SIMPLE]
-_DEEPEST = 3
+_MAX_DEPTH = 3
 
 
 class Wandering:
@@ -76,7 +76,7 @@ class Wandering:
         return "BEGIN\n" + " ;\n".join(body) + "\nEND"
 
     def _statement(self) -> str:
-        if self._depth >= _DEEPEST or self._random.random() < self._simple:
+        if self._depth >= _MAX_DEPTH or self._random.random() < self._simple:
             text = self._random.choices(_TEXTS, _WEIGHTS)[0]
             return "".join(self._filled(text))
         self._depth += 1

@@ -18,7 +18,7 @@ from armwright.errors import InvalidValueError
 
 # A hypothesis is rejected at this level of significance; so few outliers are not tested, and so large a part of all is
 # too many.
-_SIGNIFICANCE, _FEWEST, _MANY = 1e-4, 5, 0.2
+_SIGNIFICANCE, _MIN_COUNT, _MANY = 1e-4, 5, 0.2
 # Errors of a link that are larger than so many prior sigmas are no errors of a link.
 _MAX_SIGMAS = 3.0
 
@@ -37,7 +37,7 @@ def contradictions(calibration: Calibration, measured: Readings, noise: float | 
     outlying = np.zeros(len(measured), dtype=np.bool_)
     outlying[list(calibration.outliers)] = True
     count = int(outlying.sum())
-    shared = _shared_joint(measured.q, outlying) if _FEWEST <= count <= len(measured) - _FEWEST else None
+    shared = _shared_joint(measured.q, outlying) if _MIN_COUNT <= count <= len(measured) - _MIN_COUNT else None
     if shared is not None:
         yield (
             f"the {count} readings that do not count are those in which joint {shared + 1} is elsewhere "

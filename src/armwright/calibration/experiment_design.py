@@ -28,7 +28,7 @@ INDICES: tuple[Index, ...] = ("O1", "O2", "O3", "O4", "O5")
 # Candidates in all, and at least so many for each pose that is asked for.
 _CANDIDATES, _PER_POSE = 400, 4
 # More poses than anybody measures.
-_MOST_POSES = 10_000
+_MAX_POSES = 10_000
 # Exchanges of single poses at most.
 _MAX_EXCHANGES = 200
 # Noise for which errors have to be identifiable [m], [rad].
@@ -126,8 +126,8 @@ def plan_poses(
         UnknownNameError: there is no such index.
     """
     one_of("index", index, INDICES)
-    if not 1 <= count <= _MOST_POSES:
-        expected = "1 pose or more" if count < 1 else f"{_MOST_POSES:,} poses or fewer"
+    if not 1 <= count <= _MAX_POSES:
+        expected = "1 pose or more" if count < 1 else f"{_MAX_POSES:,} poses or fewer"
         raise InvalidValueError(f"count: expected {expected}, got {count}")
     chain = chain_of(arm)
     rng = np.random.default_rng(seed)

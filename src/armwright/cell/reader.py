@@ -49,7 +49,7 @@ _AFTER_LAST = ("nothing", "same")
 # A hundred times that of the earth: more is a slip of units [m/s²].
 _STRONGEST_GRAVITY = 1000.0
 # Fingers and cameras that take longer are a slip of units [s].
-_LONGEST_WAIT = 600.0
+_MAX_WAIT = 600.0
 
 
 def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
@@ -76,7 +76,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         visions=_visions(top.table("visions")),
         camera=_pose(camera, "pose", default=np.eye(4)),
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
-        vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_LONGEST_WAIT),
+        vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_WAIT),
         devices=_devices(top.table("devices")) if "devices" in top else None,
         contact=ContactPlane(
             height=None if math.isnan(height) else height,
@@ -163,7 +163,7 @@ def _arm(table: Table, folder: Path) -> CellArm:
     base = _pose(table, "base", default=np.eye(4))
     start = _start(table, arm, base)
     waits = {
-        name: table.number(key, default=0.3, lower=0.0, upper=_LONGEST_WAIT)
+        name: table.number(key, default=0.3, lower=0.0, upper=_MAX_WAIT)
         for name, key in (("open_time", "open_s"), ("grasp_time", "grasp_s"))
     }
     table.finish()

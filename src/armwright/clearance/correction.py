@@ -30,9 +30,9 @@ from armwright.errors import InvalidValueError, ShapeError
 # Larger corrections have another cause than clearance [m].
 _LARGEST = 0.02
 # Knots of the shift of a path: more would be closer together than the samples of a simulation.
-_MOST_KNOTS = 1000
+_MAX_KNOTS = 1000
 # Three rounds reduce the error to a millionth; the remainder is chance.
-_MOST_ROUNDS = 100
+_MAX_ROUNDS = 100
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -110,8 +110,8 @@ def correct_path(
     Raises:
         InvalidValueError: the linkage diverges, the number of knots is out of range, or a correction exceeds 20 mm.
     """
-    if not 2 <= knots <= _MOST_KNOTS:
-        raise InvalidValueError(f"knots: expected 2 to {_MOST_KNOTS}, got {knots}")
+    if not 2 <= knots <= _MAX_KNOTS:
+        raise InvalidValueError(f"knots: expected 2 to {_MAX_KNOTS}, got {knots}")
     times = np.linspace(0.0, goal.duration, knots)
     timed = attrs.evolve(goal, targets=tuple(times.tolist()))
     goals = goal.evaluate(times).position
@@ -194,8 +194,8 @@ def _corrected(  # noqa: PLR0917 - the inputs that both kinds of correction shar
     progress: Callable[[float], None] | None,
 ) -> Correction:
     """Move the nodes of a path against the mean error at its goals (j, 2), which are the nodes of the original path."""
-    if not 0 <= rounds <= _MOST_ROUNDS:
-        raise InvalidValueError(f"rounds: expected 0 to {_MOST_ROUNDS}, got {rounds}")
+    if not 0 <= rounds <= _MAX_ROUNDS:
+        raise InvalidValueError(f"rounds: expected 0 to {_MAX_ROUNDS}, got {rounds}")
     c = floats(clearances, "clearances")
     if c.ndim not in (1, 2):
         raise ShapeError(f"clearances: expected one row or several, got shape {c.shape}")

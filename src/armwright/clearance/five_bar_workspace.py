@@ -28,7 +28,7 @@ _ON_CIRCLE = 1e-9
 # Rods so little bent are in one line: the sine of their angle.
 _IN_LINE = 1e-12
 # The largest number of cells along a side of the grid of the workspace.
-_MOST_CELLS = 4000
+_MAX_CELLS = 4000
 
 
 class Singularity(NamedTuple):
@@ -130,8 +130,8 @@ def workspace(bar: FiveBar, cells: int = 200) -> Workspace:
     Raises:
         InvalidValueError: the arms never meet, or the cells are too many or too few.
     """
-    if not 2 <= cells <= _MOST_CELLS:
-        raise InvalidValueError(f"cells: expected 2 to {_MOST_CELLS}, got {cells}")
+    if not 2 <= cells <= _MAX_CELLS:
+        raise InvalidValueError(f"cells: expected 2 to {_MAX_CELLS}, got {cells}")
     low, high = (np.array([_extreme_point(bar, i, sign)[i] for i in range(2)]) for sign in (-1, 1))
     size = float((high - low).max()) / cells
     counts = np.maximum(2, np.ceil((high - low) / size - 1e-9).astype(int))

@@ -21,9 +21,9 @@ from armwright.tracing.scalar import Scalar
 
 # Newton's iteration ends when no coordinate moves by more [rad, m].
 _CLOSED = 1e-13
-_MOST_ITERATIONS = 50
+_MAX_ITERATIONS = 50
 # A Newton step is limited to this, so that it does not jump to another assembly [rad, m].
-_LONGEST_STEP = 0.3
+_MAX_STEP = 0.3
 # Samples per block: the arrays of a block fit the cache of the processor.
 _BLOCK = 8192
 
@@ -91,14 +91,14 @@ def closed(
 def _close(linkage: Linkage, q: Array, goal: Array, apart: Array, *, by_tip: bool) -> int | None:
     """Close the loops of configurations (s, n) in place; return the index of the worst, if any stays open."""
     done = np.zeros((len(q), 1), dtype=bool)
-    for _ in range(_MOST_ITERATIONS):
+    for _ in range(_MAX_ITERATIONS):
         placement = _placed(linkage, q)
         residuals = _residuals(placement, goal, by_tip=by_tip)
         residuals[..., : apart.shape[-1]] -= apart
         with np.errstate(invalid="ignore"):
             step = _solved(_closure(placement, by_tip), -residuals)
         size = np.abs(step).max(axis=-1, keepdims=True, initial=0.0)
-        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
+        step *= np.minimum(1.0, _MAX_STEP / np.maximum(size, 1e-300))
         q += np.where(done, 0.0, step)
         if not np.all(np.isfinite(q)):
             break

@@ -18,7 +18,7 @@ from armwright.clearance.ideal import balance, closed, gaps_of, tip_of
 from armwright.clearance.linkage import Linkage
 from armwright.errors import InvalidValueError, ShapeError
 
-_MOST_ITERATIONS = 60
+_MAX_ITERATIONS = 60
 # The iteration ends when no coordinate changes by more [rad, m].
 _CONVERGED = 1e-14
 # Changes below this are rounding; an iteration that ends with larger ones has not converged [rad, m].
@@ -72,7 +72,7 @@ def at_rest(
     drives = q[..., list(linkage.driven)]
     still = np.zeros_like(q)
     converged = np.zeros((*lead, 1), dtype=bool)
-    for _ in range(_MOST_ITERATIONS):
+    for _ in range(_MAX_ITERATIONS):
         _, reactions = balance(linkage, q, still, still)
         size = forces_of(linkage, reactions)
         gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
@@ -85,7 +85,7 @@ def at_rest(
             break
     if np.any(~converged & (moved > _ROUNDING)):
         raise InvalidValueError(
-            f"{linkage.name} has no equilibrium: after {_MOST_ITERATIONS} iterations it still moves by "
+            f"{linkage.name} has no equilibrium: after {_MAX_ITERATIONS} iterations it still moves by "
             f"{moved.max():.2g}; expected drives locked away from singular configurations"
         )
     return StaticEquilibrium(q=q, tip=tip_of(linkage, q), gaps=gaps_of(linkage, q), forces=size)

@@ -20,7 +20,7 @@ STARTS: tuple[Start, ...] = ("rest", "rigid", "centred")
 # The force of a typical contact at rest [N], and the largest step times its angular frequency.
 _USUAL_FORCE, _LARGEST_PART = 20.0, 0.7
 # A path of more steps has a mistaken unit.
-_MOST_STEPS = 20_000_000
+_MAX_STEPS = 20_000_000
 
 
 @attrs.frozen(kw_only=True)
@@ -75,10 +75,10 @@ class Settings:
             InvalidValueError: they are more than the limit.
         """
         count = duration / self.step - 1e-9
-        steps = max(1, int(np.ceil(min(count, 2.0 * _MOST_STEPS))))
-        if steps > _MOST_STEPS:
+        steps = max(1, int(np.ceil(min(count, 2.0 * _MAX_STEPS))))
+        if steps > _MAX_STEPS:
             raise InvalidValueError(
-                f"{duration:g} s would take {count:.3g} steps of {self.step:g} s; at most {_MOST_STEPS:,} are made"
+                f"{duration:g} s would take {count:.3g} steps of {self.step:g} s; at most {_MAX_STEPS:,} are made"
             )
         return steps
 

@@ -46,7 +46,7 @@ _AROUND = 5
 _SLICE = 0.05
 _PROMPT = "(rlo) "
 # Digits of a count, or of the number of a breakpoint or process, at most.
-_MOST_DIGITS = 15
+_MAX_DIGITS = 15
 _EVENT_LOG_HINT = "`armwright run -o FOLDER` writes all to events.jsonl"
 
 
@@ -262,6 +262,6 @@ class _NumberError(ArmwrightError, ValueError):
 
 def _number(text: str) -> int:
     number = text.strip()
-    if not number.isdecimal() or len(number) > _MOST_DIGITS:
+    if not number.isdecimal() or len(number) > _MAX_DIGITS:
         raise _NumberError(f"expected an integer, got `{shortened(number)}`")
     return int(number)

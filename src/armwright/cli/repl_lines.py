@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from armwright.program.repl.session import Session
 
 # Lines of earlier sessions that the arrow keys recall.
-_LONGEST_HISTORY = 2000
+_MAX_HISTORY_LENGTH = 2000
 # Characters that end a word; a colon begins a command, and a slash separates the folders of a path.
 _DELIMITERS = ' \t\n()[],;:=<>*/+"'
 _PROMPT = "\001\033[1;34m\002{}\001\033[0m\002"
@@ -84,7 +84,7 @@ def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
     if history:
         with contextlib.suppress(OSError):
             readline.read_history_file(history)
-    readline.set_history_length(_LONGEST_HISTORY)
+    readline.set_history_length(_MAX_HISTORY_LENGTH)
     readline.set_completer_delims(_DELIMITERS)
 
     def complete(word: str, number: int) -> str | None:

@@ -28,7 +28,7 @@ _HIDDEN = re.compile(
 
 
 # Largest plausible number of columns or lines of a terminal.
-_MOST_COLUMNS = 10_000
+_MAX_COLUMNS = 10_000
 
 
 def cleaned(text: str) -> str:
@@ -102,7 +102,7 @@ def bound_widths() -> None:
     """Remove implausible sizes of the terminal from the environment."""
     for name in ("COLUMNS", "LINES", "TERMINAL_WIDTH"):
         size = os.environ.get(name, "")
-        if size and not (size.isascii() and size.isdigit() and len(size) < 10 and 0 < int(size) <= _MOST_COLUMNS):
+        if size and not (size.isascii() and size.isdigit() and len(size) < 10 and 0 < int(size) <= _MAX_COLUMNS):
             del os.environ[name]
 
 

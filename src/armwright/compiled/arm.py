@@ -20,7 +20,7 @@ from armwright.tracing.kernel import Kernel
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
 # Arms whose functions are kept, those asked for last.
-_MOST_ARMS = 64
+_MAX_ARMS = 64
 _COMPILED: OrderedDict[object, CompiledArm] = OrderedDict()
 _COMPILED_LOCK = Lock()
 
@@ -41,7 +41,7 @@ def compile_arm(arm: Arm) -> CompiledArm:
     with _COMPILED_LOCK:
         compiled = _COMPILED.pop(key, None) or CompiledArm(arm=arm)
         _COMPILED[key] = compiled
-        if len(_COMPILED) > _MOST_ARMS:
+        if len(_COMPILED) > _MAX_ARMS:
             _COMPILED.popitem(last=False)
     return compiled
 

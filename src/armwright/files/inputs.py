@@ -23,7 +23,7 @@ _KINDS = {
     stat.S_IFDIR: "a folder",
 }
 # Names of a folder among which the nearest to a missing one is looked for.
-_MOST_NAMES = 1000
+_MAX_NAMES = 1000
 # The SHA-256 hash of what was read last of every file: the file may be another by now, or a pipe, which is empty then.
 _READ: dict[Path, str] = {}
 # The files that this process has read, by where they were then.
@@ -228,6 +228,6 @@ def _line_too_long(path: Path | str, line: int) -> FileFormatError:
 def _names_in(folder: Path) -> list[str]:
     try:
         with os.scandir(folder) as entries:
-            return sorted(entry.name for entry, _ in zip(entries, range(_MOST_NAMES), strict=False))
+            return sorted(entry.name for entry, _ in zip(entries, range(_MAX_NAMES), strict=False))
     except OSError:
         return []

@@ -39,7 +39,7 @@ _NAMES = re.compile(
 # A record that is larger is none of ours [bytes], and hashes are worked out in pieces [bytes].
 _LARGEST_RECORD, _PIECE = 200_000_000, 1 << 20
 # Links that a path may lead through, as Linux has it.
-_MOST_LINKS = 40
+_MAX_LINKS = 40
 
 
 def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str, Any] | None = None) -> None:
@@ -110,7 +110,7 @@ def descriptor(path: Path) -> int | None:
     """Return the number of the open descriptor that a path names, such as ``/dev/stdin``; None where it names none."""
     folders = (Path(f"/proc/{os.getpid()}/fd"), Path("/dev/fd"))
     with contextlib.suppress(OSError, ValueError):
-        for _ in range(_MOST_LINKS):
+        for _ in range(_MAX_LINKS):
             folder = path.parent.resolve()
             if folder in folders and path.name.isascii() and path.name.isdigit():
                 return int(path.name[:9])

@@ -23,7 +23,7 @@ _NAME = re.compile(rf"{re.escape(PREFIX)}[0-9a-f]{{{_DIGITS}}}")
 _LOCK, NEW, KEPT = "lock", "new", "kept"
 # What is in a staging folder; a folder of that name with anything else in it is somebody else's.
 _OWN = {_LOCK, NEW, KEPT}
-_LONGEST_PATH = 65536
+_MAX_PATH_LENGTH = 65536
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -95,7 +95,7 @@ def _remove_if_abandoned(folder: Path, target: Path | None, found: Callable[[Pat
         lock = os.open(folder / _LOCK, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
         try:
             if stat.S_ISREG(os.fstat(lock).st_mode) and _locked(lock):
-                if found is not None and target is not None and os.read(lock, _LONGEST_PATH) == os.fsencode(target):
+                if found is not None and target is not None and os.read(lock, _MAX_PATH_LENGTH) == os.fsencode(target):
                     found(folder / NEW)
                 _remove(folder)
         finally:

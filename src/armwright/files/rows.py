@@ -16,7 +16,7 @@ _SEPARATORS = (",", ";", "\t")
 # A line of these alone is empty.
 _NOTHING = ' ,;\t\r\n"'
 # A number that is written longer is shown rounded.
-_LONGEST = 40
+_MAX_LENGTH = 40
 
 
 class Cells(NamedTuple):
@@ -146,7 +146,7 @@ class NumberFormat:
             hint = "; write a decimal point" if _parsed(text.replace(",", ".")) is not None else ""
             raise FileFormatError(self._path, line, header, f"expected a number, got {shown(text)}{hint}")
         if not abs(value) <= LARGEST:
-            got = text if len(text) < _LONGEST else f"{value:g}"
+            got = text if len(text) < _MAX_LENGTH else f"{value:g}"
             raise FileFormatError(
                 self._path, line, header, f"every number must be finite and no larger than {LARGEST:g}, got {got}"
             )

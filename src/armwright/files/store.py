@@ -27,7 +27,7 @@ from armwright.errors import CacheWarning
 _MARK = b"armwright store 1\n"
 _DIGEST = hashlib.sha256().digest_size
 # No entry of ours comes near it; what is longer is not read [bytes].
-_LONGEST = 1 << 28
+_MAX_LENGTH = 1 << 28
 _HALF = ".tmp"
 # A half-written file is left by a process that was killed; after so long no process still writes it [s].
 _FORGOTTEN = 3600.0
@@ -253,7 +253,7 @@ def _read(path: Path) -> bytes:
     with os.fdopen(handle, "rb") as file:
         about = os.fstat(handle)
         sound = stat.S_ISREG(about.st_mode) and _trusted(about.st_uid) and not about.st_mode & _OTHERS_WRITE
-        return file.read(about.st_size) if sound and about.st_size < _LONGEST else b""
+        return file.read(about.st_size) if sound and about.st_size < _MAX_LENGTH else b""
 
 
 def _replace(path: Path, data: bytes) -> None:

@@ -20,7 +20,7 @@ from armwright.files.column_names import WORD, Heading, Schema, headings_of, pla
 from armwright.files.rows import Cells, NumberFormat, read_rows
 
 # Of the lines in which a column is empty a message names this many.
-_MOST_LINES = 20
+_MAX_LINES = 20
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -283,7 +283,7 @@ class _Incomplete:
         self._first = self._first or (line, empty[0])
         for heading in empty:
             count, lines = self._columns.get(heading.text, (0, []))
-            if len(lines) < _MOST_LINES:
+            if len(lines) < _MAX_LINES:
                 lines.append(line)
             self._columns[heading.text] = count + 1, lines
 

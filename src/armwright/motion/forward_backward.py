@@ -18,8 +18,8 @@ from armwright.arrays import Array
 from armwright.errors import ArmwrightError, MissingExtraError
 
 # The largest x there is, where nothing binds. The solver of toppra loses its path among numbers so far apart.
-MOST = 1e12
-_MOST_OF_TOPPRA = 1e3
+MAX_COUNT = 1e12
+_MAX_OF_TOPPRA = 1e3
 # A coefficient of u this much smaller than the largest is 0.
 _NONE = 1e-12
 # Bounds may be passed by this much: rounding.
@@ -48,7 +48,7 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) ->
     """
     sides, twice = _sides(bounds), (2 * lengths).tolist()
     reachable = [0.0] * (len(twice) + 1)
-    reachable[-1] = MOST if rests[1] else 0.0
+    reachable[-1] = MAX_COUNT if rests[1] else 0.0
     top, top_highs, top_lows = sides.top.tolist(), *sides.room(sides.top)
     for i in reversed(range(len(twice))):
         # Mostly the end is reached from the largest x of all.
@@ -91,9 +91,9 @@ def _sides(bounds: Bounds) -> _Sides:
     side = np.sign(a)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         upper, lower = np.where(on_u, (side - c) / a, np.inf), np.where(on_u, (-side - c) / a, -np.inf)
-        tops = np.where(on_u | (b == 0), MOST, (1 - np.sign(b) * c) / np.abs(b))
+        tops = np.where(on_u | (b == 0), MAX_COUNT, (1 - np.sign(b) * c) / np.abs(b))
         lean = np.where(on_u, b / a, 0.0)
-    return _Sides(upper, lower, lean, np.minimum(tops.min(axis=1), MOST))
+    return _Sides(upper, lower, lean, np.minimum(tops.min(axis=1), MAX_COUNT))
 
 
 def _largest(sides: _Sides, i: int, twice: float, reachable: float) -> float:
@@ -138,13 +138,13 @@ def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array
         np.concatenate([np.eye(rows), -np.eye(rows)]),
         np.ones(2 * rows),
         None,
-        np.tile((0.0, _MOST_OF_TOPPRA), (len(s), 1)),
+        np.tile((0.0, _MAX_OF_TOPPRA), (len(s), 1)),
     )
     limits = constraint.LinearConstraint()
     limits.identical = True
     limits.compute_constraint_params = lambda *_arguments: params
     run = algorithm.TOPPRA([limits], SimpleNamespace(path_interval=s[[0, -1]]), gridpoints=s, solver_wrapper="seidel")
-    sets = run.compute_controllable_sets(0.0, math.sqrt(_MOST_OF_TOPPRA) if rests[1] else 0.0)
+    sets = run.compute_controllable_sets(0.0, math.sqrt(_MAX_OF_TOPPRA) if rests[1] else 0.0)
     sd = None
     if not np.isnan(sets).any():
         run.compute_controllable_sets = lambda *_ends: sets  # an end that is left free is not among its arguments

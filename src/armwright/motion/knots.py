@@ -11,7 +11,7 @@ from armwright.errors import InvalidValueError, ShapeError
 # A motion shorter than a billionth of a second is a slip of the unit; powers of its time would not be numbers [s].
 SHORTEST = 1e-9
 # Nor would those of a time as long as this [s].
-_LONGEST = 1e50
+_MAX_LENGTH = 1e50
 # A path of no joint farther than this is rounding of the inverse kinematics [rad] or [m].
 NOWHERE = 1e-12
 
@@ -72,8 +72,8 @@ def check_duration(duration: float) -> float:
     duration = number(duration, "duration")
     if not duration >= SHORTEST:
         raise InvalidValueError(f"duration: expected more than 0 s, {SHORTEST:g} s at least, got {duration}")
-    if duration > _LONGEST:
-        raise InvalidValueError(f"duration: expected {_LONGEST:g} s at most, got {duration:g}")
+    if duration > _MAX_LENGTH:
+        raise InvalidValueError(f"duration: expected {_MAX_LENGTH:g} s at most, got {duration:g}")
     return duration
 
 

@@ -26,7 +26,7 @@ JERK_TIME = 0.1
 # A state beyond a limit by this part of it is at the limit.
 _AT_LIMIT = 1e-9
 # The default jerk rises at most so many times where a state asks for more.
-_MOST_JERK = 1000.0
+_MAX_JERK = 1000.0
 # A joint does not have its full acceleration sooner than this: rounding would make steps of it [s].
 _SHORTEST_RISE = 1e-6
 _GAVE_UP = (
@@ -223,7 +223,7 @@ def _jerk(arm: Arm, task: _Task, jerk_limits: ArrayLike | None, *, brake: bool) 
     with np.errstate(divide="ignore", invalid="ignore"):
         least = np.where(task.qdd != 0, task.qdd**2 / (2 * np.maximum(room, 0.0)), 0.0)
     if jerk_limits is None:
-        jerk = np.clip(least, jerk, jerk * _MOST_JERK)
+        jerk = np.clip(least, jerk, jerk * _MAX_JERK)
     if brake:
         return jerk
     allowed = "; brake=True accepts it and brings it back inside first"

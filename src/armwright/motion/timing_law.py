@@ -29,7 +29,7 @@ from armwright.motion.trajectory import Trajectory
 # From rest to the full speed of the path takes no less than this where a joint has no limit of acceleration [s].
 _RAMP = 0.05
 # What averaging may cost, in parts of the shortest time and at most [s]; no window is longer than that.
-_COST, _LONGEST = 0.006, 0.05
+_COST, _MAX_LENGTH = 0.006, 0.05
 # Windows that are tried: where one costs too much, the next is shorter in that proportion and by a little more.
 _WINDOWS, _LESS, _LEAST_STEP = 8, 0.9, 1 / 16
 # Rounds of drawing limits tighter where they are passed.
@@ -170,7 +170,7 @@ def timed(arm: Arm, path: Trajectory, caps: Array) -> Timed:
 
 def _allowed(shortest: float) -> float:
     """Return how long a run may take whose shortest time is given [s]."""
-    return shortest + min(_COST * shortest, _LONGEST)
+    return shortest + min(_COST * shortest, _MAX_LENGTH)
 
 
 def _gridded(arm: Arm, path: Trajectory, caps: Array) -> _Grid:

@@ -17,7 +17,7 @@ from armwright.motion.polynomials import derivative, extremes, peaks, shifted
 from armwright.notebook import html_table
 
 # Nobody reads more samples than this; a shorter period is a slip of the unit.
-_MOST_SAMPLES = 100_000_000
+_MAX_SAMPLES = 100_000_000
 # The hair's breadth keeps a duration that is a whole number of ticks but for rounding from gaining one.
 _HAIR = 1e-9
 
@@ -216,10 +216,10 @@ class Trajectory:
             InvalidValueError: it is not above 0, or so short that there would be more than 1e8 samples.
         """
         period = _period(period)
-        if self.duration / period > _MOST_SAMPLES:
+        if self.duration / period > _MAX_SAMPLES:
             raise InvalidValueError(
                 f"period: {period:g} s cuts {self.duration:g} s into {self.duration / period:.3g} samples, "
-                f"{_MOST_SAMPLES:.0e} are allowed"
+                f"{_MAX_SAMPLES:.0e} are allowed"
             )
         before = max(math.ceil(self.duration / period - _HAIR), int(self.duration > 0))
         times = np.append(period * np.arange(before), self.duration)

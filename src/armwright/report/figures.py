@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Line styles in the order of the curves: the first is the reference; all are distinguishable without colour.
 _STYLES = ("-", "--", "-.", ":")
 # Characters of a name or title that are shown at most.
-_LONGEST = 40
+_MAX_LENGTH = 40
 
 
 class Drawing(NamedTuple):
@@ -151,6 +151,6 @@ def literal(text: str) -> str:
     Tabs and line breaks become blanks, other unprintable characters become replacement characters, and a long text is
     truncated.
     """
-    text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+    text = text if len(text) <= _MAX_LENGTH else f"{text[:_MAX_LENGTH]}..."
     letters = (c if c.isprintable() else " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" for c in text)
     return "".join(letters).replace("$", r"\$")

@@ -22,9 +22,9 @@ from armwright.version import __version__
 
 # Instants of the animation at most, which suffice for a screen.
 _FRAMES_PER_SECOND = 30.0
-_MOST_INSTANTS = 1200
+_MAX_INSTANTS = 1200
 # Frames that the view draws at most: more would hide each other, and each has a pose at every instant.
-_MOST_FRAMES = 400
+_MAX_FRAMES = 400
 _T = TypeVar("_T")
 
 
@@ -126,13 +126,13 @@ def _record(stream: Stream, cell: Cell) -> ArmRecord:
 
 def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     """Return the animation, and notes on what it omits."""
-    fps = min(_FRAMES_PER_SECOND, _MOST_INSTANTS / max(recording.duration, 1e-9))
+    fps = min(_FRAMES_PER_SECOND, _MAX_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
     arms = recording.cell.arms
     links = {s.arm: _poses_in_world(arms[s.arm], _sampled(s, t)) for s in recording.streams}
     hands = {name: poses[:, -1] for name, poses in links.items()}
     visible = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
-    names, fewer_frames = _fewer(visible, _MOST_FRAMES, "frames", "all in frames.json")
+    names, fewer_frames = _fewer(visible, _MAX_FRAMES, "frames", "all in frames.json")
     changes, fewer_changes = _fewer([*_tree_changes(recording, t)], IN_A_LIST, "changes of the tree of frames")
     animation = Animation(
         fps=fps,

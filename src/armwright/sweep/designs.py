@@ -16,7 +16,7 @@ from armwright.errors import InvalidValueError, KindError, ShapeError, one_of, s
 
 KINDS = ("given", "full factorial", "latin hypercube", "sobol")
 # More runs than this are a slip in a level, not a plan.
-MOST_RUNS = 10_000_000
+MAX_RUNS = 10_000_000
 
 
 def _names(value: Sequence[str]) -> tuple[str, ...]:
@@ -204,5 +204,5 @@ def _check_mapping(value: Mapping[str, Any], what: str) -> None:
 
 
 def _check_runs(runs: int) -> None:
-    if runs > MOST_RUNS:
-        raise InvalidValueError(f"design: {runs} runs are more than {MOST_RUNS}; take fewer levels or points")
+    if runs > MAX_RUNS:
+        raise InvalidValueError(f"design: {runs} runs are more than {MAX_RUNS}; take fewer levels or points")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 # Rows per block: some lanes of simulations side by side, and some seconds of work.
 BLOCK = 64
 # Processes of one machine; a larger number is a slip.
-_MOST_WORKERS = 1000
+_MAX_WORKERS = 1000
 
 
 def run(
@@ -72,9 +72,9 @@ def run(
     check_task(task, design.names)
     block = integer(block, "block", least=1)
     if workers is not None:
-        if integer(workers, "workers", least=1) > _MOST_WORKERS:
+        if integer(workers, "workers", least=1) > _MAX_WORKERS:
             raise InvalidValueError(
-                f"workers: expected at most {_MOST_WORKERS} processes of this machine, got {workers}"
+                f"workers: expected at most {_MAX_WORKERS} processes of this machine, got {workers}"
             )
         if scheduler is not None:
             raise InvalidValueError("workers are processes of this machine, a scheduler has its own: give one of them")

@@ -22,7 +22,7 @@ FAILURE = "failure"
 # Names that every result has, or that mean something else.
 _RESERVED = ("run", "status", "message", "letter", FAILURE)
 # Characters of a message that are kept.
-_LONGEST_MESSAGE = 300
+_MAX_MESSAGE_LENGTH = 300
 # NumPy counts the bytes of a row by 32 bits; the message and the status are in it too [bytes].
 _LARGEST_ROW = 2**31 - 2**16
 
@@ -208,4 +208,4 @@ def _checked(task: Task, returned: Mapping[str, Any], runs: int) -> Rows:
 def _short(text: str) -> str:
     """Return a text on one line, not too long, without what a file cannot hold."""
     line = " ".join(text.replace("\0", " ").split()).encode("utf-8", "replace").decode()
-    return line if len(line) <= _LONGEST_MESSAGE else f"{line[: _LONGEST_MESSAGE - 3]}..."
+    return line if len(line) <= _MAX_MESSAGE_LENGTH else f"{line[: _MAX_MESSAGE_LENGTH - 3]}..."

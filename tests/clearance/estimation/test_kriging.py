@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.kriging import MOST_POINTS, Surrogate, learn, solve_features
+from armwright.clearance.estimation.kriging import MAX_POINTS, Surrogate, learn, solve_features
 from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
 from armwright.sweep.designs import sobol
 from clearance.arms import ARM_A, ARM_B, PATHS, accuracy
@@ -131,7 +131,7 @@ def test_many_points() -> None:
     surrogate = learn(NAMES, points, ("f",), smooth(points)[:, :1], seed=4)
     again = learn(NAMES, points, ("f",), smooth(points)[:, :1], seed=4)
 
-    assert len(surrogate.processes[0].x) == MOST_POINTS
+    assert len(surrogate.processes[0].x) == MAX_POINTS
     np.testing.assert_array_equal(surrogate.processes[0].weights, again.processes[0].weights)
     np.testing.assert_allclose(surrogate.predict(points)[0], smooth(points)[:, :1], rtol=0, atol=5e-4)
 

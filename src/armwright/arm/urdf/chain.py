@@ -15,7 +15,7 @@ from armwright.errors import one_of
 from armwright.files.limits import beyond, limit
 
 # Of links and joints, a message lists this many.
-_MOST_LISTED = 50
+_MAX_LISTED = 50
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -197,5 +197,5 @@ def _carries(robot: Robot, joint: UrdfJoint) -> bool:
 
 
 def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - _MOST_LISTED:,} more" if len(names) > _MOST_LISTED else ""
-    return ", ".join(f"'{name}'" for name in names[:_MOST_LISTED]) + more
+    more = f" and {len(names) - _MAX_LISTED:,} more" if len(names) > _MAX_LISTED else ""
+    return ", ".join(f"'{name}'" for name in names[:_MAX_LISTED]) + more

@@ -26,7 +26,7 @@ _LENGTHS = (0.1, 30.0)
 _NOISE = (1e-8, 1.0)
 _AMPLITUDE = (1e-2, 1e4)
 # The largest number of points of a surrogate; the time grows with their cube.
-MOST_POINTS = 300
+MAX_POINTS = 300
 # The weight of the estimated correlation of residuals, which stems from a few hundred points.
 _CORRELATION_WEIGHT = 0.98
 # The distance over which spreads are averaged, as part of the range of a parameter.
@@ -161,7 +161,7 @@ def learn(
         spreads: (m, f) their standard deviations over indistinguishable runs, which a single measured run has too;
             none when left out.
         ranges: (k, 2) of the design; by default those of the points, which are a little narrower.
-        seed: of the choice of points where there are more than ``MOST_POINTS``.
+        seed: of the choice of points where there are more than ``MAX_POINTS``.
         restarts: how often the length scales are fitted again from another start.
         progress: called with the name of each feature before it is learnt.
 
@@ -240,7 +240,7 @@ def solve_features(surrogate: Surrogate, measured: ArrayLike, weights: ArrayLike
 
 
 def _training_rows(y: Array, least: int, seed: int) -> npt.NDArray[np.intp]:
-    """Return the numbers of the rows (m, f) to learn from: those without NaN, at most ``MOST_POINTS``.
+    """Return the numbers of the rows (m, f) to learn from: those without NaN, at most ``MAX_POINTS``.
 
     Raises:
         TooFewError: there are fewer than ``least``.
@@ -248,8 +248,8 @@ def _training_rows(y: Array, least: int, seed: int) -> npt.NDArray[np.intp]:
     rows = np.flatnonzero(np.all(np.isfinite(y), axis=-1))
     if len(rows) < least:
         raise TooFewError(f"points: expected {least} or more simulations that finished, got {len(rows)}")
-    if len(rows) > MOST_POINTS:
-        rows = np.sort(np.random.default_rng(seed).choice(rows, MOST_POINTS, replace=False))
+    if len(rows) > MAX_POINTS:
+        rows = np.sort(np.random.default_rng(seed).choice(rows, MAX_POINTS, replace=False))
     return rows
 
 

@@ -42,7 +42,7 @@ _LARGEST = 0.02
 # No instrument measures a resting tip more accurately [m].
 LEAST_NOISE = 1e-6
 # The smallest number of samples of a measured path, and the part of the path that they must cover.
-_FEWEST, _COVERAGE = 20, 0.99
+_MIN_COUNT, _COVERAGE = 20, 0.99
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -210,8 +210,8 @@ def _on_paths(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]])
             raise table.error(rows[0], "path", str(error)) from error
         values = numbers[rows]
         t = values[:, 0]
-        if len(rows) < _FEWEST:
-            raise table.error(rows[0], name, f"expected {_FEWEST} samples or more, got {len(rows)}")
+        if len(rows) < _MIN_COUNT:
+            raise table.error(rows[0], name, f"expected {_MIN_COUNT} samples or more, got {len(rows)}")
         steps = np.diff(t)
         if np.any(steps <= 0) or np.ptp(steps) > 0.01 * steps.mean():
             late = int(np.argmax(np.abs(steps - np.median(steps)))) + 1

@@ -34,7 +34,7 @@ _STEP = 1e-4
 _NEGLIGIBLE = 1e-6
 # The detection limit is iterated until the remainder is this near to what is needed; an error many times as large as
 # its linear estimate is not detected, since it shifts the tip less and less.
-_TOLERANCE, _FAR, _MOST_ROUNDS = 0.01, 10.0, 20
+_TOLERANCE, _FAR, _MAX_ROUNDS = 0.01, 10.0, 20
 # A model error whose full size shifts the tip by less has no effect, such as the mass of a locked crank [m].
 _NO_SHIFT = 1e-9
 
@@ -126,7 +126,7 @@ def _detection_limit(remainder: Callable[[float], float], linear: float, least: 
         least: remainder needed [m].
     """
     size = linear
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         try:
             smaller = min(remainder(change) for change in (size, -size) if change > -1)
         except InvalidValueError:

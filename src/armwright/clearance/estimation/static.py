@@ -23,7 +23,7 @@ from armwright.clearance.scenario import assembly_guess
 from armwright.clearance.settings import contact_stiffness
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 
-_MOST_ROUNDS = 12
+_MAX_ROUNDS = 12
 # The iteration ends when no clearance changes by more [m].
 _CONVERGED = 1e-12
 # The lower bound of clearances during the iteration: contact needs one [m].
@@ -225,7 +225,7 @@ def _fitted(linkage: Linkage, q: Array, offsets: Array, B: Array, weights: Array
 
     c = step(np.full((*offsets.shape[:-2], B.shape[1]), _SMALLEST), offsets)
     best, smallest, converged = c, np.full_like(offsets, np.inf), False
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         residuals = offsets - _offsets_at(linkage, q, c)
         # The last round need not be the best.
         better = square(residuals) < square(smallest)

@@ -14,7 +14,7 @@ _TURN = 2 * math.pi
 # An angle this far beyond a limit is on it [rad].
 _ON_LIMIT = 1e-9
 # Of one configuration so many equivalents are listed: of joints with room for more turns those nearest to it.
-_MOST_EQUIVALENTS = 4096
+_MAX_EQUIVALENTS = 4096
 
 
 def joint_distance(arm: Arm, q_from: ArrayLike, q_to: ArrayLike) -> float:
@@ -76,7 +76,7 @@ def midpoints(lower: Array, upper: Array, otherwise: Array) -> Array:
 def _few(choices: list[list[float]], values: list[float]) -> list[list[float]]:
     """Leave out, where there are too many combinations, the values farthest from ``values`` of joints with the most."""
     most = max(map(len, choices))
-    while math.prod(min(len(turns), most) for turns in choices) > _MOST_EQUIVALENTS:
+    while math.prod(min(len(turns), most) for turns in choices) > _MAX_EQUIVALENTS:
         most -= 1
     return [
         sorted(sorted(turns, key=lambda x: abs(x - value))[:most]) for turns, value in zip(choices, values, strict=True)
@@ -99,7 +99,7 @@ def _equivalents(arm: Arm, q: ArrayLike, starts: list[float]) -> list[list[float
             last = math.floor((upper + _ON_LIMIT - value) / _TURN)
             # As many on either side as there may be in all, around the one nearest to the start.
             nearest = min(max(round((start - value) / _TURN), first), last)
-            first, last = max(first, nearest - _MOST_EQUIVALENTS), min(last, nearest + _MOST_EQUIVALENTS)
+            first, last = max(first, nearest - _MAX_EQUIVALENTS), min(last, nearest + _MAX_EQUIVALENTS)
             least = value + _TURN * round(((lower + upper) / 2 - value) / _TURN)
             result.append([value + k * _TURN for k in range(first, last + 1)] or [least])
         else:

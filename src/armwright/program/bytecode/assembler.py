@@ -40,7 +40,7 @@ _ROW = re.compile(r"(?P<at>[0-9]+)\s+(?P<span>\S+)\s+(?P<op>[A-Za-z]+)(?P<rest>.
 _SPAN = re.compile(r"(?P<line>[0-9]+):(?P<column>[0-9]+)\+(?P<length>[0-9]+)(?P<begins>!?)")
 _TYPE = re.compile(r"(?:ARRAY \[(?P<sizes>[0-9]+(?:,[0-9]+)*)\] OF )?(?P<kind>[A-Z]+)")
 # What a file may ask for at most.
-_MOST_ELEMENTS = 1_000_000
+_MAX_ELEMENTS = 1_000_000
 
 
 # ---- writing -------------------------------------------------------------------------------------------------------
@@ -302,8 +302,8 @@ class _Reader:
         if match is None or match["kind"] not in VariableKind.__members__:
             self._fail(f"unknown type {text!r}")
         sizes = tuple(int(size[:9]) for size in (match["sizes"] or "").split(",") if size)
-        if sizes and not 1 <= math.prod(sizes) <= _MOST_ELEMENTS:
-            self._fail(f"an array has 1 to {_MOST_ELEMENTS} elements")
+        if sizes and not 1 <= math.prod(sizes) <= _MAX_ELEMENTS:
+            self._fail(f"an array has 1 to {_MAX_ELEMENTS} elements")
         return VariableType(VariableKind[match["kind"]], sizes)
 
     def _name(self, text: str) -> str:

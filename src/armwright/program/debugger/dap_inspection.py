@@ -13,7 +13,7 @@ from armwright.program.language.position_codec import UTF_16, PositionCodec
 from armwright.program.semantics.builtins import FUNCTIONS
 
 # So many elements are sent to an editor that does not say how many it wants.
-_MOST_ELEMENTS = 1000
+_MAX_ELEMENTS = 1000
 # What gives a variable or an element a value.
 _ASSIGNMENT = re.compile(r"([A-Za-z][\w-]*(?:\s*\[[^\[\]]*\])?)\s*=\s*(.+)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
@@ -64,7 +64,7 @@ def variables(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     group, path, level = session.variables(arguments)
     if arguments.text("filter", "") == ("named" if isinstance(group, Elements) else "indexed"):
         group = ()
-    first, count = arguments.whole("start", 0), arguments.whole("count", 0) or _MOST_ELEMENTS
+    first, count = arguments.whole("start", 0), arguments.whole("count", 0) or _MAX_ELEMENTS
     listed = group[first : first + count]
     return {"variables": [{"name": variable.name, **_variable(session, variable, path, level)} for variable in listed]}
 

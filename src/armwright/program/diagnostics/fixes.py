@@ -15,9 +15,9 @@ from armwright.program.language.text_edits import Edit, apply_edits
 # How often a program is looked at again: one cure may bring the next slip to light.
 ROUNDS = 10
 # How often a program is translated at most to find out which changes help, in one round.
-_MOST_TRIALS = 200
+_MAX_TRIALS = 200
 # A longer text is not shown whole.
-_LONGEST_SHOWN = 30
+_MAX_SHOWN_LENGTH = 30
 
 Translate: TypeAlias = Callable[[Source], Compilation]
 
@@ -169,7 +169,7 @@ def _that_help(
     diagnostics_: list[Diagnostic] = []
     after = before
     waiting = [list(selected)]
-    for _ in range(_MOST_TRIALS):
+    for _ in range(_MAX_TRIALS):
         if not waiting:
             break
         several = waiting.pop()
@@ -189,7 +189,7 @@ def _line_of(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:
 
 def _description(fix: Fix, source: Source) -> str:
     old, new = (" ".join(text.split()) for text in (source.slice(fix.span), fix.replacement))
-    old, new = (text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..." for text in (old, new))
+    old, new = (text if len(text) <= _MAX_SHOWN_LENGTH else f"{text[:_MAX_SHOWN_LENGTH]}..." for text in (old, new))
     if not new:
         return f"left out `{old}`"
     return f"wrote `{new}` for `{old}`" if old else f"put in `{new}`"

@@ -16,11 +16,11 @@ Piece: TypeAlias = tuple[str, str]
 Row: TypeAlias = list[Piece]
 
 # So many are read one by one at most; the rest is counted.
-MOST_SHOWN = 100
+MAX_SHOWN = 100
 _TAB = 4
 _NARROWEST_GUTTER = 2
 # Longer lines are shown in part, from so many characters before the first place on.
-_LONGEST_LINE, _AROUND, _CUT = 240, 60, "..."
+_MAX_LINE_LENGTH, _AROUND, _CUT = 240, 60, "..."
 _LOUD = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow"}
 _QUIET = "bold blue"
 
@@ -45,12 +45,12 @@ def render_rich(diagnostics: Iterable[Diagnostic], source: Source) -> "Text":
 def _page(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Row]:
     ordered = in_order(diagnostics)
     # Of too many the errors come first: a warning is never shown in place of what keeps a program from running.
-    shown = in_order(sorted(ordered, key=lambda one: not one.is_error)[:MOST_SHOWN])
+    shown = in_order(sorted(ordered, key=lambda one: not one.is_error)[:MAX_SHOWN])
     for diagnostic in shown:
         yield from _block(diagnostic, source)
         yield [("", "")]
-    if len(ordered) > MOST_SHOWN:
-        rest = f"{len(ordered) - MOST_SHOWN} more are not shown; one mistake may have caused many"
+    if len(ordered) > MAX_SHOWN:
+        rest = f"{len(ordered) - MAX_SHOWN} more are not shown; one mistake may have caused many"
         yield [("note", "bold"), (f": {rest}. `armwright check --format json` prints all", "")]
         yield [("", "")]
     yield [(count_line(ordered, source), "bold" if ordered else "")]
@@ -90,10 +90,10 @@ def _block(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
 
 def _window(length: int, column: int) -> tuple[int, int]:
     """Return which characters of a line are shown: all, or of a very long line those around a place."""
-    if length <= _LONGEST_LINE:
+    if length <= _MAX_LINE_LENGTH:
         return 0, length
     first = max(0, column - _AROUND)
-    return first, min(length, first + _LONGEST_LINE)
+    return first, min(length, first + _MAX_LINE_LENGTH)
 
 
 def _marks(label: Label, mark: str, style: str, source: Source, shown: tuple[int, int]) -> Row:

@@ -12,7 +12,7 @@ from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
 
 # Calls inside calls that are followed, and statements of procedures that are followed in all.
-_DEEPEST, _MOST_STATEMENTS = 6, 20_000
+_MAX_DEPTH, _MAX_STATEMENTS = 6, 20_000
 _BY_VALUE = (VariableKind.SCALAR, VariableKind.TRANS)
 
 
@@ -28,7 +28,7 @@ class Calling:
         """
         self._state, self._follow = state, follow
         self._count = 0
-        self._left = _MOST_STATEMENTS
+        self._left = _MAX_STATEMENTS
         # Procedures that are followed at each call, and those of which that is not so.
         self._seen: set[str] = set()
         self._passed_over: set[str] = set()
@@ -48,7 +48,7 @@ class Calling:
         key = procedure.node.name.key
         self._needs(procedure, node)
         plausibility.lengths(state, *node.arguments)
-        deep = len(state.calls) >= _DEEPEST or self._left <= 0 or any(call.name == key for call in state.calls)
+        deep = len(state.calls) >= _MAX_DEPTH or self._left <= 0 or any(call.name == key for call in state.calls)
         if deep or not follow or len(node.arguments) != len(procedure.parameters):
             self.pass_over(key)
             writes = state.writing.called(node, state.now.scope)

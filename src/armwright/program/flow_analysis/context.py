@@ -16,7 +16,7 @@ Node = TypeVar("Node", bound=tree.Statement)
 Step: TypeAlias = Callable[["Context", Any], None]
 
 # Statements inside one another that are followed; deeper ones only make things unknown.
-_DEEPEST = 100
+_MAX_DEPTH = 100
 
 
 def of_state(change: Callable[[FlowState, Node], None]) -> Callable[["Context", Node], None]:
@@ -57,7 +57,7 @@ class Context:
     def follow_one(self, statement: tree.Statement) -> None:
         """Follow one statement; only forget what it changes where it stands too deep."""
         self._calling.step()
-        if self._depth >= _DEEPEST:
+        if self._depth >= _MAX_DEPTH:
             self._pass_over(statement)
             return
         self._depth += 1
@@ -66,7 +66,7 @@ class Context:
 
     def call(self, node: tree.Call) -> None:
         """Follow a call."""
-        self._calling.call(node, follow=self._depth < _DEEPEST)
+        self._calling.call(node, follow=self._depth < _MAX_DEPTH)
 
     def follow_uncalled(self) -> None:
         """Follow the procedures that were not followed at each of their calls."""

@@ -16,11 +16,11 @@ from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 
 # Loops inside one another of which the first pass is followed by itself.
-_DEEPEST_LOOPS = 3
+_MAX_LOOP_DEPTH = 3
 # Branches beside which one checks each other one.
-_MOST_BRANCHES = 30
+_MAX_BRANCHES = 30
 # Paths of one IF that are joined name by name where they meet.
-_MOST_WAYS = 100
+_MAX_WAYS = 100
 
 
 def event(state: FlowState, node: tree.Signal | tree.Wait) -> None:
@@ -48,7 +48,7 @@ def if_(context: Context, node: tree.If) -> None:
                 need(state, statement.condition)
             ways.append(context.path(statement.then))
         ways.append(context.path(*(() if otherwise is None else (otherwise,))))
-    if len(ways) > _MOST_WAYS and any(way is not None for way in ways):
+    if len(ways) > _MAX_WAYS and any(way is not None for way in ways):
         state.forget(context.writes(node))
         return
     says, advice = "it gets one on one side of this IF only", "give it a value before the IF, or on both sides"
@@ -115,7 +115,7 @@ def _loop(
             context.follow(*body)
         state.forget(writes)
         return
-    if context.loops < _DEEPEST_LOOPS:
+    if context.loops < _MAX_LOOP_DEPTH:
         _first_pass(context, body)
     context.loops += 1
     mark = state.facts.mark()
@@ -219,7 +219,7 @@ def end(context: Context, node: tree.Halt | tree.Retry) -> None:
 
 def _others(writes: list[SideEffects], number: int) -> SideEffects:
     """Return what all branches but one may change; where there are many of them, anything."""
-    if len(writes) > _MOST_BRANCHES:
+    if len(writes) > _MAX_BRANCHES:
         return ANYTHING
     others = NOTHING
     for own in (*writes[:number], *writes[number + 1 :]):

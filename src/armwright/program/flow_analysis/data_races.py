@@ -13,7 +13,7 @@ from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
 
 # Branches beside one another of which one checks each, and pairs of writes, signals and waits that are compared.
-_MOST_BRANCHES, _MOST_PAIRS = 30, 1000
+_MAX_BRANCHES, _MAX_PAIRS = 30, 1000
 # An event of which nobody knows which it is.
 _ANY = "?"
 
@@ -90,7 +90,7 @@ class _Branch:
         )
 
     def _met(self, other: "_Branch") -> "Iterator[tuple[tuple[str, _Location], tuple[str, _Location]]]":
-        return islice(product(self.signals, other.waits), _MOST_PAIRS)
+        return islice(product(self.signals, other.waits), _MAX_PAIRS)
 
 
 def _alike(branch: tuple[str, _Location], other: tuple[str, _Location]) -> bool:
@@ -115,7 +115,7 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
         forks = [branch for branch in every(statements) if isinstance(branch, tree.Cobegin)]
         inner = {id(branch) for fork in forks for branch in every(part.body for part in fork.branches)}
         for fork in forks:
-            if len(fork.branches) <= _MOST_BRANCHES:
+            if len(fork.branches) <= _MAX_BRANCHES:
                 # Beside a COBEGIN that stands in a branch or a procedure others may be at work.
                 alone = id(fork) not in inner and scope.procedure is None
                 _branches(findings, fork, scope, symbols, () if alone else bodies)
@@ -153,7 +153,7 @@ def _unsettled(name: str, first: _Branch, other: _Branch, all_branches: list[_Br
     if _leads_round(first, other, beside) or _leads_round(other, first, beside):
         return None
     pairs = product(*(sorted(branch.writes[name], key=lambda write: write.locked) for branch in (first, other)))
-    for mine, its in islice(pairs, _MOST_PAIRS):
+    for mine, its in islice(pairs, _MAX_PAIRS):
         if not ((mine.locked and its.locked) or first.settles(mine, other, its) or other.settles(its, first, mine)):
             return mine, its
     return None

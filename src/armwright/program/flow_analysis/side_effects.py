@@ -13,11 +13,11 @@ from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
 
 # A part that changes more than this is taken to change everything.
-_MOST = 400
+_MAX_COUNT = 400
 # Any arm, nobody knows which.
 ANY_ARM = "*"
 # So often what procedures that call one another may change is looked at again.
-_MOST_ROUNDS = 10
+_MAX_ROUNDS = 10
 
 
 @attrs.frozen(kw_only=True)
@@ -75,7 +75,7 @@ ANYTHING = SideEffects(arms=frozenset({ANY_ARM}), grasps=True, everything=True)
 
 
 def _limited(writes: SideEffects) -> SideEffects:
-    if writes.everything or sum(map(len, (writes.placed, writes.hung, writes.moved, writes.values))) > _MOST:
+    if writes.everything or sum(map(len, (writes.placed, writes.hung, writes.moved, writes.values))) > _MAX_COUNT:
         return attrs.evolve(ANYTHING, halts=writes.halts, retries=writes.retries)
     return writes
 
@@ -157,7 +157,7 @@ class Writing:
                 self._own(statement, scope) for statement in inner if not isinstance(statement, tree.Call | tree.Retry)
             )
         order = _callees_first({key: [statement.name.key for statement in several] for key, several in calls.items()})
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(_MAX_ROUNDS):
             news = {}
             for key in order:
                 scope, old = self._symbols.scope(key), self._procedures[key]

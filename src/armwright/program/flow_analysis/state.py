@@ -22,7 +22,7 @@ from armwright.program.syntax import tree
 # The name under which the arm named or moved last is kept; no variable has it.
 LAST = "(last)"
 # Calls named in a message: the innermost ones.
-_MOST_CALLS = 3
+_MAX_CALLS = 3
 
 
 @attrs.frozen(kw_only=True)
@@ -366,7 +366,7 @@ class FlowState:
         if (code, span) in self._said:
             return
         self._said.add((code, span))
-        calls = tuple(Label(call.span, f"{call.text} is called here") for call in self.calls[: -_MOST_CALLS - 1 : -1])
+        calls = tuple(Label(call.span, f"{call.text} is called here") for call in self.calls[: -_MAX_CALLS - 1 : -1])
         self.found.say(
             code, message, span, label, severity=severity, secondary=(*secondary, *calls), notes=notes, helps=helps
         )

@@ -17,7 +17,7 @@ from armwright.program.semantics.cell_symbols import Imported
 _IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)
 _ARM = re.compile(r"ARM[-_]0*([0-9]+)", re.IGNORECASE)
 # A folder with more files that might be cells, or a larger one, is no folder of cells.
-_MOST_FILES = 50
+_MAX_FILES = 50
 _LARGEST_FILE = 1_000_000
 _SUFFIXES = (".toml", ".json")
 
@@ -117,7 +117,7 @@ def _candidates(folder: Path) -> Iterator[Path]:
     """Give the files of a folder that might be cells."""
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES)
-        if len(paths) <= _MOST_FILES:
+        if len(paths) <= _MAX_FILES:
             yield from (path for path in paths if path.is_file() and path.stat().st_size <= _LARGEST_FILE)
     except OSError:
         return

@@ -13,7 +13,7 @@ from armwright.program.language.text_edits import Edit
 from armwright.program.language_server.analysis import Analysis
 
 # A longer text is not repeated in a title.
-_LONGEST_SHOWN = 30
+_MAX_SHOWN_LENGTH = 30
 _DID_YOU_MEAN = re.compile(r"did you mean `([A-Za-z][\w-]*)`")
 # The place of a misspelt word is the word, or ends with it: `WITH SPED`.
 _LAST_WORD = re.compile(r"(?<![\w-])[^\W\d_][\w-]*\Z")
@@ -78,7 +78,7 @@ def _touch(span: Span, other: Span) -> bool:
 def _title(diagnostic: Diagnostic, source: Source) -> str:
     fix = diagnostic.fixes[0]
     old, new = source.slice(fix.span), fix.replacement
-    if len(diagnostic.fixes) > 1 or len(old) > _LONGEST_SHOWN or len(new) > _LONGEST_SHOWN:
+    if len(diagnostic.fixes) > 1 or len(old) > _MAX_SHOWN_LENGTH or len(new) > _MAX_SHOWN_LENGTH:
         return (diagnostic.helps or (f"correct this: {diagnostic.message}",))[0].partition("\n")[0]
     if not new.strip():
         return f"leave `{old.strip()}` out"

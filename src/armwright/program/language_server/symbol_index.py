@@ -17,7 +17,7 @@ from armwright.program.syntax.lexer import Token, TokenKind
 OPENERS = frozenset((";", "BEGIN", "THEN", "ELSE", "DO", "TRY", "RECOVER", "REPEAT", "COBEGIN"))
 _NAME, _ARM, _KEYWORD = TokenKind.NAME, TokenKind.ARM, TokenKind.KEYWORD
 # How far an index may reach before its variable is no longer taken for one that gets a value.
-_LONGEST_INDEX = 50
+_MAX_INDEX_LENGTH = 50
 
 
 class What(enum.Enum):
@@ -183,7 +183,7 @@ def _variable(token: Token, scope: Scope) -> Occurrence:
 def _assigned(tokens: Sequence[Token], at: int) -> bool:
     """Whether ``=`` stands behind the index that begins at a token."""
     depth = 0
-    for index in range(at, min(len(tokens), at + _LONGEST_INDEX)):
+    for index in range(at, min(len(tokens), at + _MAX_INDEX_LENGTH)):
         key = tokens[index].key
         depth += (key == "[") - (key == "]")
         if not depth:

@@ -6,9 +6,9 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.syntax import tree
 
 # A longer expression is not repeated in a message; its pose is marked anyway.
-_LONGEST_SHOWN = 32
+_MAX_SHOWN_LENGTH = 32
 # In advice it is repeated up to here.
-_LONGEST_WRITTEN = 100
+_MAX_WRITTEN_LENGTH = 100
 # How tightly operations bind; comparisons stand between.
 _STRENGTH = {"OR": 1, "AND": 2, "+": 5, "-": 5, "*": 6, "/": 6}
 _COMPARISON, _NOT, _MINUS, _ATOM = 4, 3, 7, 8
@@ -71,13 +71,13 @@ def called(node: tree.Expression) -> str:
     if isinstance(node, tree.Matrix):
         return "this"
     text = written(node)
-    return f"`{text}`" if len(text) <= _LONGEST_SHOWN else "this"
+    return f"`{text}`" if len(text) <= _MAX_SHOWN_LENGTH else "this"
 
 
 def written(node: tree.Expression) -> str:
     """Return an expression as one would write it, with no more parentheses than it takes; of a long one the start."""
     text = _written(node)[0]
-    return text if len(text) <= _LONGEST_WRITTEN else f"{text[:_LONGEST_WRITTEN].rpartition(' ')[0]} ..."
+    return text if len(text) <= _MAX_WRITTEN_LENGTH else f"{text[:_MAX_WRITTEN_LENGTH].rpartition(' ')[0]} ..."
 
 
 def _written(node: tree.Expression) -> tuple[str, int]:

@@ -14,7 +14,7 @@ from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
 
 # More elements than this are a slip, and would take the memory of the machine.
-MOST_ELEMENTS = 1_000_000
+MAX_ELEMENTS = 1_000_000
 # How people call units, whose names in a program are shorter.
 _LONG_UNITS: Mapping[str, str] = {
     **dict.fromkeys(("MILLIMETRE", "MILLIMETRES", "MILLIMETER", "MILLIMETERS"), "MM"),
@@ -86,9 +86,9 @@ def _type(names: Names, written: tree.TypeName) -> VariableType | None:
     count = 1
     for size in known:
         count *= size
-    if count > MOST_ELEMENTS:
+    if count > MAX_ELEMENTS:
         span = written.sizes[0].span.to(written.sizes[-1].span)
-        names.found.say("E222", f"an array of {count} elements is too large", span, f"more than {MOST_ELEMENTS}")
+        names.found.say("E222", f"an array of {count} elements is too large", span, f"more than {MAX_ELEMENTS}")
         return None
     return VariableType(VariableKind(written.key), known)
 

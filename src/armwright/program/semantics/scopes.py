@@ -13,7 +13,7 @@ from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, S
 from armwright.program.syntax import tree
 
 # Looking for what a name was meant to be takes time; a program that goes on like this gets no more advice.
-_MOST_COMPARISONS = 20_000
+_MAX_COMPARISONS = 20_000
 
 
 class Table:
@@ -177,7 +177,7 @@ class Names:
             text: what was written.
             known: gives what could have been meant.
         """
-        if self._comparisons > _MOST_COMPARISONS:
+        if self._comparisons > _MAX_COMPARISONS:
             return None
         choices = known()
         self._comparisons += len(choices)
@@ -208,7 +208,7 @@ class Names:
 
     def _owner(self, key: str) -> Procedure | None:
         """Return a procedure that has a name of its own like this."""
-        if self._comparisons > _MOST_COMPARISONS:
+        if self._comparisons > _MAX_COMPARISONS:
             return None
         self._comparisons += len(self.procedures)
         return next((procedure for procedure in self.procedures.values() if key in procedure.own.types), None)

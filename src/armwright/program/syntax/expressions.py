@@ -10,7 +10,7 @@ from armwright.program.language.diagnostic import Fix
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.token_stream import DEEPEST, Tokens, shown
+from armwright.program.syntax.token_stream import MAX_DEPTH, Tokens, shown
 
 T = TypeVar("T")
 
@@ -63,7 +63,7 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
         # A sum of many terms is long and not deep: only what is nested counts.
         height = tokens.height if strength == last and not chained else tokens.height + 1
         last = strength
-        if tokens.depth + height > DEEPEST:
+        if tokens.depth + height > MAX_DEPTH:
             tokens.too_deep()
         sign = tokens.take()
         tokens.enter()

@@ -20,7 +20,7 @@ from armwright.program.syntax.lexer import Token, TokenKind
 _FRAME = "the name of a FRAME"
 _MOVED = "the name of a FRAME or an arm"
 _ARM = "an arm such as ARM_1"
-_LONGEST_SHOWN = 16
+_MAX_SHOWN_LENGTH = 16
 # In front of a word of RLO-2 that stands where only a name can, and behind one that gets a value or is declared.
 _BEFORE_NAMES = frozenset(
     (*("MOVE", "AFFIX", "UNFIX", "TO", "FROM", "AT", "OPERATE", "=", ":=", "(", "[", ","), *"+-*/<>", "<=", ">=", "<>")
@@ -317,7 +317,7 @@ class _Visitor:
         text, start = self._source.slice(span), self._word(span)
         if span == start.span:
             return f"`{text}` as a value"
-        if len(text) <= _LONGEST_SHOWN and text.isprintable():
+        if len(text) <= _MAX_SHOWN_LENGTH and text.isprintable():
             return f"`{text}`"
         is_call = start.kind is TokenKind.NAME and self._tokens[self._at(span) + 1].key == "("
         return f"`{start.text}(...)`" if is_call else "this expression"

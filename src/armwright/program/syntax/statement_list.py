@@ -9,7 +9,7 @@ from armwright.program.language.source import Span
 from armwright.program.language.words import ABSENT, CLOSING, ELSEWHERE, OPENING
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.token_stream import ANY_VALUE, DEEPEST, LostError, Tokens, TooDeepError, shown
+from armwright.program.syntax.token_stream import ANY_VALUE, MAX_DEPTH, LostError, Tokens, TooDeepError, shown
 
 _Read = TypeVar("_Read")
 _NAME, _KEYWORD, _ARM, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.NUMBER
@@ -129,7 +129,7 @@ def statement(tokens: Tokens) -> tree.Statement:
             return _reserved(tokens)
         tokens.depth += 1
         tokens.statement_depth = tokens.depth
-        if tokens.depth > DEEPEST:
+        if tokens.depth > MAX_DEPTH:
             tokens.too_deep()
         statements_ = tokens.rules[token.key](tokens)
         tokens.depth -= 1

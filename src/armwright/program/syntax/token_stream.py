@@ -13,7 +13,7 @@ from armwright.program.syntax.expected_tokens import Expected
 from armwright.program.syntax.lexer import Token, TokenKind
 
 # How deep statements, parentheses and operations may lie in one another.
-DEEPEST = 100
+MAX_DEPTH = 100
 
 # What an expression is for where nothing more is known.
 ANY_VALUE = ("a value", "")
@@ -231,7 +231,7 @@ class Tokens:
             LostError: it would be too deep.
         """
         self.depth += 1
-        if self.depth > DEEPEST:
+        if self.depth > MAX_DEPTH:
             self.too_deep()
 
     def too_deep(self) -> NoReturn:
@@ -240,14 +240,14 @@ class Tokens:
         Raises:
             LostError: always; where most of the depth is that of statements, all of them are to be given up.
         """
-        statement = self.statement_depth > DEEPEST // 2
+        statement = self.statement_depth > MAX_DEPTH // 2
         what = "statements" if statement else "parentheses and operations"
         if self.deep < 0:
             self.say_once(
                 "E119",
                 f"{what} lie too deep in one another here",
                 self.now.span,
-                f"more than {DEEPEST} deep",
+                f"more than {MAX_DEPTH} deep",
                 helps=("give a part of it to a procedure",) if statement else ("split the expression",),
             )
         self.deep = self.at

@@ -15,7 +15,7 @@ from armwright.program.vm.synchronization import give_up, lock, signal, unlock, 
 # A last pass that rounding would leave out is made.
 _ROUNDING = 1e-9
 # The longest pause; more is a slip of units [s].
-_LONGEST_PAUSE = 1e6
+_MAX_PAUSE = 1e6
 
 
 def _place(step: Instruction, index: int) -> int:
@@ -165,9 +165,9 @@ def end(machine: Machine, process: Process) -> None:
 
 def _pause(machine: Machine, process: Process, step: Instruction) -> None:
     seconds = machine.number(process, step.operands[0], step)
-    if not 0 <= seconds <= _LONGEST_PAUSE:
+    if not 0 <= seconds <= _MAX_PAUSE:
         text = f"a PAUSE of {seconds:g} s is not possible"
-        raise machine.error(process, "E231", text, step.span, f"expected 0 to {_LONGEST_PAUSE:g} s")
+        raise machine.error(process, "E231", text, step.span, f"expected 0 to {_MAX_PAUSE:g} s")
     text = f"PAUSE {seconds:g}"
     machine.take_time(process, seconds, Pending(kind="PAUSE", text=text, since=machine.starts(), span=step.span))
 

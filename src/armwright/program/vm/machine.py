@@ -28,7 +28,7 @@ from armwright.spatial.poses import from_noap, to_noap
 # A time this part of a period behind a tick is on it.
 _ON_A_TICK = 1e-9
 # Frame trees that are kept; a page shows fewer.
-_MOST_TREES = 2000
+_MAX_TREES = 2000
 
 
 class RunError(ArmwrightError, RuntimeError):
@@ -263,8 +263,8 @@ class Machine:
         if len(self.state.trees) > 1 and self.state.trees[-1][0] == self.now:
             self.state.trees.pop()
         self.state.trees.append((self.now, tree))
-        if len(self.state.trees) > 2 * _MOST_TREES:
-            self.state.trees = thinned(self.state.trees, self.now / _MOST_TREES)
+        if len(self.state.trees) > 2 * _MAX_TREES:
+            self.state.trees = thinned(self.state.trees, self.now / _MAX_TREES)
 
     # ---- arms and time ---------------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Guard, Process
 
 # The longest MOVE; more is a slip of units [s].
-_LONGEST = 1e6
+_MAX_LENGTH = 1e6
 
 
 class Goal(NamedTuple):
@@ -103,9 +103,9 @@ def _quantity(machine: Machine, process: Process, part: Instruction) -> float:
             raise machine.error(process, "E207", message, part.span, "out of range")
         return value
     what = "the blend" if part.op is Op.MVBLD else "the duration"
-    if part.op is Op.MVDUR and value > _LONGEST:
+    if part.op is Op.MVDUR and value > _MAX_LENGTH:
         text = f"{what} {name} s is not possible"
-        raise machine.error(process, "E231", text, part.span, f"expected {_LONGEST:g} s or less")
+        raise machine.error(process, "E231", text, part.span, f"expected {_MAX_LENGTH:g} s or less")
     if value <= 0:
         raise machine.error(process, "E231", f"{what} {name} is not above 0", part.span, "expected more than 0")
     return value * machine.code.units.metres if part.op is Op.MVBLD else value

@@ -8,7 +8,7 @@ from armwright.program.language.source import Span
 from armwright.program.syntax.tree.values import Number
 
 # Deeper levels are not shown further to the right.
-_DEEPEST_SHOWN = 100
+_MAX_SHOWN_DEPTH = 100
 
 
 def walk(node: object) -> Iterator[object]:
@@ -32,8 +32,8 @@ def dump(node: object) -> Iterator[str]:
     waiting: list[tuple[object, int, str]] = [(node, 0, "")]
     while waiting:
         now, depth, field = waiting.pop()
-        level = f"({depth}) " if depth > _DEEPEST_SHOWN else ""
-        head = "  " * min(depth, _DEEPEST_SHOWN) + level + (f"{field}: " if field else "")
+        level = f"({depth}) " if depth > _MAX_SHOWN_DEPTH else ""
+        head = "  " * min(depth, _MAX_SHOWN_DEPTH) + level + (f"{field}: " if field else "")
         if isinstance(now, tuple):
             if all(isinstance(item, Number) for item in now):
                 yield head + " ".join(item.text for item in now)
