@@ -15,7 +15,7 @@ def test_taken_back() -> None:
     facts = Facts()
     numbers = book(facts)
     numbers.put("A", 1)
-    mark = facts.mark()
+    mark = facts.checkpoint()
     numbers.put("A", 2)
     numbers.put("B", 3)
     facts.wipe("S[]")
@@ -45,7 +45,7 @@ def test_joined() -> None:
     for name in ("A", "B", "C", "S[1]", "S[2]"):
         numbers.put(name, 0)
     ways = []
-    mark = facts.mark()
+    mark = facts.checkpoint()
     for way in (1, 2):
         numbers.put("A", 7)
         numbers.put("B", way)
@@ -68,7 +68,7 @@ def test_gone_together() -> None:
     numbers = book(facts)
     numbers.put("A", 0)
     ways = []
-    mark = facts.mark()
+    mark = facts.checkpoint()
     for name in ("A", "B"):
         numbers.put(name, 9)
         ways.append(facts.outcome(mark))

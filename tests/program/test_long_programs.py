@@ -6,7 +6,7 @@ from armwright.errors import FileFormatError, InvalidValueError
 from armwright.files.limits import raised
 from armwright.program import Source, compile as translate
 from armwright.program.diagnostics.render import render
-from armwright.program.language.diagnostic import MAX_OF_A_CODE, Findings, to_json
+from armwright.program.language.diagnostic import MAX_PER_CODE, Findings, to_json
 from armwright.program.language.source import Span
 
 LONG = 200_000
@@ -30,27 +30,27 @@ def test_words_are_counted() -> None:
 @pytest.mark.parametrize("unit", ["''", "/**/", "n = ) ; "])
 def test_messages_of_one_kind_are_counted(unit: str) -> None:
     """Of each code so many messages are kept, and the last of them says that there are more."""
-    compiled = translate(Source("p.rlo", unit * (2 * MAX_OF_A_CODE)))
+    compiled = translate(Source("p.rlo", unit * (2 * MAX_PER_CODE)))
     codes = [one.code for one in compiled.diagnostics]
 
     assert compiled.code is None
-    assert all(codes.count(code) <= 2 * MAX_OF_A_CODE for code in set(codes))
+    assert all(codes.count(code) <= 2 * MAX_PER_CODE for code in set(codes))
     assert any("those behind this place are not told" in one.message for one in compiled.diagnostics)
 
 
 def test_findings() -> None:
     """Whichever way messages are added, they are counted."""
     found, same = Findings(), Findings()
-    for _ in range(MAX_OF_A_CODE + 5):
+    for _ in range(MAX_PER_CODE + 5):
         found.say("E105", "what", Span(0, 1), "here")
     found.say("E106", "another", Span(0, 1), "here")
     same += list(found)
     same.extend(found)
 
-    assert len(found) == MAX_OF_A_CODE + 1
+    assert len(found) == MAX_PER_CODE + 1
     assert found[-2].message == "10,000 messages have the code E105; those behind this place are not told"
     assert found[-1].message == "another"
-    assert len(same) == MAX_OF_A_CODE + 2
+    assert len(same) == MAX_PER_CODE + 2
 
 
 def test_many_torn_names() -> None:

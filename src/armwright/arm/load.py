@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
-from armwright.arm.quantities import ANGLE, LENGTH, given, number_in, per, pose_in, vector_in
+from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
 from armwright.arm.tensors import impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
@@ -151,7 +151,7 @@ def _joint(table: Table) -> Joint:
     for name in ("lower", "upper"):
         if kind == "revolute" and most < abs(values[name]) < math.inf:
             raise limits.error(
-                given(limits, name, units) and f"{name}_{given(limits, name, units)}",
+                unit_of(limits, name, units) and f"{name}_{unit_of(limits, name, units)}",
                 f"too far from zero: {beyond('revolutions', _written(kind, values[name]))}; for a joint without "
                 "limits leave it out",
             )

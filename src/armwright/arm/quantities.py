@@ -47,7 +47,7 @@ def typed_pose(table: Table) -> TypedPose:
         FileFormatError: the turn is given twice or is none, or a unit is missing.
     """
     place = vector_in(table, "xyz", LENGTH, default=np.zeros(3))
-    ways = {way: f"{way}_{unit}" for way in ("rpy", "zyz") if (unit := given(table, way, ANGLE))}
+    ways = {way: f"{way}_{unit}" for way in ("rpy", "zyz") if (unit := unit_of(table, way, ANGLE))}
     ways |= {way: way for way in ("rotation", "quaternion_wxyz") if way in table}
     if len(ways) > 1:
         (first, _), (second, key), *_ = ways.items()
@@ -80,7 +80,7 @@ def per(units: dict[str, float], time: str) -> dict[str, float]:
     return {f"{unit}_{time}": factor for unit, factor in units.items()}
 
 
-def given(table: Table, name: str, units: dict[str, float]) -> str | None:
+def unit_of(table: Table, name: str, units: dict[str, float]) -> str | None:
     """Return the ending with which a quantity is given.
 
     Raises:
@@ -97,7 +97,7 @@ def given(table: Table, name: str, units: dict[str, float]) -> str | None:
 
 def number_in(table: Table, name: str, units: dict[str, float], *, default: float, positive: bool = False) -> float:
     """Read a quantity in SI units, by whatever unit its key tells."""
-    unit = given(table, name, units)
+    unit = unit_of(table, name, units)
     if unit is None:
         table.allow(*(f"{name}_{unit}" for unit in units))
         return default
@@ -107,7 +107,7 @@ def number_in(table: Table, name: str, units: dict[str, float], *, default: floa
 
 def vector_in(table: Table, name: str, units: dict[str, float], *, default: Array) -> Array:
     """Read three quantities in SI units, by whatever unit their key tells."""
-    unit = given(table, name, units)
+    unit = unit_of(table, name, units)
     if unit is None:
         table.allow(*(f"{name}_{unit}" for unit in units))
         return default

@@ -10,7 +10,7 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, of_shape
 from armwright.errors import InvalidValueError, UnknownNameError
-from armwright.spatial.poses import turned_over
+from armwright.spatial.poses import inverse_pose
 
 WORLD = "WORLD"
 
@@ -152,11 +152,11 @@ class FrameTree:
         """
         X = of_shape(X_WF, (4, 4), "pose")
         while (node := self.nodes.get(name)) is not None and node.rigid and node.relation is not None:
-            X, name = X @ turned_over(node.relation), node.parent
+            X, name = X @ inverse_pose(node.relation), node.parent
         if name == WORLD:
             raise InvalidValueError("the frame WORLD is the root and cannot be placed")
         parent = WORLD if node is None else node.parent
-        relation = X if parent == WORLD else _kept(turned_over(self.world(parent)) @ X)
+        relation = X if parent == WORLD else _kept(inverse_pose(self.world(parent)) @ X)
         return self._with(name, Node(parent=parent, relation=relation))
 
     def leader(self, name: str) -> str:
@@ -196,7 +196,7 @@ class FrameTree:
         if self.would_ring(child, parent):
             raise InvalidValueError(f"{child} cannot hang on {parent}, which hangs on {child}")
         if relation is None:
-            relation = _kept(turned_over(self.world(parent)) @ self.world(child))
+            relation = _kept(inverse_pose(self.world(parent)) @ self.world(child))
         else:
             self.world(parent)
         return self._with(child, Node(parent=parent, relation=relation, rigid=rigid))

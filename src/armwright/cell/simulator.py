@@ -136,7 +136,7 @@ class Simulator:
             return np.zeros((1, 6))
         depths = np.stack([tip.depths() for tip in run.tips])[:, round(run.local(now) / period) :]
         found, deepest = np.zeros((depths.shape[1], 6)), depths.argmax(axis=0)
-        for ticks in _pieces(np.flatnonzero(depths.any(axis=0))):
+        for ticks in _chunks(np.flatnonzero(depths.any(axis=0))):
             t = np.minimum(run.local(now) + ticks * period, run.trajectory.duration)
             levers = np.stack([tip.pose[:3, 3] for tip in run.tips])[deepest[ticks]]
             arms = (forward(place.arm, run.trajectory(t))[:, :3, :3] @ levers[..., None])[..., 0]
@@ -188,7 +188,7 @@ class Simulator:
 
     def _heights(self, arm: str, trajectory: Trajectory, tip: Array, t: Array) -> Array:
         place = self._cell.arms[arm]
-        heights = [(place.base @ forward(place.arm, trajectory(piece)) @ tip)[:, 2, 3] for piece in _pieces(t)]
+        heights = [(place.base @ forward(place.arm, trajectory(piece)) @ tip)[:, 2, 3] for piece in _chunks(t)]
         return np.concatenate(heights)
 
     def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:  # noqa: ARG002 - see below
@@ -244,6 +244,6 @@ class Simulator:
         return frozenset(self._on)
 
 
-def _pieces(values: np.ndarray) -> list[np.ndarray]:
+def _chunks(values: np.ndarray) -> list[np.ndarray]:
     """Cut values into pieces that are worked out together."""
     return np.array_split(values, max(1, -(-len(values) // _AT_ONCE)))

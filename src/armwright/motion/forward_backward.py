@@ -18,7 +18,7 @@ from armwright.arrays import Array
 from armwright.errors import ArmwrightError, MissingExtraError
 
 # The largest x there is, where nothing binds. The solver of toppra loses its path among numbers so far apart.
-MAX_COUNT = 1e12
+UNBOUNDED = 1e12
 _MAX_OF_TOPPRA = 1e3
 # A coefficient of u this much smaller than the largest is 0.
 _NONE = 1e-12
@@ -48,7 +48,7 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) ->
     """
     sides, twice = _sides(bounds), (2 * lengths).tolist()
     reachable = [0.0] * (len(twice) + 1)
-    reachable[-1] = MAX_COUNT if rests[1] else 0.0
+    reachable[-1] = UNBOUNDED if rests[1] else 0.0
     top, top_highs, top_lows = sides.top.tolist(), *sides.room(sides.top)
     for i in reversed(range(len(twice))):
         # Mostly the end is reached from the largest x of all.
@@ -91,9 +91,9 @@ def _sides(bounds: Bounds) -> _Sides:
     side = np.sign(a)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         upper, lower = np.where(on_u, (side - c) / a, np.inf), np.where(on_u, (-side - c) / a, -np.inf)
-        tops = np.where(on_u | (b == 0), MAX_COUNT, (1 - np.sign(b) * c) / np.abs(b))
+        tops = np.where(on_u | (b == 0), UNBOUNDED, (1 - np.sign(b) * c) / np.abs(b))
         lean = np.where(on_u, b / a, 0.0)
-    return _Sides(upper, lower, lean, np.minimum(tops.min(axis=1), MAX_COUNT))
+    return _Sides(upper, lower, lean, np.minimum(tops.min(axis=1), UNBOUNDED))
 
 
 def _largest(sides: _Sides, i: int, twice: float, reachable: float) -> float:

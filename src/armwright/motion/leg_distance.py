@@ -14,7 +14,7 @@ from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
 
 # Samples on every interval to begin with and at most; doubled while more than this part is added to what they show.
-_SAMPLES, _MAX_COUNT, _ADDED = 8, 128, 0.1
+_SAMPLES, _MAX_SAMPLES, _ADDED = 8, 128, 0.1
 # A distance below this is not sampled more closely [m].
 _SMALL = 1e-9
 
@@ -57,7 +57,7 @@ def farthest_from_legs(solver: Solver, trajectory: Trajectory, positions: Array,
         q = np.stack([evaluate(trajectory.coefficients, (p * h)[:, None]) for p in part])
         distance = _chord_distances(solver.forward(q)[..., :3, 3], positions, leg)
         bound = float((distance + (h / samples) ** 2 / 8 * bounds.pull).max())
-        if samples == _MAX_COUNT or bound <= (1 + _ADDED) * float(distance.max()) + _SMALL:
+        if samples == _MAX_SAMPLES or bound <= (1 + _ADDED) * float(distance.max()) + _SMALL:
             worst = int(distance.max(axis=0).argmax())
             return LegDistance(bound, float(distance.max()), float(trajectory.times[worst]))
         samples *= 2

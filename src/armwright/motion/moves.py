@@ -34,7 +34,7 @@ from armwright.spatial.rotations import nearest_rotation
 # A matrix this far from a rotation is not worth a warning.
 _ROUNDING = 1e-9
 # Knots to begin with: so far apart [s], and so many in each blend and on each straight segment; and at most.
-_STEP, _MIN_COUNT, _MAX_COUNT = 0.02, 4, 500_000
+_STEP, _MIN_KNOTS, _MAX_KNOTS = 0.02, 4, 500_000
 # Blends without a time of their own take this part of the shortest time between two poses.
 _BLEND = 0.2
 
@@ -349,10 +349,10 @@ def _followed(
     solution = inverse(arm, X, near)
     if not solution.allowed:
         raise PathError(cause_of(solution), 0, 0.0, f"pose 1: {solution.explain()}")
-    knots = hand.first_knots(_STEP, _MIN_COUNT)
+    knots = hand.first_knots(_STEP, _MIN_KNOTS)
     errors: dict[str, PathError] = {}
     for branch in sorted(solution.allowed, key=lambda branch: joint_distance(arm, near, branch.q)):
-        task = Task(solver, hand, branch.q, allowed, allowed, rest=from_rest, whole_turns=True, most_knots=_MAX_COUNT)
+        task = Task(solver, hand, branch.q, allowed, allowed, rest=from_rest, whole_turns=True, most_knots=_MAX_KNOTS)
         tracked = track(task, knots)
         if isinstance(tracked, Tracking):
             return branch.label, tracked

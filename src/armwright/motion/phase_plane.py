@@ -19,7 +19,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.errors import IncapableArmError
 from armwright.motion.efforts import dry_frictions, refuse_lasting
-from armwright.motion.forward_backward import MAX_COUNT, Bounds, by_toppra, largest_squares
+from armwright.motion.forward_backward import UNBOUNDED, Bounds, by_toppra, largest_squares
 from armwright.motion.joint_path import Grid
 from armwright.motion.solver import Solver
 
@@ -100,7 +100,7 @@ def fastest(
     rows = _rows(solver, grid, locate, efforts=efforts)
     bounds = rows.without_viscous()
     x = solve(bounds, grid.lengths, rests)
-    for k in np.flatnonzero(x[1:-1] > MAX_COUNT / 2):
+    for k in np.flatnonzero(x[1:-1] > UNBOUNDED / 2):
         raise IncapableArmError(f"{locate(float(grid.origins[k + 1]))} nothing limits how fast the joints may be")
     before = 0.0
     for _ in range(_ROUNDS if rows.viscous.any() else 0):

@@ -54,7 +54,7 @@ _TIGHTER, _TRIES = 8.0, 2
 _HALVINGS = 40
 _WITH_STOPS = "with a stop at every frame: {}"
 # Knots to begin with: so far apart [s], and so many in each blend and on each leg.
-_STEP, _MIN_COUNT = 0.1, 8
+_STEP, _MIN_KNOTS = 0.1, 8
 # So that rounding does not carry what is just allowed beyond it.
 _HAIR = 1e-9
 # A blend needs some width before and after each pose; nothing is rounded at the ends.
@@ -331,7 +331,7 @@ def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, Timed]:
     close, wide = tolerance(task.closer), tolerance(_CLOSER * task.closer)
     tracked = track(
         Task(solver, hand, task.q_start, close, wide, rest=False, max_slowdown=most),
-        hand.first_knots(_STEP, _MIN_COUNT),
+        hand.first_knots(_STEP, _MIN_KNOTS),
     )
     if isinstance(tracked, Obstruction):
         error = path_error(hand, tracked)

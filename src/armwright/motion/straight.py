@@ -28,7 +28,7 @@ _RAMP = 0.25
 # the line can be run [m].
 COARSE = (1e-3, 2e-3, 5e-3)
 # Knots to begin with, at least and at most.
-_MIN_COUNT, _MAX_COUNT = 9, 1000
+_MIN_KNOTS, _MAX_KNOTS = 9, 1000
 
 
 def straight_line(
@@ -169,7 +169,7 @@ def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
     """Return times to begin with, as many as the report's rule asks for."""
     A, B = motion.poses[:, :3, 3]
     count = math.ceil(float(np.linalg.norm(B - A)) / report_step(arm, A, B, allowed.position)) + 2
-    return np.linspace(0.0, motion.duration, min(max(_MIN_COUNT, count), _MAX_COUNT))
+    return np.linspace(0.0, motion.duration, min(max(_MIN_KNOTS, count), _MAX_KNOTS))
 
 
 def _requested_time(even: float, t: Array) -> Array:

@@ -27,7 +27,7 @@ from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.rotations import rotation_vector
 
-Ways: TypeAlias = npt.NDArray[np.intp]
+SegmentNumbers: TypeAlias = npt.NDArray[np.intp]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -79,11 +79,11 @@ class StraightPath:
         X[:, 3, 3] = 1.0
         return X
 
-    def _way(self, t: Array) -> Ways:
+    def _way(self, t: Array) -> SegmentNumbers:
         """Return the numbers of the segments (...) at times (...)."""
         return np.asarray(np.clip(np.searchsorted(self.corners, t, side="right") - 1, 0, len(self.numbers) - 1))
 
-    def _along(self, t: Array) -> tuple[Ways, Array]:
+    def _along(self, t: Array) -> tuple[SegmentNumbers, Array]:
         """Return the numbers of the segments (...) at times (...), and the fractions of them."""
         way = self._way(t)
         return way, self.progress(t)[..., 0] - way
@@ -146,7 +146,7 @@ class StraightPath:
     def _by_position(self) -> bool:
         return len(self.numbers) == 1 and self._length > self.near
 
-    def _rates(self, times: Array) -> tuple[Ways, Array, Array]:
+    def _rates(self, times: Array) -> tuple[SegmentNumbers, Array, Array]:
         """Return of intervals (m,) between times: the segment, and upper bounds of the rate of progress and its change.
 
         Each lies within one cubic of the progress, whose second derivative is largest at an end of the interval.

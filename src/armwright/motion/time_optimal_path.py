@@ -27,7 +27,7 @@ from armwright.motion.trajectory import Trajectory, hold, join
 _BINDS = 0.98
 # Times of a motion at which it is asked which limit binds.
 _LOOKS = 2000
-_MIN_COUNT, _MAX_COUNT = 10, 20_000
+_MIN_INTERVALS, _MAX_INTERVALS = 10, 20_000
 
 
 @attrs.frozen(kw_only=True)
@@ -176,8 +176,8 @@ def _geometry(arm: Arm, path: Trajectory | ArrayLike) -> tuple[Trajectory, Calla
 def _whole(intervals: int) -> int:
     if isinstance(intervals, bool) or not isinstance(intervals, Integral):
         raise KindError(f"intervals: expected a whole number, got {shown(intervals)}")
-    if not _MIN_COUNT <= intervals <= _MAX_COUNT:
-        raise InvalidValueError(f"intervals: expected {_MIN_COUNT} to {_MAX_COUNT}, got {intervals}")
+    if not _MIN_INTERVALS <= intervals <= _MAX_INTERVALS:
+        raise InvalidValueError(f"intervals: expected {_MIN_INTERVALS} to {_MAX_INTERVALS}, got {intervals}")
     return int(intervals)
 
 

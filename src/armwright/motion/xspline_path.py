@@ -38,7 +38,7 @@ _FORGOTTEN = 1e-20
 # So few rows are solved sooner as a full matrix than SciPy is imported.
 _FEW = 200
 # New knots are put so much closer than the jump asks for, at most so many for one, so often, and so many in all.
-_CLOSER, _PARTS, _ROUNDS, _MAX_COUNT = 1.05, 8, 40, 100_000
+_CLOSER, _PARTS, _ROUNDS, _MAX_PARTS = 1.05, 8, 40, 100_000
 
 
 def usual_weight(steps: Pair, b: Scalar = 0.0) -> Scalar:
@@ -186,7 +186,7 @@ def xspline_along(
         # A knot asks for more of both steps beside it.
         reduction = np.maximum(np.append(excess, 0.0), np.append(0.0, excess))
         parts = np.where(reduction > 1, np.clip(np.ceil(_CLOSER * np.sqrt(reduction)), 2, _PARTS), 1).astype(int)
-        if parts.sum() > _MAX_COUNT:
+        if parts.sum() > _MAX_PARTS:
             break
         h = np.repeat(np.diff(spline.times) / parts, parts)
         rank = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)

@@ -18,7 +18,7 @@ from armwright.version import __version__
 # Samples of the path of the tool from pose to pose.
 _SAMPLES = 200
 # Instants of the animation: for a short move, bounds per second, and at most.
-_INSTANTS, _FPS, _MAX_COUNT = 240, (30.0, 60.0), 1200
+_INSTANTS, _FPS, _MAX_FRAMES = 240, (30.0, 60.0), 1200
 _ARM = "ARM"
 
 
@@ -113,7 +113,7 @@ def _stages(planned: PlannedMove) -> Iterator[StageRow]:
 
 def _animation(move: Move, file: PosesFile) -> Animation:
     duration = move.trajectory.duration
-    fps = min(max(_INSTANTS / duration, _FPS[0]), _FPS[1], _MAX_COUNT / duration)
+    fps = min(max(_INSTANTS / duration, _FPS[0]), _FPS[1], _MAX_FRAMES / duration)
     t = np.append(np.arange(int(np.ceil(duration * fps))) / fps, duration)
     poses = link_poses(move.arm, move.trajectory(t))
     tracks = [

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Images per second, and images at most; a longer move is shown faster.
-_FPS, _MAX_COUNT = 20, 90
+_FPS, _MAX_FRAMES = 20, 90
 _SIZE, _DPI = (4.8, 4.4), 100
 # Length of the approach vector relative to half the scene.
 _APPROACH = 0.25
@@ -34,7 +34,7 @@ def films(move: Move, watch: Callable[[int, int], None] | None = None) -> dict[s
     """
     from matplotlib.animation import FFMpegWriter, PillowWriter  # noqa: PLC0415
 
-    count = int(np.clip(np.ceil(move.trajectory.duration * _FPS), 24, _MAX_COUNT))
+    count = int(np.clip(np.ceil(move.trajectory.duration * _FPS), 24, _MAX_FRAMES))
     X = link_poses(move.arm, move.trajectory(np.linspace(0, move.trajectory.duration, count)))
     points = skeleton_of(move.arm, X)
     writers: dict[str, AbstractMovieWriter] = {"move.gif": PillowWriter(fps=_FPS)}

@@ -43,7 +43,7 @@ def inverse(X_AB: ArrayLike) -> Array:
     return homogeneous(R_BA, -(R_BA @ X_AB[..., :3, 3:])[..., 0])
 
 
-def turned_over(X_AB: Array) -> Array:
+def inverse_pose(X_AB: Array) -> Array:
     """Return the inverse (4, 4) of one pose that is known to be one: nothing is checked."""
     X_BA = np.eye(4)
     R_BA = X_AB[:3, :3].T

@@ -25,11 +25,11 @@ def if_(context: Context, node: tree.If) -> None:
         context.generate(choice.then)
         if choice.otherwise is not None:
             ends.append(out.emit(Op.JMP, LATER, span=choice.head))
-        out.land(to_next)
+        out.patch_jump(to_next)
     if otherwise is not None:
         context.generate(otherwise)
     for end in reversed(ends):
-        out.land(end)
+        out.patch_jump(end)
 
 
 def while_(context: Context, node: tree.While) -> None:
@@ -38,7 +38,7 @@ def while_(context: Context, node: tree.While) -> None:
     over = out.emit(Op.JZ, out.value(node.condition), LATER, span=node.head)
     context.generate(node.body)
     out.emit(Op.JMP, top, span=node.head)
-    out.land(over)
+    out.patch_jump(over)
 
 
 def repeat(context: Context, node: tree.Repeat) -> None:
@@ -65,7 +65,7 @@ def for_(context: Context, node: tree.For) -> None:
     over = out.emit(Op.FOR, context.operand(node.variable), count, *bounds, LATER, span=head)
     context.generate(node.body)
     out.emit(Op.JMP, top, span=head)
-    out.land(over)
+    out.patch_jump(over)
 
 
 def cobegin(context: Context, node: tree.Cobegin) -> None:
@@ -78,11 +78,11 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     join = out.emit(Op.JOIN, span=node.span)
     over = out.emit(Op.JMP, LATER, span=out.instructions[join].span)
     for branch, fork in zip(node.branches, forks, strict=True):
-        out.land(fork)
+        out.patch_jump(fork)
         context.generate_with(*branch.body.statements, in_action=False)
         out.begin()
         out.emit(Op.QUIT, span=branch.body.end)
-    out.land(over)
+    out.patch_jump(over)
 
 
 def signal(context: Context, node: tree.Signal) -> None:
@@ -114,10 +114,10 @@ def try_(context: Context, node: tree.Try) -> None:
     attempt = out.emit(Op.TRY, LATER, span=node.span)
     context.generate(*node.body)
     succeeded = out.emit(Op.ENDT, LATER, span=node.span)
-    out.land(attempt)
+    out.patch_jump(attempt)
     context.generate(*node.recovery)
     out.emit(Op.ENDR, span=node.span)
-    out.land(succeeded)
+    out.patch_jump(succeeded)
 
 
 def retry(context: Context, node: tree.Retry) -> None:

@@ -53,8 +53,8 @@ class Emitter:
         self.instructions.append(Instruction(op=op, operands=operands, span=span, begins=begins, comment=comment))
         return len(self.instructions) - 1
 
-    def land(self, number: int) -> None:
-        """Let an instruction that was written with a place still open lead here."""
+    def patch_jump(self, number: int) -> None:
+        """Let a jump whose target was left open go to the next instruction."""
         old, target = self.instructions[number], self.here
         operands = tuple(target if operand == LATER else operand for operand in old.operands)
         self.instructions[number] = Instruction(
@@ -144,7 +144,7 @@ class Emitter:
             self.emit(Op.NOT, decides, to, span=node.left.span)
         over = self.emit(Op.JZ, decides, LATER, span=node.span)
         self.value(node.right, to)
-        self.land(over)
+        self.patch_jump(over)
         return to
 
     def _matrix(self, node: tree.Matrix, to: str) -> str:

@@ -42,7 +42,7 @@ def move(context: Context, node: tree.Move) -> None:
         over = out.emit(Op.JMP, LATER, span=node.span)
         for guard, number in conditions:
             _guard(context, guard, number)
-        out.land(over)
+        out.patch_jump(over)
 
 
 def _guard(context: Context, guard: tree.On, number: int) -> None:

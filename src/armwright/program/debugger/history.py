@@ -20,7 +20,7 @@ from armwright.program.vm.process import Process
 _OFTEN = 0.05
 _SHARE = 20.0
 # With more moments than this every second one is forgotten.
-_MAX_MOMENTS = 100
+_MAX_SNAPSHOTS = 100
 
 Path = tuple[int, ...]
 Change = Callable[[Machine], None]
@@ -159,7 +159,7 @@ class Timeline:
         if self.done <= self._moments[-1].done or now - self._begun < max(self._often, _SHARE * self._cost):
             return
         self._moments.append(self._moment())
-        if len(self._moments) > _MAX_MOMENTS:
+        if len(self._moments) > _MAX_SNAPSHOTS:
             del self._moments[1::2]
             self._often *= 2
 

@@ -23,7 +23,7 @@ Translate: TypeAlias = Callable[[Source], Compilation]
 
 
 @attrs.frozen
-class Cure:
+class AppliedFix:
     """A change that was made.
 
     Attributes:
@@ -49,7 +49,7 @@ class Fixed:
         compilation: of the program as it is now; what is left is in its diagnostics.
     """
 
-    cures: tuple[Cure, ...]
+    cures: tuple[AppliedFix, ...]
     compilation: Compilation
 
     @property
@@ -70,7 +70,7 @@ def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixe
         rounds: how often to look again at most.
     """
     now = translate(source)
-    cures: list[Cure] = []
+    cures: list[AppliedFix] = []
     vain: set[tuple[str, str]] = set()
     for _ in range(rounds if "\0" not in source.text else 0):
         offered = [
@@ -85,7 +85,7 @@ def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixe
         if not _helps(selected, now, after):
             selected, after = _that_help(selected, now, translate)
             vain |= {_line_of(one, now.source) for one in offered if one not in selected}
-        cures += [Cure(now.source, one) for one in selected]
+        cures += [AppliedFix(now.source, one) for one in selected]
         now = after
     return Fixed(cures=tuple(cures), compilation=now)
 

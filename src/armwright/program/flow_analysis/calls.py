@@ -82,7 +82,7 @@ class Calling:
 
     def _follow_unknown(self, procedure: ProcedureSymbols) -> None:
         state, facts = self._state, self._state.facts
-        mark = facts.mark()
+        mark = facts.checkpoint()
         facts.wipe(EVERYTHING)
         activation = self._activation(procedure, None)
         own = [

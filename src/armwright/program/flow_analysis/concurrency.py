@@ -14,7 +14,7 @@ from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
 
 # Locations shown in one message.
-_MAX_PLACES = 3
+_MAX_LOCATIONS = 3
 
 
 def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagnostic]:
@@ -304,7 +304,7 @@ def _too_few(findings: Findings, step: _Step, branches: list[list[_Step]]) -> No
         f"`{text}` is waited for more often than it is signalled",
         step.node.span,
         "waits for ever",
-        secondary=tuple(Label(span, "signalled here") for span in signals[:_MAX_PLACES]),
+        secondary=tuple(Label(span, "signalled here") for span in signals[:_MAX_LOCATIONS]),
         notes=(f"{len(nodes) - len(signals)} WAITs, and {len(signals)} SIGNAL{plural}",),
     )
 

@@ -87,7 +87,7 @@ class Context:
     def path(self, *statements: tree.Statement, mark: int | None = None) -> Outcome | None:
         """Follow one path from here and come back to a mark, or to here; None where HALT ends it."""
         state, facts = self.state, self.state.facts
-        start = facts.mark() if mark is None else mark
+        start = facts.checkpoint() if mark is None else mark
         self.follow(*statements)
         outcome = None if state.over else facts.outcome(start)
         facts.take_back(start)

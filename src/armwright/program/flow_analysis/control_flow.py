@@ -20,7 +20,7 @@ _MAX_LOOP_DEPTH = 3
 # Branches beside which one checks each other one.
 _MAX_BRANCHES = 30
 # Paths of one IF that are joined name by name where they meet.
-_MAX_WAYS = 100
+_MAX_PATHS = 100
 
 
 def event(state: FlowState, node: tree.Signal | tree.Wait) -> None:
@@ -48,7 +48,7 @@ def if_(context: Context, node: tree.If) -> None:
                 need(state, statement.condition)
             ways.append(context.path(statement.then))
         ways.append(context.path(*(() if otherwise is None else (otherwise,))))
-    if len(ways) > _MAX_WAYS and any(way is not None for way in ways):
+    if len(ways) > _MAX_PATHS and any(way is not None for way in ways):
         state.forget(context.writes(node))
         return
     says, advice = "it gets one on one side of this IF only", "give it a value before the IF, or on both sides"
@@ -118,7 +118,7 @@ def _loop(
     if context.loops < _MAX_LOOP_DEPTH:
         _first_pass(context, body)
     context.loops += 1
-    mark = state.facts.mark()
+    mark = state.facts.checkpoint()
     none = state.facts.outcome(mark)
     state.forget(writes)
     again = context.path(*body, mark=mark)
@@ -139,7 +139,7 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     writes = [context.writes(branch.body) for branch in node.branches]
     last, shaky = state.last[LAST], facts.shaky
     outcomes, uses = [], []
-    mark = facts.mark()
+    mark = facts.checkpoint()
     for number, branch in enumerate(node.branches):
         own, others = writes[number], _others(writes, number)
         state.forget(others)
@@ -181,7 +181,7 @@ def try_(context: Context, node: tree.Try) -> None:
         state.forget(writes)
         return
     retries = context.writes(*node.recovery).retries
-    mark = state.facts.mark()
+    mark = state.facts.checkpoint()
     if retries:
         state.forget_undone(writes)
     well = context.path(*node.body, mark=mark)

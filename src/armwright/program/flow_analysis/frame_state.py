@@ -27,7 +27,7 @@ from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import STATION, WORLD, KnownCell
 
 # Frames that hang on one another, up to which a pose is worked out.
-_MAX_WAY_LENGTH = 50
+_MAX_CHAIN_LENGTH = 50
 
 
 class FrameState:
@@ -126,7 +126,7 @@ class FrameState:
     def where(self, name: str) -> Pose | None:
         """Return where a frame stands in WORLD; None where that is not certain, or up a long path."""
         pose: Pose | None = HERE
-        for _ in range(_MAX_WAY_LENGTH):
+        for _ in range(_MAX_CHAIN_LENGTH):
             if name == WORLD or pose is None:
                 return pose
             if is_any(name) or is_arm(name) or (step := self._steps[name]) is None:

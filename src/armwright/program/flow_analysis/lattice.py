@@ -81,11 +81,11 @@ class Facts:
 
     # ---- paths that part and meet -----------------------------------------------------------------------------------
 
-    def mark(self) -> int:
+    def checkpoint(self) -> int:
         """Return what to go back to later."""
         return len(self._changes)
 
-    def note(self, book: "FactTable[Any]", key: str, old: Any) -> None:
+    def record_change(self, book: "FactTable[Any]", key: str, old: Any) -> None:
         """Keep an entry of a book that is about to change."""
         self._changes.append((book, key, old))
 
@@ -184,7 +184,7 @@ class FactTable(Generic[V]):
         if facts.shaky and facts.is_shaky(key):
             value = self.unknown
         old = self._entries.get(key)
-        facts.note(self, key, old)
+        facts.record_change(self, key, old)
         self._write(key, old, (value, facts.tick))
 
     def restore(self, key: str, old: tuple[V, int] | None) -> None:

@@ -26,7 +26,7 @@ def move(context: Context, node: tree.Move) -> None:
         need(state, guard.condition)
         writes = context.writes(guard.action)
         if not state.first:
-            mark = state.facts.mark()
+            mark = state.facts.checkpoint()
             if arm is None:
                 state.lose_arms(grasps=False)
             else:

@@ -14,7 +14,7 @@ _UNITS = {"M": "metres", "MM": "millimetres", "CM": "centimetres", "IN": "inches
 # A pose, or a step, this many times longer than an arm reaches is out of every robot's world.
 _FAR = 50.0
 # A pose nearer to WORLD than this part of the reach that would be one in metres was typed in metres.
-_NEAR, _LEAST, _MAX_COUNT = 0.02, 0.05, 3.0
+_NEAR, _LEAST, _MAX_SIZE = 0.02, 0.05, 3.0
 # No hand holds what is so far from it [m].
 _AWAY = 0.2
 
@@ -30,7 +30,7 @@ def placed(state: FlowState, frame: str, value: tree.Expression) -> None:
     for numbers in _typed(value):
         size = math.hypot(*(number.value for number in numbers))
         bare, broken = not any(number.unit for number in numbers), any(number.value % 1 for number in numbers)
-        if bare and broken and 0 < away < _NEAR * reach and _LEAST * reach < size < _MAX_COUNT * reach:
+        if bare and broken and 0 < away < _NEAR * reach and _LEAST * reach < size < _MAX_SIZE * reach:
             unit = _UNITS[units.length]
             advice = f"write the lengths in {unit}, or with their unit: `{numbers[0].text}m`"
             _odd(state, f"`{state.name(frame)}` would be {_length(away)} from WORLD", numbers, reach, advice)

@@ -13,7 +13,7 @@ from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
 
 # A part that changes more than this is taken to change everything.
-_MAX_COUNT = 400
+_MAX_EFFECTS = 400
 # Any arm, nobody knows which.
 ANY_ARM = "*"
 # So often what procedures that call one another may change is looked at again.
@@ -75,7 +75,7 @@ ANYTHING = SideEffects(arms=frozenset({ANY_ARM}), grasps=True, everything=True)
 
 
 def _limited(writes: SideEffects) -> SideEffects:
-    if writes.everything or sum(map(len, (writes.placed, writes.hung, writes.moved, writes.values))) > _MAX_COUNT:
+    if writes.everything or sum(map(len, (writes.placed, writes.hung, writes.moved, writes.values))) > _MAX_EFFECTS:
         return attrs.evolve(ANYTHING, halts=writes.halts, retries=writes.retries)
     return writes
 

@@ -56,7 +56,7 @@ def _around(source: Source, std: Standard, width: int) -> str | None:
     head_wrong = any(diagnostic.start <= begin.end for diagnostic in wrong)
     pieces, done, has_tail = [], 0, False
     for span in _stretches(source, program, Span(begin.end, end.start), wrong):
-        laid = _alone("" if head_wrong else head, source.slice(span), std, width)
+        laid = _formatted_alone("" if head_wrong else head, source.slice(span), std, width)
         if laid is not None and laid != source.slice(span):
             pieces += [source.text[done : span.start], laid]
             done = span.end
@@ -92,7 +92,7 @@ def _stretches(source: Source, program: tree.Program, body: Span, wrong: list[Sp
         yield Span(first, last)
 
 
-def _alone(head: str, stretch: str, std: Standard, width: int) -> str | None:
+def _formatted_alone(head: str, stretch: str, std: Standard, width: int) -> str | None:
     """Return statements laid out as those of a program of their own; None where they are none."""
     program = f"{head}BEGIN\n{_FROM}\n{stretch}{_TO}\nEND.\n"
     try:

@@ -11,7 +11,7 @@ from armwright.errors import counted, shortened
 from armwright.program.language.source import Source, Span
 
 # Of each code a pass over a program tells so many: else a file of nonsense takes more memory for messages than itself.
-MAX_OF_A_CODE = 10_000
+MAX_PER_CODE = 10_000
 
 
 class Severity(enum.StrEnum):
@@ -91,10 +91,10 @@ class Findings(list[Diagnostic]):
         """Add one; of a code that was told as often as is allowed, what is added last says so."""
         self._counts[one.code] += 1
         count = self._counts[one.code]
-        if count < MAX_OF_A_CODE:
+        if count < MAX_PER_CODE:
             super().append(one)
-        elif count == MAX_OF_A_CODE:
-            text = f"{MAX_OF_A_CODE:,} messages have the code {one.code}; those behind this place are not told"
+        elif count == MAX_PER_CODE:
+            text = f"{MAX_PER_CODE:,} messages have the code {one.code}; those behind this place are not told"
             super().append(
                 attrs.evolve(
                     one, message=text, label="this one, and perhaps more", secondary=(), notes=(), helps=(), fixes=()
@@ -124,7 +124,7 @@ class Findings(list[Diagnostic]):
         fixes: tuple[Fix, ...] = (),
     ) -> None:
         """Add an error, or what ``severity`` says; the arguments are those of ``Diagnostic``."""
-        if self._counts[code] >= MAX_OF_A_CODE:
+        if self._counts[code] >= MAX_PER_CODE:
             return
         self.append(
             Diagnostic(

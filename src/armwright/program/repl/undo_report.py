@@ -9,7 +9,7 @@ from armwright.program.vm.machine import Machine
 # Effects that say nothing of their own in a trace.
 SILENT = ("PLACE", "LOCK", "END", "STOP")
 # Nobody reads more of what is no longer so.
-_MAX_SAID = 10
+_MAX_LISTED = 10
 # What is nearer than this was not moved: rounding [m], [rad], and of entries of rotations.
 _ROUNDING = 1e-9
 
@@ -22,8 +22,8 @@ def taken_back(before: Machine, after: Machine) -> list[str]:
         after: what the statement had come to.
     """
     done = [effect.text for effect in after.state.effects[len(before.state.effects) :] if effect.kind not in SILENT]
-    count = len(done) - _MAX_SAID
-    done = [*done[:_MAX_SAID], f"{count} more"] if count > 1 else done
+    count = len(done) - _MAX_LISTED
+    done = [*done[:_MAX_LISTED], f"{count} more"] if count > 1 else done
     sentences = [f"before that it had done: {'; '.join(done)}"] if done else []
     back = _arms(before, after)
     if frames := [after.spelled(name) for name in _frames(before, after)]:

@@ -71,7 +71,7 @@ def go_on(machine: Machine, process: Process) -> None:
     motion = process.motion
     assert motion is not None  # noqa: S101 - asked for only then
     for guard in motion.guards:
-        if not guard.done and _holds(machine, process, motion, guard):
+        if not guard.done and _condition_holds(machine, process, motion, guard):
             guard.done = True
             machine.set_hand(motion.arm, motion.span)
             action = process.now.inner("action", back=process.at, called=motion.span, locks=len(process.locks))
@@ -316,7 +316,7 @@ def _start(machine: Machine, process: Process, motion: Motion) -> None:
     process.wake = machine.state.ticks if motion.guards else motion.until
 
 
-def _holds(machine: Machine, process: Process, motion: Motion, guard: Guard) -> bool:
+def _condition_holds(machine: Machine, process: Process, motion: Motion, guard: Guard) -> bool:
     """Whether the condition of a guard holds now, with the arm where it is now."""
     tree, now = machine.state.tree, process.now
     if guard.looks and len(motion.hands):

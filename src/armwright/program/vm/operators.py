@@ -68,7 +68,7 @@ def _turn(axis: int) -> Callable[[float, UnitSystem], Array]:
     return turn
 
 
-def _shift(x: float, y: float, z: float, units: UnitSystem) -> Array:
+def _translation(x: float, y: float, z: float, units: UnitSystem) -> Array:
     X = np.eye(4)
     X[:3, 3] = x * units.metres, y * units.metres, z * units.metres
     return X
@@ -115,7 +115,7 @@ PLAIN: Mapping[Op, Callable[..., Any]] = {
 }
 # Operations that count in the program's units, given as the last argument.
 IN_UNITS: Mapping[Op, Callable[..., Any]] = {
-    Op.XYZ: _shift,
+    Op.XYZ: _translation,
     Op.ROTX: _turn(0),
     Op.ROTY: _turn(1),
     Op.ROTZ: _turn(2),
