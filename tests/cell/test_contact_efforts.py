@@ -117,7 +117,7 @@ def test_peaks_and_warning() -> None:
         for i, j in enumerate(arm.joints)
     ]
     weak, _ = pressing(attrs.evolve(arm, joints=joints))
-    messages = [one.message for one in warnings_of(weak) if one.code == "W401"]
+    messages = [one.message for one in warnings_of(weak.stages, weak.cell) if one.code == "W401"]
     assert len(messages) == 1
     assert f"would need {stage.peak_effort[joint]:.1f} N m" in messages[0]
 

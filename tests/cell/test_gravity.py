@@ -154,7 +154,7 @@ def test_a_program_on_the_ceiling(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(stream.tau[ticks] - np.sign(stream.qd[ticks]) * dry, expected, atol=AGREES)
     (stage,) = recording.stages
     np.testing.assert_allclose(stage.peak_effort, np.abs(stream.tau).max(axis=0), atol=AGREES)
-    found = warnings_of(recording)
+    found = warnings_of(recording.stages, recording.cell)
     assert [one.code for one in found] == ["W401"]
     assert f"joint 2 of ARM_1 would need {stage.peak_effort[1]:.1f} N m" in found[0].message
 
