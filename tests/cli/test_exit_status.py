@@ -161,6 +161,7 @@ def test_broken_pipe(arguments: str) -> None:
     ("arguments", "status", "output", "errors"),
     [("arms", 0, True, False), ("show pumma560", 2, False, True), ("show pumma560 --json", 2, True, False)],
 )
+@pytest.mark.drawn(0.5)
 def test_closed_streams(closed: str, arguments: str, status: int, output: bool, errors: bool) -> None:  # noqa: FBT001
     """What is said to a closed output is lost; it changes no status, and gets into no other stream."""
     command = f"{sys.executable} -m armwright {arguments} {closed}"
@@ -246,6 +247,7 @@ def test_changed_results_are_told(tmp_path: Path) -> None:
     ("arguments", "status"),
     [("fmt -", 1), ("fix -", 1), ("repl", 0), ("repl --json", 0), ("debug", 0), ("lsp", 0)],
 )
+@pytest.mark.drawn(0.5)
 def test_closed_input(arguments: str, status: int) -> None:
     """A closed standard input is an empty one."""
     command = f"{sys.executable} -m armwright {arguments} <&-"
@@ -257,6 +259,7 @@ def test_closed_input(arguments: str, status: int) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status"), [("show nosuch", 2), ("nosuch", 2), ("run", 2), ("check nosuch.rlo", 4), ("arms", 0)]
 )
+@pytest.mark.drawn(0.5)
 def test_full_error_output(arguments: str, status: int) -> None:
     """What the error output cannot take is lost, and the status stays."""
     command = f"{sys.executable} -m armwright {arguments} 2>/dev/full"
@@ -269,7 +272,8 @@ def test_folder_that_has_gone(tmp_path: Path) -> None:
     """An error of the system that names no file is none of the output, and stands in the document."""
     inside = tmp_path / "gone"
     inside.mkdir()
-    command = f"cd {inside} && rmdir {inside} && {sys.executable} -m armwright clearance sweep five-bar -o o --json"
+    sweep = "clearance sweep five-bar -n 2 --paths x1 -o o --json"
+    command = f"cd {inside} && rmdir {inside} && {sys.executable} -m armwright {sweep}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, timeout=120)
 
     assert done.returncode == 4

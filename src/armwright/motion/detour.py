@@ -59,6 +59,8 @@ _EASINGS, _AROUND = 3, 20
 _LOOKED_AT = 1e-3
 # The end is met to this [m], a rotation counted as ``ROTATION_PER_METRE`` says.
 _ARRIVED = 1e-6
+# Efforts at rest are compared with their limits to this part.
+_ROUNDING = 1e-6
 
 
 @attrs.frozen(kw_only=True)
@@ -188,8 +190,11 @@ def _by_via(
     arm: AnyArm, line: StraightPath, q: Array, obstacle: PathError, *, allowed: Tolerance, speed: float
 ) -> Detour | None:
     """Return the fastest path by one of the nearest via poses; None where none is found."""
+    solver = solver_of(arm)
+    if _is_too_weak_to_begin(solver, q):
+        return None
     ways: list[Detour] = []
-    for ring in chain(_rings(line, obstacle.fraction), _on_joint_moves(solver_of(arm), q, line.poses[-1])):
+    for ring in chain(_rings(line, obstacle.fraction), _on_joint_moves(solver, q, line.poses[-1])):
         for via in ring:
             try:
                 there = certified_line(arm, q, via, allowed, speed=speed, diagnose=False)
@@ -209,6 +214,15 @@ def _by_via(
         if best is not None and best.price.time < _LONG * line.duration:
             return best
     return min(ways, key=lambda way: way.price.time, default=None)
+
+
+def _is_too_weak_to_begin(solver: Solver, q: Array) -> bool:
+    """Whether gravity alone takes more than a joint may give where a motion begins, so that none keeps the efforts."""
+    limits = solver.arm.limit("effort")
+    if not np.isfinite(limits).any():
+        return False
+    at_rest = np.abs(solver.inverse_dynamics(q, np.zeros(len(q)), np.zeros(len(q))))
+    return bool((at_rest > limits * (1 + _ROUNDING)).any())
 
 
 def _rings(line: StraightPath, fraction: float) -> Iterator[list[Array]]:
