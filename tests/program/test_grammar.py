@@ -24,7 +24,7 @@ def read(text: str, standard: Standard = Standard.RLO_2) -> tuple[tree.Program, 
     source = Source("t.rlo", text)
     scanned = scan(source, text, standard)
     program, slips = parse(source, scanned.tokens, standard)
-    return program, [*scanned.found, *slips]
+    return program, [*scanned.diagnostics, *slips]
 
 
 def statements(text: str) -> tuple[tree.Statement, ...]:

@@ -48,7 +48,7 @@ def judged(text: str) -> tuple[ExpressionType | None, list[Diagnostic]]:
     """Return what an expression is, and what is said of it."""
     names = Names(None)
     names.main.types.update(DECLARED)
-    return sort(names, expression(text)), names.found
+    return sort(names, expression(text)), names.diagnostics
 
 
 def checked(text: str) -> tuple[Symbols, list[Diagnostic]]:

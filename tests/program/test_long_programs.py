@@ -6,7 +6,7 @@ from armwright.errors import FileFormatError, InvalidValueError
 from armwright.files.limits import raised
 from armwright.program import Source, compile as translate
 from armwright.program.diagnostics.render import render
-from armwright.program.language.diagnostic import MAX_PER_CODE, Findings, to_json
+from armwright.program.language.diagnostic import MAX_PER_CODE, DiagnosticList, to_json
 from armwright.program.language.source import Span
 
 LONG = 200_000
@@ -40,10 +40,10 @@ def test_messages_of_one_kind_are_counted(unit: str) -> None:
 
 def test_findings() -> None:
     """Whichever way messages are added, they are counted."""
-    found, same = Findings(), Findings()
+    found, same = DiagnosticList(), DiagnosticList()
     for _ in range(MAX_PER_CODE + 5):
-        found.say("E105", "what", Span(0, 1), "here")
-    found.say("E106", "another", Span(0, 1), "here")
+        found.report("E105", "what", Span(0, 1), "here")
+    found.report("E106", "another", Span(0, 1), "here")
     same += list(found)
     same.extend(found)
 

@@ -19,7 +19,7 @@ def tokens_of(text: str, standard: Standard = Standard.RLO_2) -> tuple[Token, ..
 
 
 def codes_of(text: str, standard: Standard = Standard.RLO_2) -> list[str]:
-    return [one.code for one in scanned(text, standard).found]
+    return [one.code for one in scanned(text, standard).diagnostics]
 
 
 @pytest.mark.parametrize("text", ["ARM-1", "arm-1", "ARM_1", "Arm_01", "arm-001"])
@@ -159,12 +159,12 @@ def test_look_alikes(text: str, meant: str) -> None:
     found = scanned(text)
 
     assert found.tokens[0].key == meant
-    assert [(one.code, one.fixes[0].replacement) for one in found.found] == [("E101", meant)]
+    assert [(one.code, one.fixes[0].replacement) for one in found.diagnostics] == [("E101", meant)]
 
 
 def test_look_alikes_once() -> None:
     """The same wrong mark is reported once, with all its places to change."""
-    (odd,) = scanned("a；b；c；").found
+    (odd,) = scanned("a；b；c；").diagnostics
 
     assert len(odd.fixes) == 3
     assert odd.notes == ("it stands in 3 places",)
@@ -177,7 +177,7 @@ def test_tokens_lie_in_the_text(text: str, standard: Standard) -> None:
 
     assert all(before.end <= after.start for before, after in pairwise(found.tokens))
     assert found.tokens[-1].start == len(text)
-    assert all(0 <= one.span.start <= one.span.end <= len(text) for one in found.found)
+    assert all(0 <= one.span.start <= one.span.end <= len(text) for one in found.diagnostics)
     assert all(before.end <= after.start for before, after in pairwise(found.comments))
 
 
@@ -190,12 +190,12 @@ def test_word_in_place() -> None:
 
 def test_many_strange_characters() -> None:
     """A million control characters are one mistake, and take as long as they are many, not the square of it."""
-    found = scanned("\x01" * 1_000_000 + "\nPAUSE 1").found
+    found = scanned("\x01" * 1_000_000 + "\nPAUSE 1").diagnostics
 
     assert [diagnostic.code for diagnostic in found] == ["E101"]
     assert found[0].notes == ("it stands in 1000000 places",)
     between = scanned("\x01a" * 90_000)
-    assert [diagnostic.code for diagnostic in between.found] == ["E101"]
+    assert [diagnostic.code for diagnostic in between.diagnostics] == ["E101"]
     assert all(token.damaged for token in between.tokens[:-1])
 
 

@@ -71,7 +71,7 @@ def by_hand(text: str) -> tuple[bool, list[Diagnostic]]:
     scanned = scan(source, text, Standard.RLO_2)
     program, slips = parse(source, scanned.tokens, Standard.RLO_2)
     # The grammar does not count the characters of names.
-    said = [one for one in [*scanned.found, *slips] if one.code != "E103"]
+    said = [one for one in [*scanned.diagnostics, *slips] if one.code != "E103"]
     return not said and not any(left_to_the_checker(node) for node in tree.walk(program)), said
 
 

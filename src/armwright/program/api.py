@@ -250,7 +250,7 @@ def _compile(
         cell = _imported(program, read_import) if cell is None else cell
     symbols, name_errors, imports = check.check(program, cell, std=std, read_import=read_import)
     spelling = {token.key: token.text for token in reversed(scanned.tokens) if token.kind is TokenKind.NAME}
-    diagnostics += [*scanned.found, *syntax_errors]
+    diagnostics += [*scanned.diagnostics, *syntax_errors]
     guessed = any(diagnostic.is_syntax for diagnostic in diagnostics)
     # Where the parser had to guess, a name may seem unused, and the effect of the statements is unknown.
     diagnostics += [error for error in name_errors if not (guessed and error.code == "L304")]

@@ -237,7 +237,7 @@ class _Reader:
             self._fail(f"expected instruction {len(self._steps):04d}")
         span = _SPAN.fullmatch(match["span"])
         if span is None:
-            self._fail("expected a place such as 12:5+20")
+            self._fail("expected a location such as 12:5+20")
         name = match["op"].upper()
         if name not in Op.__members__:
             self._fail(f"unknown operation {name!r}", closest(name, Op.__members__))

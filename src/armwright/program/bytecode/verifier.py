@@ -31,7 +31,7 @@ class Value(enum.Enum):
 
     NUMBER = "a number"
     TRUTH = "a truth value"
-    POSE = "a place or a step"
+    POSE = "a pose or a transformation"
 
 
 @attrs.frozen

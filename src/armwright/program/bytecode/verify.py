@@ -205,7 +205,7 @@ def _multiply(verifier: Verifier, state: State) -> Flow:
     to, *factors = verifier.operands
     left, right = (verifier.value(state, factor) for factor in factors)
     if left is not right or left is Value.TRUTH:
-        raise verifier.wrong("MUL takes two numbers, or two places or steps")
+        raise verifier.wrong("MUL takes two numbers, or two poses or transformations")
     return Flow(verifier.write(state, to, left))
 
 

@@ -65,14 +65,14 @@ def parse(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
     """
     source = Source("expression", text)
     scanned = scan(source, text)
-    _refuse(scanned.found)
+    _refuse(scanned.diagnostics)
     named = [attrs.evolve(token, kind=TokenKind.NAME) if token.key in types else token for token in scanned.tokens]
     tokens = Tokens(source, named, {})
     try:
         node = expression(tokens)
     except LostError:
         node = None
-    _refuse(tokens.found)
+    _refuse(tokens.diagnostics)
     if node is None or not tokens.done:
         raise ExpressionError(f"`{tokens.now.text}` does not belong here")
     if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
@@ -81,7 +81,7 @@ def parse(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
     names.main.types = dict(types)
     names.units = code.units
     sort = type_check.sort(names, node)
-    _refuse(names.found)
+    _refuse(names.diagnostics)
     if sort is None:
         raise ExpressionError(f"`{text}` has no value")
     return Parsed(source=source, node=node, sort=sort)

@@ -60,5 +60,5 @@ def check(
     context.follow(*program.statements)
     state.over = False
     context.follow_uncalled()
-    findings = [*state.found, *concurrency.check(program, symbols, source), *data_races.check(program, symbols)]
+    findings = [*state.diagnostics, *concurrency.check(program, symbols, source), *data_races.check(program, symbols)]
     return Flow(arms=state.arms, implied=state.implied), findings

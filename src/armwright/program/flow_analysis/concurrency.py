@@ -6,7 +6,7 @@ import attrs
 
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
 from armwright.program.flow_analysis.state import FlowState, Use, Uses
-from armwright.program.language.diagnostic import Diagnostic, Findings, Label, Severity
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label, Severity
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Source
 from armwright.program.semantics.expression_types import written
@@ -25,7 +25,7 @@ def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagn
         symbols: its names.
         source: its text.
     """
-    findings = Findings()
+    findings = DiagnosticList()
     bodies = [_Body(symbols.scope(None), program.statements)]
     for node in program.procedures:
         procedure = symbols.procedures.get(node.name.key)
@@ -46,7 +46,7 @@ def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagn
 # ---- priorities and arms -------------------------------------------------------------------------------------------
 
 
-def _priorities(findings: Findings, fork: tree.Cobegin, source: Source) -> None:
+def _priorities(findings: DiagnosticList, fork: tree.Cobegin, source: Source) -> None:
     """Warn of branches of equal priority, where it is written."""
     first_use: dict[float, tree.Branch] = {}
     for branch in fork.branches:
@@ -54,7 +54,7 @@ def _priorities(findings: Findings, fork: tree.Cobegin, source: Source) -> None:
             continue
         first = first_use.setdefault(branch.priority.value, branch)
         if first is not branch:
-            findings.say(
+            findings.report(
                 "W502",
                 f"{'both' if len(fork.branches) == 2 else 'two'} branches have priority {branch.priority.text}",
                 branch.head,
@@ -80,7 +80,7 @@ def shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
             if first is use:
                 continue
             does = "moved" if first.moves and use.moves else "used"
-            state.say(
+            state.report(
                 "E503",
                 f"{arm} is {does} in two branches of one COBEGIN",
                 use.span,
@@ -214,7 +214,7 @@ def _ends(body: _Body) -> Iterator[bool]:
             waiting += [(inner, beside or isinstance(node, tree.Cobegin)) for inner in parts(node)]
 
 
-def _never_signalled(findings: Findings, events: _Events) -> None:
+def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
     reported: set[str] = set()
     for name, waits in events.waits.items():
         scope, node = waits[0]
@@ -231,7 +231,7 @@ def _never_signalled(findings: Findings, events: _Events) -> None:
             continue
         reported.add(head(name))
         declared, text = scope.declared(key), written(node.event)
-        findings.say(
+        findings.report(
             "E501",
             f"nothing signals `{text}`, so this WAIT never ends",
             node.span,
@@ -244,7 +244,7 @@ def _never_signalled(findings: Findings, events: _Events) -> None:
 # ---- waits that cannot end -----------------------------------------------------------------------------------------
 
 
-def _deadlock(findings: Findings, branches: list[list[_Step]], source: Source, *, main: bool) -> None:
+def _deadlock(findings: DiagnosticList, branches: list[list[_Step]], source: Source, *, main: bool) -> None:
     """Say which branches wait for one another for ever."""
     reached = _run(branches)
     stuck = {number: branches[number][index] for number, index in enumerate(reached) if index < len(branches[number])}
@@ -294,12 +294,12 @@ def _run(branches: list[list[_Step]]) -> list[int]:
     return reached
 
 
-def _too_few(findings: Findings, step: _Step, branches: list[list[_Step]]) -> None:
+def _too_few(findings: DiagnosticList, step: _Step, branches: list[list[_Step]]) -> None:
     text = written(step.node.event)
     nodes = [statement.node for several in branches for statement in several if statement.event == step.event]
     signals = [node.span for node in nodes if isinstance(node, tree.Signal)]
     plural = "s" * (len(signals) > 1)
-    findings.say(
+    findings.report(
         "E501",
         f"`{text}` is waited for more often than it is signalled",
         step.node.span,
@@ -309,7 +309,9 @@ def _too_few(findings: Findings, step: _Step, branches: list[list[_Step]]) -> No
     )
 
 
-def _wait_for_each_other(findings: Findings, ring: list[tuple[_Step, _Step]], source: Source, *, main: bool) -> None:
+def _wait_for_each_other(
+    findings: DiagnosticList, ring: list[tuple[_Step, _Step]], source: Source, *, main: bool
+) -> None:
     """Speak of branches of which each waits for what the next would signal.
 
     Args:
@@ -328,4 +330,4 @@ def _wait_for_each_other(findings: Findings, ring: list[tuple[_Step, _Step]], so
         1: f"{'the program' if main else 'this branch'} waits for itself for ever",
         2: "these two branches wait for each other for ever",
     }.get(count, f"these {count} branches wait for one another for ever")
-    findings.say("E501", message, first.span, first.text, secondary=tuple(others))
+    findings.report("E501", message, first.span, first.text, secondary=tuple(others))

@@ -6,7 +6,7 @@ from itertools import combinations, islice, product
 import attrs
 
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
-from armwright.program.language.diagnostic import Diagnostic, Findings, Label, Severity
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label, Severity
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import Scope, Symbols
@@ -105,7 +105,7 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
 
     Branches of which one waits, before its write, for what the other signals behind its own are no danger.
     """
-    findings = Findings()
+    findings = DiagnosticList()
     bodies = [(symbols.scope(None), program.statements)]
     for node in program.procedures:
         procedure = symbols.procedures.get(node.name.key)
@@ -123,7 +123,7 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
 
 
 def _branches(
-    findings: Findings,
+    findings: DiagnosticList,
     fork: tree.Cobegin,
     scope: Scope,
     symbols: Symbols,
@@ -167,9 +167,9 @@ def _leads_round(start: _Branch, end: _Branch, beside: list[_Branch]) -> bool:
     return any(third.leads_to(end) for third in reached)
 
 
-def _say(findings: Findings, first: _Write, second: _Write) -> None:
+def _say(findings: DiagnosticList, first: _Write, second: _Write) -> None:
     unlocked = second if first.locked else first
-    findings.say(
+    findings.report(
         "W503",
         f"`{unlocked.text}` is written in two branches of one COBEGIN without LOCK",
         second.span,

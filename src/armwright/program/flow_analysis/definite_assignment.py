@@ -64,7 +64,7 @@ def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
     if kind is VariableKind.FRAME:
         _no_place(state, node, secondary, from_cell=slot == head.key and head is node)
         return
-    state.say(
+    state.report(
         "E303",
         f"`{written(node)}` is used before it has a value",
         node.span,
@@ -82,7 +82,7 @@ def _uncertain(state: FlowState, node: tree.Name | tree.Index, name: str, partin
     open_cell = state.cell is None and _kind(state, node) is VariableKind.FRAME
     if open_cell or not state.settle(name):
         return
-    state.say(
+    state.report(
         "W207",
         f"`{written(node)}` may have no value here",
         node.span,
@@ -100,7 +100,7 @@ def _no_place(state: FlowState, node: tree.Name | tree.Index, secondary: tuple[L
     if not certain:
         note = "no cell was given; a cell file may give it one"
     nothing_yet = state.table.is_empty
-    state.say(
+    state.report(
         "E304" if certain else "W204",
         f"frame `{written(node)}` is used before it has a value",
         node.span,

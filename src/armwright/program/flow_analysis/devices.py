@@ -39,7 +39,7 @@ def grasp(state: FlowState, node: tree.Grasp) -> None:
         if state.symbols.std is Standard.RLO_83:
             help_ = f"name one before, as `OPEN {state.some_arm()}` does"
         text = "GRASP does not say which arm, and none has been used yet"
-        state.say("E307", text, node.span, "which arm?", helps=(help_,))
+        state.report("E307", text, node.span, "which arm?", helps=(help_,))
         return
     state.record(node, None if arm == UNKNOWN else arm)
     if arm == UNKNOWN:
@@ -57,7 +57,7 @@ def _closed_on_arrival(state: FlowState, arm: str) -> None:
     never_opened = hand.arrived_open is False and hand.opened is None
     if hand.arrival is None or hand.at is None or not (opened_late or never_opened):
         return
-    state.say(
+    state.report(
         "L301",
         f"{arm} {'may come' if opened_late else 'comes'} to `{state.name(hand.at)}` with closed fingers",
         hand.arrival,
@@ -96,7 +96,7 @@ def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
         own = "'" in frame or "[" in frame
         if visions is not None and not own and frame not in visions and state.settle(frame):
             near = closest(written(target), visions)
-            state.say(
+            state.report(
                 "W601",
                 f"the camera of the cell has no answer for `{written(target)}`",
                 target.span,
@@ -117,7 +117,7 @@ def operate(state: FlowState, node: tree.Operate) -> None:
         return
     near = closest(device.text, known)
     listed = ", ".join(sorted(known)) or "none"
-    state.say(
+    state.report(
         "R602",
         f"the cell has no device `{device.text}`",
         device.span,

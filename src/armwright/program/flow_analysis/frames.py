@@ -46,7 +46,7 @@ def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) ->
     if leader is not None and leader != frame and (is_arm(leader) or leader == WORLD):
         link = state.table.links[frame]
         name = written(node)
-        state.say(
+        state.report(
             "E310",
             f"`{name}` hangs rigidly on {state.name(leader)}, which no value moves",
             node.span,
@@ -99,7 +99,7 @@ def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
     if link is None or link.parent is None or link.parent == parent or _may_be(state, parent, link.parent):
         return
     name = state.name
-    state.say(
+    state.report(
         "W203",
         f"`{name(child)}` still hangs on `{name(link.parent)}`",
         span,
@@ -129,7 +129,7 @@ def _ring(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
         if link and link.span and link.parent:
             chain.append(Label(link.span, f"{name(below)} hangs on {name(link.parent)}"))
     on = "itself" if child == parent else name(parent)
-    state.say(
+    state.report(
         "E305",
         "this AFFIX would close a ring",
         node.link,
@@ -145,7 +145,7 @@ def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
     if above is None or below is None or not above.moved or above.order < below.order:
         return
     name = state.name
-    state.say(
+    state.report(
         "L303",
         f"`{name(parent)}` was moved before `{name(child)}` hung on it",
         node.link,
@@ -184,7 +184,7 @@ def _not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
     on = link.parent if link else None
     where = Label(link.span, f"{name(child)} was affixed to {name(on)} here") if link and link.span and on else None
     instead = f"write `UNFIX {name(child)} FROM {name(on)}`" if on else "leave this UNFIX out"
-    state.say(
+    state.report(
         "E306",
         f"`{name(child)}` is not affixed to `{written(node.parent)}`",
         node.parent.span,

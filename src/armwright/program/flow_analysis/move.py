@@ -105,7 +105,7 @@ def _left_hanging(state: FlowState, node: tree.Move, arm: str) -> None:
     link, name = state.table.links[frame], state.name(frame)
     if link is None or link.parent != arm:
         return
-    state.say(
+    state.report(
         "W209",
         f"`{name}` still hangs on {arm}, whose fingers have let it go",
         node.span,
@@ -149,7 +149,7 @@ def _carrier(state: FlowState, node: tree.Move, moved: str | None) -> tuple[str 
 
 def _imply(state: FlowState, node: tree.Move, moved: str, arm: str) -> None:
     name, grip = state.name(moved), state.table.grips[arm]
-    state.say(
+    state.report(
         "W201",
         f"`{name}` is moved, but no AFFIX hangs it on {arm}",
         node.span,
@@ -164,7 +164,7 @@ def _imply(state: FlowState, node: tree.Move, moved: str, arm: str) -> None:
 
 def _not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
     link, name = state.table.links[moved], state.name(moved)
-    state.say(
+    state.report(
         "E301",
         f"`{name}` cannot be moved: it is not affixed to an arm",
         node.moved.span,
@@ -177,7 +177,7 @@ def _not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
 
 
 def _relative(state: FlowState, node: tree.Move, arm: str) -> None:
-    state.say(
+    state.report(
         "L302",
         f"`{written(node.goal)}` moves together with {arm}, which is to come to it",
         node.goal.span,
@@ -197,7 +197,7 @@ def _speed(state: FlowState, node: tree.Expression) -> None:
     if LOWEST_SPEED <= value <= HIGHEST_SPEED or slot is None or state.now.scope.is_poisoned(node.key):
         return
     if state.settle(slot):
-        state.say(
+        state.report(
             "E207",
             f"speed `{node.text}` = {value:.12g} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
             node.span,

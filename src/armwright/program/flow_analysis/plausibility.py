@@ -47,7 +47,11 @@ def lengths(state: FlowState, *nodes: tree.Expression | None) -> None:
         for numbers in () if node is None else _typed(node):
             away = math.hypot(*(convert(number.value, number.unit, units) * units.metres for number in numbers))
             if away > _FAR * reach:
-                what = "this place is {} from its origin" if isinstance(node, tree.Matrix) else "this step is {} long"
+                what = (
+                    "this position is {} from its origin"
+                    if isinstance(node, tree.Matrix)
+                    else "this translation is {} long"
+                )
                 advice = f"write the lengths in {_UNITS[units.length]}"
                 if units.length == "M":
                     advice = "put `UNITS MM ;` in front of BEGIN if they are millimetres, or write them with their unit"
@@ -75,7 +79,7 @@ def _typed(node: tree.Expression) -> Iterator[list[tree.Number]]:
 
 def _odd(state: FlowState, what: str, numbers: list[tree.Number], reach: float, advice: str) -> None:
     unit = _UNITS[state.symbols.units.length]
-    state.say(
+    state.report(
         "W208",
         f"{what}, in a cell whose arm reaches {_length(reach)}",
         numbers[0].span.to(numbers[-1].span),
@@ -105,7 +109,7 @@ def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
     if away <= _AWAY:
         return
     name, hand = state.name, table.hands[arm]
-    state.say(
+    state.report(
         "W210",
         f"`{name(child)}` is {_length(away)} away from the hand of {arm}",
         node.link,

@@ -11,7 +11,7 @@ from armwright.program.flow_analysis.frame_state import FrameState
 from armwright.program.flow_analysis.lattice import EVERYTHING, Facts, FactTable, same
 from armwright.program.flow_analysis.poses import Pose
 from armwright.program.flow_analysis.side_effects import ANY_ARM, SideEffects, Writing
-from armwright.program.language.diagnostic import Findings, Label, Severity
+from armwright.program.language.diagnostic import DiagnosticList, Label, Severity
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Source, Span
@@ -95,7 +95,7 @@ class FlowState:
         strict: bool,
     ) -> None:
         """Start in front of the first statement."""
-        self.found = Findings()
+        self.diagnostics = DiagnosticList()
         self.symbols, self.spelling, self.cell = symbols, spelling, cell
         self.source, self.strict = source, strict
         self.writing = Writing(program, symbols)
@@ -234,7 +234,7 @@ class FlowState:
         """Point at a statement that no path leads to."""
         if self.ended is None:
             return
-        self.say(
+        self.report(
             "L305",
             "this statement is never reached",
             span,
@@ -267,7 +267,7 @@ class FlowState:
         if self.cell is None or arm in self.cell.arms or not self.settle(arm):
             return
         known = ", ".join(sorted(self.cell.arms)) or "none"
-        self.say("E302", f"the cell has no arm {arm}", span, "no such arm", notes=(f"arms of the cell: {known}",))
+        self.report("E302", f"the cell has no arm {arm}", span, "no such arm", notes=(f"arms of the cell: {known}",))
 
     def lose_arms(self, *, grasps: bool) -> None:
         """Take note that an arm was used, nobody knows which, perhaps to grasp something."""
@@ -350,7 +350,7 @@ class FlowState:
         self._settled.add(key)
         return news
 
-    def say(
+    def report(
         self,
         code: str,
         message: str,
@@ -367,7 +367,7 @@ class FlowState:
             return
         self._said.add((code, span))
         calls = tuple(Label(call.span, f"{call.text} is called here") for call in self.calls[: -_MAX_CALLS - 1 : -1])
-        self.found.say(
+        self.diagnostics.report(
             code, message, span, label, severity=severity, secondary=(*secondary, *calls), notes=notes, helps=helps
         )
 

@@ -65,7 +65,7 @@ def _lines(source: Source, std: Standard, width: int) -> list[str]:
     text, _ = without_numbers(source)
     scanned = scan(source, text, std)
     program, slips = parse(source, scanned.tokens, std)
-    wrong = in_order(diagnostic for diagnostic in (*scanned.found, *slips) if diagnostic.is_error)
+    wrong = in_order(diagnostic for diagnostic in (*scanned.diagnostics, *slips) if diagnostic.is_error)
     if wrong:
         raise UnformattableError(source, wrong[0])
     pieces = pieces_of(text, scanned, program)

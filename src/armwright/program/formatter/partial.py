@@ -47,7 +47,7 @@ def _around(source: Source, std: Standard, width: int) -> str | None:
         return None
     scanned = scan(source, text, std)
     program, slips = parse(source, scanned.tokens, std)
-    wrong = [diagnostic.span for diagnostic in (*scanned.found, *slips) if diagnostic.is_error]
+    wrong = [diagnostic.span for diagnostic in (*scanned.diagnostics, *slips) if diagnostic.is_error]
     begin = next((token for token in scanned.tokens if token.key == "BEGIN" and _is_main(token.start, program)), None)
     end = next((token for token in reversed(scanned.tokens) if token.key == "END"), None)
     if begin is None or end is None or not program.statements or end.start < program.statements[-1].span.end:

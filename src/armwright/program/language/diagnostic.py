@@ -79,7 +79,7 @@ class Diagnostic:
         return self.code.startswith("E1")
 
 
-class Findings(list[Diagnostic]):
+class DiagnosticList(list[Diagnostic]):
     """What one pass over a program has found so far: of each code so many at most, the last saying that more follow."""
 
     def __init__(self) -> None:
@@ -110,7 +110,7 @@ class Findings(list[Diagnostic]):
         self.extend(several)
         return self
 
-    def say(
+    def report(
         self,
         code: str,
         message: str,

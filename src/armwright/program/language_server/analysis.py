@@ -140,7 +140,7 @@ def before(text: str, offset: int, std: Standard) -> Before | None:
     behind = scanned.tokens[len(front) :]
     if behind[0].kind is TokenKind.STRING and behind[0].start < offset:
         return None
-    opened = any(diagnostic.code == "E102" and diagnostic.span.end <= offset for diagnostic in scanned.found)
+    opened = any(diagnostic.code == "E102" and diagnostic.span.end <= offset for diagnostic in scanned.diagnostics)
     return None if opened else Before(tokens=front, word=word, behind=behind)
 
 

@@ -121,7 +121,7 @@ _OPERANDS: Mapping[str, _Operand] = {
     "a condition": attrs.evolve(_NUMBER, words=("NOT",)),
     **dict.fromkeys(("a number", "a number of seconds", "a width"), _NUMBER),
     **dict.fromkeys(("an index", "the name of a SCALAR"), _Operand(kinds=_SCALAR)),
-    **dict.fromkeys(("a place", "the name of a FRAME or an arm"), _POSE),
+    **dict.fromkeys(("a pose", "the name of a FRAME or an arm"), _POSE),
     "a TRANS": _TRANS,
     "the name of a FRAME": _Operand(kinds=_FRAME),
     "the name of an EVENT": _EVENT,

@@ -36,7 +36,7 @@ class Entry:
         statements: what is to be done, in order; a value that is to be shown is a PRINT.
         shown: where the statements start that only show a value.
         spelling: how it first writes each of its names, by key.
-        found: what is wrong with its syntax.
+        diagnostics: what is wrong with its syntax.
         complete: whether it can be taken as it is; otherwise it goes on in the next line.
     """
 
@@ -44,7 +44,7 @@ class Entry:
     statements: tuple[tree.Statement, ...]
     shown: frozenset[int]
     spelling: Mapping[str, str]
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
     complete: bool
 
 
@@ -72,7 +72,7 @@ def read(
         text, odd = without_numbers(Source(source.name, text))
         diagnostics += [moved(diagnostic, start) for diagnostic in odd]
     scanned = scan(source, " " * start + text, std)
-    diagnostics += scanned.found
+    diagnostics += scanned.diagnostics
     tokens = _without_frame(scanned.tokens[:-1])
     reader = _Reader(source, std, names, procedures)
     for is_header, part in _parts(tokens, VOCABULARIES[std]):
@@ -80,13 +80,13 @@ def read(
             reader.headers_of(part)
         else:
             reader.statements_of(part)
-    diagnostics += map(_advised, reader.found)
+    diagnostics += map(_advised, reader.diagnostics)
     return Entry(
         headers=tuple(reader.headers),
         statements=tuple(reader.statements),
         shown=frozenset(reader.shown),
         spelling={token.key: token.text for token in reversed(tokens) if token.kind is TokenKind.NAME},
-        found=tuple(diagnostics),
+        diagnostics=tuple(diagnostics),
         complete=_is_complete(scanned.tokens[:-1], diagnostics),
     )
 
@@ -225,7 +225,7 @@ class _Reader:
         self.headers: list[tree.Header] = []
         self.statements: list[tree.Statement] = []
         self.shown: list[int] = []
-        self.found: list[Diagnostic] = []
+        self.diagnostics: list[Diagnostic] = []
 
     def headers_of(self, part: Sequence[Token]) -> None:
         """Read declarations, units, an import or a procedure; the last ``;`` and the word VAR may be left out."""
@@ -263,7 +263,7 @@ class _Reader:
         """Parse what has a program around it already, up to the end of the text."""
         tokens.append(Token(TokenKind.END, "", "", end, end))
         program, diagnostics = parse(self._source, tokens, std, declared=self._names, procedures=self._procedures)
-        self.found += diagnostics
+        self.diagnostics += diagnostics
         return program
 
     def _is_expression(self, piece: Sequence[Token], *, alone: bool) -> bool:

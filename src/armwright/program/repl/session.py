@@ -289,7 +289,7 @@ class Session:
         end = _end(source)
         program = tree.Program(Span(0, end.end), heading.headers, (*heading.statements, *entry.statements), end)
         cell, symbols, wrong = self._check_names(program)
-        diagnostics = [*entry.found, *wrong]
+        diagnostics = [*entry.diagnostics, *wrong]
         flow = None
         if not any(diagnostic.is_syntax for diagnostic in diagnostics):
             flow, warnings = analysis.check(program, symbols, spelling, known_cell(cell), source=source)

@@ -15,7 +15,7 @@ def single(names: Names, name: tree.Name, kind: VariableType) -> ExpressionType 
         return OF_KIND[kind.kind]
     if names.first("E222", name.key):
         first = ",".join("1" * len(kind.sizes))
-        names.found.say(
+        names.report(
             "E222",
             f"`{name.text}` is an {kind} and needs an index",
             name.span,
@@ -41,7 +41,7 @@ def element(names: Names, node: tree.Index, sorts: Sequence[ExpressionType | Non
     if not kind.sizes:
         what = OF_KIND[kind.kind].value
         if names.first("E222", name.key):
-            names.found.say(
+            names.report(
                 "E222",
                 f"`{name.text}` is {what} and has no index",
                 node.span,
@@ -51,7 +51,7 @@ def element(names: Names, node: tree.Index, sorts: Sequence[ExpressionType | Non
             )
         return None
     if len(node.indices) != len(kind.sizes):
-        names.found.say(
+        names.report(
             "E222",
             f"`{name.text}` has {_indices(len(kind.sizes))}, not {len(node.indices)}",
             node.span,
@@ -73,11 +73,11 @@ def _index(names: Names, name: tree.Name, index: tree.Expression, sort: Expressi
     if sort not in (None, ExpressionType.SCALAR):
         what = is_what(index, sort)
         text = f"an index must be a number, but {called(index)} is {what}"
-        names.found.say("E222", text, index.span, bare(what))
+        names.report("E222", text, index.span, bare(what))
     elif isinstance(index, tree.Number) and measure(names, index, None, "an index has no unit"):
         value = index.value
         if value < 1 or value > size:
             text = f"index {index.text} is outside 1..{size}"
-            names.found.say("E222", text, index.span, "no such element", secondary=names.where_declared(name.key))
+            names.report("E222", text, index.span, "no such element", secondary=names.where_declared(name.key))
         elif value % 1 > 0:
-            names.found.say("E222", f"an index must be a whole number, not {index.text}", index.span, "not whole")
+            names.report("E222", f"an index must be a whole number, not {index.text}", index.span, "not whole")

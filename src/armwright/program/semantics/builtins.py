@@ -63,7 +63,7 @@ def result(names: Names, node: tree.Function, sorts: Sequence[ExpressionType | N
     signature = FUNCTIONS[node.name.key]
     if len(node.arguments) != signature.count:
         plural = "s" * (len(node.arguments) != 1)
-        names.found.say(
+        names.report(
             "E220",
             f"{node.name.key} takes {signature.takes}, not {len(node.arguments)} argument{plural}",
             node.span,
@@ -89,7 +89,7 @@ def _axis(names: Names, node: tree.Expression) -> None:
     if isinstance(node, tree.Poison) or (isinstance(node, tree.Name) and node.key in AXES):
         return
     names.use(plain_keys(node))
-    names.found.say(
+    names.report(
         "E220",
         f"FORCE takes one axis, X, Y or Z, not {called(node)}",
         node.span,
@@ -104,7 +104,7 @@ def _misfit(names: Names, node: tree.Function, argument: tree.Expression, sort: 
     if sort is ExpressionType.EVENT:
         events.refuse(names, argument)
         return
-    names.found.say(
+    names.report(
         "E220",
         f"{node.name.key} takes {takes}, but {called(argument)} is {what}",
         argument.span,

@@ -76,7 +76,7 @@ class Calls:
             if changed is None or not fixed:
                 continue
             called_so, parameter = passed_.procedure.node.name.text, _text(passed_.procedure, passed_.parameter)
-            self._names.found.say(
+            self._names.report(
                 "E220",
                 f"`{called_so}` changes its parameter `{parameter}`, and `{argument.text}` cannot be changed",
                 argument.span,
@@ -119,12 +119,12 @@ def _fits(names: Names, argument: tree.Expression, procedure: Procedure, paramet
         is_one = type_check.sort(names, argument)
         if is_one is not None:
             text = f"{what}an {kind}, but {called(argument)} is {is_one.value}"
-            names.found.say("E220", text, argument.span, "no array")
+            names.report("E220", text, argument.span, "no array")
         return
     argument_type = names.type(argument)
     if argument_type is None or argument_type == kind:
         return
-    names.found.say(
+    names.report(
         "E220",
         f"{what}an {kind}, but `{argument.text}` is {a_type(argument_type)}",
         argument.span,
@@ -143,7 +143,7 @@ def _wrong_count(names: Names, node: tree.Call, procedure: Procedure) -> None:
         f"{', '.join(name.text for name in declaration.names)} : {declaration.type.text}"
         for declaration in procedure.node.parameters
     )
-    names.found.say(
+    names.report(
         "E220",
         f"`{name.text}` takes {takes} argument{'s' * (takes != 1)}, not {argument_type}",
         node.span,
@@ -178,9 +178,7 @@ def _unknown(names: Names, node: tree.Call) -> None:
         message, label = f"unknown procedure `{name.text}`", "unknown procedure"
         otherwise = ABSENT.get(name.key, "declare it with PROCEDURE before BEGIN")
         help_ = f"did you mean `{near}`?" if near else otherwise
-    names.found.say(
-        "E227", message, name.span, label, secondary=secondary, helps=(help_,) if help_ else (), fixes=fixes
-    )
+    names.report("E227", message, name.span, label, secondary=secondary, helps=(help_,) if help_ else (), fixes=fixes)
 
 
 def _spelled(names: Names) -> list[str]:

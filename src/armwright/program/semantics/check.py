@@ -49,4 +49,4 @@ def check(
     Context(CHECKS, names, calls).check(*program.statements)
     calls.finish()
     names.unused()
-    return names.symbols, names.found, tuple(names.imports)
+    return names.symbols, names.diagnostics, tuple(names.imports)

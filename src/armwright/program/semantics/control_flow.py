@@ -47,7 +47,7 @@ def for_(context: Context, node: tree.For) -> None:
         kind = names.type(variable)
         if kind is not None and kind != VariableType(VariableKind.SCALAR):
             names.poison(variable.key)
-            names.found.say(
+            names.report(
                 "E229",
                 f"FOR counts with a SCALAR, but `{variable.text}` is {a_type(kind)}",
                 variable.span,
@@ -59,7 +59,7 @@ def for_(context: Context, node: tree.For) -> None:
             need(names, bound, ExpressionType.SCALAR, "E229", "FOR counts in numbers")
     if isinstance(node.step, tree.Number) and node.step.value == 0:
         text = "a FOR with STEP 0 would never end"
-        names.found.say("E229", text, node.step.span, "goes nowhere", helps=("leave STEP out to count by 1",))
+        names.report("E229", text, node.step.span, "goes nowhere", helps=("leave STEP out to count by 1",))
     context.check(node.body)
 
 
@@ -118,7 +118,7 @@ def try_(context: Context, node: tree.Try) -> None:
 def retry(context: Context, node: tree.Retry) -> None:
     """Check that a RETRY stands in a RECOVER part."""
     if not context.recovering:
-        context.names.found.say(
+        context.names.report(
             "E225",
             "RETRY stands outside of RECOVER",
             node.span,

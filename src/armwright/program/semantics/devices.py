@@ -28,10 +28,10 @@ def operate(context: Context, node: tree.Operate) -> None:
     """Check that OPERATE names a device; devices are not declared."""
     names, device = context.names, node.device
     if isinstance(device, tree.ArmName):
-        names.found.say("E201", f"OPERATE starts a device, but `{device.text}` is an arm", device.span, "an arm")
+        names.report("E201", f"OPERATE starts a device, but `{device.text}` is an arm", device.span, "an arm")
     elif isinstance(device, tree.Index):
         text = f"OPERATE starts a device, but {called(device)} is an element of an array"
-        names.found.say("E201", text, device.span, "no device")
+        names.report("E201", text, device.span, "no device")
 
 
 def read_visions(context: Context, node: tree.ReadVisions) -> None:
@@ -46,7 +46,7 @@ def _vision_target(names: Names, target: tree.Mobile) -> None:
     if isinstance(target, tree.ArmName):
         help_ = f"write `READ SYSTEM ({target.key})` to read the arm"
         text = f"READ VISIONS finds a FRAME, but `{target.text}` is an arm"
-        names.found.say("E215", text, target.span, "an arm", helps=(help_,))
+        names.report("E215", text, target.span, "an arm", helps=(help_,))
     elif is_world(target):
         refuse_world(names, target)
     else:
@@ -77,7 +77,7 @@ def _arm(names: Names, node: tree.Mobile | None, who: str) -> None:
             return
         kind = VariableType(VariableKind[sort_.name])
     is_one = "is no arm" if kind is None else f"is {a_type(kind)}"
-    names.found.say(
+    names.report(
         "E201",
         f"{who} needs an arm, but {called(node)} {is_one}",
         node.span,

@@ -11,7 +11,7 @@ def refuse(names: Names, node: tree.Expression, what: str = "computed with") -> 
     """Say once that an EVENT is no value."""
     keys = plain_keys(node)
     if names.first("E223", *keys):
-        names.found.say(
+        names.report(
             "E223",
             f"{called(node)} is an EVENT and cannot be {what}",
             node.span,

@@ -18,7 +18,7 @@ from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.type_check import declared, is_world, need, refuse_world, sort
 from armwright.program.syntax import tree
 
-_TAKES = {ExpressionType.SCALAR: "a number", ExpressionType.FRAME: "a place", ExpressionType.TRANS: "a step"}
+_TAKES = {ExpressionType.SCALAR: "a number", ExpressionType.FRAME: "a pose", ExpressionType.TRANS: "a transformation"}
 
 
 def assign(context: Context, node: tree.Assign) -> None:
@@ -28,7 +28,7 @@ def assign(context: Context, node: tree.Assign) -> None:
     actual = sort(names, node.value)
     if isinstance(target, tree.ArmName):
         help_ = f"move it, or write `READ SYSTEM ({target.key})`"
-        names.found.say(
+        names.report(
             "E218", f"`{target.text}` is an arm and cannot be given a value", target.span, "an arm", helps=(help_,)
         )
     elif is_world(target):
@@ -55,7 +55,7 @@ def _misfit(names: Names, node: tree.Assign, takes: ExpressionType, actual: Expr
         what, is_one = _TAKES[takes], is_what(value, actual)
         message, label = f", but {called(value)} is {is_one}", bare(is_one)
     help_ = _advice(target, value, takes, actual) if message else ""
-    names.found.say(
+    names.report(
         "E217",
         f"{called(target)} is {takes.value} and takes {what}{message}",
         value.span,
@@ -72,11 +72,11 @@ def _advice(target: tree.Expression, value: tree.Expression, takes: ExpressionTy
         case ExpressionType.SCALAR, ExpressionType.CONDITION:
             return f"write `IF {written(value)} THEN {written(target)} = 1 ELSE {written(target)} = 0`"
         case ExpressionType.FRAME, ExpressionType.TRANS:
-            return f"for the place at this step from WORLD write `WORLD * {written(value)}`"
+            return f"for the pose that this transformation gives from WORLD write `WORLD * {written(value)}`"
         case ExpressionType.TRANS, ExpressionType.FRAME:
-            return f"for the step from WORLD to this place write `INV(WORLD) * {written(value)}`"
+            return f"for the transformation from WORLD to this pose write `INV(WORLD) * {written(value)}`"
         case ((ExpressionType.FRAME | ExpressionType.TRANS), ExpressionType.SCALAR):
-            return "write twelve numbers in `( )`, or make a step from numbers by XYZ, ROTX, ROTY and ROTZ"
+            return "write twelve numbers in `( )`, or make a transformation from numbers by XYZ, ROTX, ROTY and ROTZ"
         case _:
             return ""
 
@@ -98,7 +98,7 @@ def affix(context: Context, node: tree.Affix) -> None:
 
     def advice(actual: ExpressionType) -> str:
         is_place = actual is ExpressionType.FRAME and not (is_arm and names.std is Standard.RLO_83)
-        return f"for the step from {whence} to {where} write `AT INV({whence}) * {where}`" if is_place else ""
+        return f"for the transformation from {whence} to {where} write `AT INV({whence}) * {where}`" if is_place else ""
 
     need(
         names,
@@ -106,7 +106,7 @@ def affix(context: Context, node: tree.Affix) -> None:
         ExpressionType.TRANS,
         "E210",
         "AT needs a TRANS",
-        notes=("a FRAME is a place in the cell; a TRANS is the step from one frame to another",),
+        notes=("a FRAME is a pose in the cell; a TRANS is the transformation from one frame to another",),
         helps=advice,
     )
 
@@ -123,10 +123,10 @@ def _child(names: Names, node: tree.Mobile, verb: str, done: str, helps: tuple[s
     """Check the frame that AFFIX hangs or UNFIX cuts."""
     if isinstance(node, tree.ArmName):
         text = f"an arm cannot be {done}"
-        names.found.say("E308", text, node.span, "an arm hangs on its own base", helps=helps)
+        names.report("E308", text, node.span, "an arm hangs on its own base", helps=helps)
     elif is_world(node):
         text = f"{called(node)} cannot be {done.partition(' ')[0]}"
-        names.found.say("E309", text, node.span, "the root of all frames")
+        names.report("E309", text, node.span, "the root of all frames")
     else:
         need(names, node, ExpressionType.FRAME, "E215", f"{verb} a FRAME")
 

@@ -53,10 +53,10 @@ def _variables(names: Names, table: Table, declaration: tree.Declaration) -> Non
         elif name.key == WORLD or (name.key in PREDECLARED and not _is_frame(declaration.type)):
             note = "the station may be declared again as a FRAME" if name.key == STATION else ""
             text = f"`{name.text}` is predeclared as a FRAME"
-            names.found.say("E203", text, name.span, "declared again here", notes=(note,) if note else ())
+            names.report("E203", text, name.span, "declared again here", notes=(note,) if note else ())
         elif table is names.main and name.key in names.imported and not _is_frame(declaration.type):
             text = f"`{name.text}` is a FRAME that an IMPORT brings"
-            names.found.say("E203", text, name.span, "declared as something else here")
+            names.report("E203", text, name.span, "declared as something else here")
         else:
             table.declared[name.key] = name
             table.types[name.key] = kind
@@ -68,7 +68,7 @@ def _is_frame(written: tree.TypeName) -> bool:
 
 
 def _twice(names: Names, name: tree.Name, first: tree.Name) -> None:
-    names.found.say(
+    names.report(
         "E203",
         f"`{name.text}` is declared twice",
         name.span,
@@ -88,7 +88,7 @@ def _type(names: Names, written: tree.TypeName) -> VariableType | None:
         count *= size
     if count > MAX_ELEMENTS:
         span = written.sizes[0].span.to(written.sizes[-1].span)
-        names.found.say("E222", f"an array of {count} elements is too large", span, f"more than {MAX_ELEMENTS}")
+        names.report("E222", f"an array of {count} elements is too large", span, f"more than {MAX_ELEMENTS}")
         return None
     return VariableType(VariableKind(written.key), known)
 
@@ -96,14 +96,14 @@ def _type(names: Names, written: tree.TypeName) -> VariableType | None:
 def _size(names: Names, number: tree.Number) -> int | None:
     if number.unit is not None:
         text = f"the size of an array has no unit, but `{number.text}` has"
-        names.found.say("E224", text, number.span, "leave the unit out")
+        names.report("E224", text, number.span, "leave the unit out")
         return None
     if number.value >= 1 and number.value.is_integer():
         return int(number.value)
     # A number that was reported before is NaN.
     if not math.isnan(number.value):
         text = f"the size of an array must be a whole number from 1, not {number.text}"
-        names.found.say("E222", text, number.span, "no size")
+        names.report("E222", text, number.span, "no size")
     return None
 
 
@@ -121,7 +121,7 @@ def _units(names: Names, program: tree.Program) -> None:
             earlier = first.setdefault(dimension(unit.key), unit)
             if earlier is not unit:
                 what = f"{dimension(unit.key)}s"
-                names.found.say(
+                names.report(
                     "E224",
                     f"a program has one unit of {dimension(unit.key)}, but UNITS names two",
                     unit.span,
@@ -139,10 +139,10 @@ def _no_unit(names: Names, unit: tree.Name) -> None:
     if unit.key in UNITS:
         what = {"time": "times are always in seconds", "force": "forces are always in newtons"}[dimension(unit.key)]
         text = f"UNITS settles lengths and angles, but `{unit.text}` is a unit of {dimension(unit.key)}"
-        names.found.say("E224", text, unit.span, "leave this out", notes=(what,))
+        names.report("E224", text, unit.span, "leave this out", notes=(what,))
         return
     near = _LONG_UNITS.get(unit.key) or names.near(unit.text, lambda: DECLARABLE)
-    names.found.say(
+    names.report(
         "E224",
         f"unknown unit `{unit.text}`",
         unit.span,
@@ -159,7 +159,7 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
     path = header.path
     if read_import is None:
         names.open_import = True
-        names.found.say(
+        names.report(
             "W205",
             f"the frames of `{path.value}` are not looked up",
             header.span,
@@ -173,7 +173,7 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
     except ArmwrightError as error:
         # What the file would have brought is unknown, so nothing is asked of unknown names.
         names.open_import = True
-        names.found.say("E228", f"`{path.value}` cannot be imported", path.span, "not read", notes=(str(error),))
+        names.report("E228", f"`{path.value}` cannot be imported", path.span, "not read", notes=(str(error),))
         return
     names.imports.append(brought)
     for frame in brought.frames:
@@ -181,7 +181,7 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
             continue
         if frame in names.imported:
             text = f"frame `{frame}` comes from two imports"
-            names.found.say("E228", text, path.span, "it comes from here too")
+            names.report("E228", text, path.span, "it comes from here too")
         names.imported.add(frame)
         names.main.types[frame] = VariableType(VariableKind.FRAME)
 
@@ -200,10 +200,10 @@ def _procedure(names: Names, node: tree.Procedure) -> Procedure:
         _twice(names, name, variable or first.node.name)  # type: ignore[union-attr]
     elif name.key in names.main.types:
         where = "an IMPORT brings" if name.key in names.imported else "is predeclared"
-        names.found.say("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a procedure of the same name")
+        names.report("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a procedure of the same name")
     elif name.key in FUNCTIONS:
         text = f"`{name.text}` is a function of the language"
-        names.found.say("E203", text, name.span, "a procedure of the same name")
+        names.report("E203", text, name.span, "a procedure of the same name")
     else:
         names.procedures[name.key] = procedure
     return procedure

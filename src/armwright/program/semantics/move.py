@@ -84,7 +84,7 @@ def _speed(names: Names, node: tree.Expression) -> None:
         return
     # A number that was reported before is NaN and in no range, nor out of it.
     if node.value < LOWEST_SPEED or node.value > HIGHEST_SPEED:
-        names.found.say(
+        names.report(
             "E207",
             f"speed {node.text} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
             node.span,
@@ -108,7 +108,7 @@ def _combination(names: Names, clauses: tuple[tree.Clause, ...]) -> None:
         if isinstance(clause, tree.On):
             continue
         if (earlier := first.setdefault(type(clause), clause)) is not clause:
-            names.found.say(
+            names.report(
                 "E213",
                 f"{_WORDS[type(clause)]} is given twice in one MOVE",
                 clause.span,
@@ -124,7 +124,7 @@ def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
     direct, straight, blend = first.get(tree.Directly), first.get(tree.Straightly), first.get(tree.Blend)
     for kind, clause in first.items():
         if direct and kind in _NOT_ASKED:
-            names.found.say(
+            names.report(
                 "E208",
                 f"DIRECTLY cannot be combined with {_WORDS[kind]}",
                 clause.span,
@@ -133,7 +133,7 @@ def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
                 helps=("remove one of the two",),
             )
         elif straight and kind in (tree.Via, tree.Approach, tree.Departure):
-            names.found.say(
+            names.report(
                 "E209",
                 f"STRAIGHTLY cannot be combined with {_WORDS[kind]}",
                 clause.span,
@@ -142,7 +142,7 @@ def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
                 helps=("write one `MOVE ... STRAIGHTLY` for each leg",),
             )
     if blend and not direct and tree.Via not in first:
-        names.found.say(
+        names.report(
             "E226",
             "BLEND rounds the corners at via points, but there is no VIA",
             blend.span,
@@ -156,7 +156,7 @@ def _times(names: Names, first: dict[type, tree.Clause]) -> None:
     if speed and duration:
         earlier, later = sorted((speed, duration), key=lambda clause: clause.span.start)
         words = _WORDS[type(later)], _WORDS[type(earlier)]
-        names.found.say(
+        names.report(
             "E230",
             "SPEED cannot be combined with DURATION",
             later.span,

@@ -73,7 +73,7 @@ def _say(names: Names, node: tree.Unary | tree.Binary, message: str, label: str,
     if not names.first("E221", *variables):
         return
     secondary = tuple(label for key in dict.fromkeys(variables) for label in names.where_declared(key))
-    names.found.say("E221", message, node.span, label, secondary=secondary, helps=(help_,) if help_ else ())
+    names.report("E221", message, node.span, label, secondary=secondary, helps=(help_,) if help_ else ())
 
 
 def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
@@ -89,7 +89,7 @@ def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> s
         back = other if node.operation == "+" else f"INV({other})"
         return f"steps follow one another by `*`: write `{left_text} * {back}`"
     if {left, right} <= _POSES and node.operation == "-":
-        return f"for the step from {other} to {left_text} write `INV({other}) * {left_text}`"
+        return f"for the transformation from {other} to {left_text} write `INV({other}) * {left_text}`"
     return ""
 
 
@@ -103,12 +103,12 @@ def _advice_on_product(node: tree.Binary, left: ExpressionType, right: Expressio
         )
     match left, right:
         case ExpressionType.FRAME, ExpressionType.FRAME:
-            return f"for the step from {left_text} to {other} write `INV({left_text}) * {other}`"
+            return f"for the transformation from {left_text} to {other} write `INV({left_text}) * {other}`"
         case ((ExpressionType.TRANS | ExpressionType.MATRIX), ExpressionType.FRAME):
-            return f"a step comes behind the place it starts from: write `{other} * {left_text}`"
+            return f"a transformation stands behind the pose it starts from: write `{other} * {left_text}`"
         case (ExpressionType.INVERSE, _) | (_, ExpressionType.INVERSE):
             return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
         case (ExpressionType.SCALAR, _) | (_, ExpressionType.SCALAR):
-            return "a step is made from numbers by XYZ, ROTX, ROTY and ROTZ"
+            return "a transformation is made from numbers by XYZ, ROTX, ROTY and ROTZ"
         case _:
             return ""

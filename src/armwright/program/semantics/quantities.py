@@ -19,7 +19,7 @@ def measure(names: Names, node: tree.Expression, expected: Dimension | None, wha
     if not isinstance(node, tree.Number) or node.unit is None or dimension(node.unit) == expected:
         return True
     is_what = _WHAT[dimension(node.unit)]
-    names.found.say("E224", f"{what}, but `{node.text}` is {is_what}", node.span, is_what)
+    names.report("E224", f"{what}, but `{node.text}` is {is_what}", node.span, is_what)
     return False
 
 
@@ -35,4 +35,4 @@ def in_range(names: Names, node: tree.Expression, what: str, *, zero: bool) -> N
     # A number that was reported before is NaN, and neither positive nor negative.
     if isinstance(node, tree.Number) and (node.value < 0 or (node.value == 0 and not zero)):
         above = "may not be negative" if zero else "must be greater than zero"
-        names.found.say("E231", f"{what} {above}, but this is {node.text}", node.span, "out of range")
+        names.report("E231", f"{what} {above}, but this is {node.text}", node.span, "out of range")

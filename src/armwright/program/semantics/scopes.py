@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Findings, Label, Severity
+from armwright.program.language.diagnostic import DiagnosticList, Label, Severity
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.units import UnitSystem
 from armwright.program.language.words import Standard
@@ -54,7 +54,8 @@ class Names:
 
     def __init__(self, cell: KnownCell | None, std: Standard = Standard.RLO_2) -> None:
         """Start with the predeclared names."""
-        self.found = Findings()
+        self.diagnostics = DiagnosticList()
+        self.report = self.diagnostics.report
         self.main = Table(dict(PREDECLARED))
         self.procedures: dict[str, Procedure] = {}
         self.units = UnitSystem()
@@ -200,7 +201,7 @@ class Names:
                 self._lint(f"`{name.text}` is never used", name)
 
     def _lint(self, message: str, name: tree.Name) -> None:
-        self.found.say("L304", message, name.span, "declared here", severity=Severity.WARNING)
+        self.report("L304", message, name.span, "declared here", severity=Severity.WARNING)
 
     def _table(self, key: str) -> Table:
         inside = self._inside
@@ -219,7 +220,7 @@ class Names:
         if name.key in self.procedures:
             text = f"`{name.text}` is a procedure and no variable"
             help_ = f"a procedure is called by a statement of its own: `{name.text}(...)`"
-            self.found.say("E227", text, name.span, "a procedure", helps=(help_,))
+            self.report("E227", text, name.span, "a procedure", helps=(help_,))
             return
         if not name.text.isascii():
             # Told of as a name that cannot be one.
@@ -232,4 +233,4 @@ class Names:
             helps = (f"did you mean `{near}`, a frame of the cell? Declare it with `VAR {near} : FRAME ;`",)
         elif (owner := self._owner(name.key)) is not None:
             notes = (f"procedure `{owner.node.name.text}` has a name like this, which is known only there",)
-        self.found.say("E202", f"`{name.text}` is not declared", name.span, "unknown name", notes=notes, helps=helps)
+        self.report("E202", f"`{name.text}` is not declared", name.span, "unknown name", notes=notes, helps=helps)

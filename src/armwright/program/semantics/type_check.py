@@ -50,7 +50,7 @@ def is_world(node: tree.Expression) -> bool:
 
 def refuse_world(names: Names, node: tree.Expression) -> None:
     """Say that the root of all frames cannot be given a value."""
-    names.found.say("E218", f"{called(node)} cannot be given a value", node.span, "the root of all frames")
+    names.report("E218", f"{called(node)} cannot be given a value", node.span, "the root of all frames")
 
 
 def need(
@@ -99,7 +99,7 @@ def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
         names.poison(key)
     is_one = is_what(node, actual)
     help_ = helps(actual) if helps else ""
-    names.found.say(
+    names.report(
         code,
         f"{what}, but {called(node)} is {is_one}",
         node.span,
@@ -191,7 +191,7 @@ def _no_function(names: Names, node: tree.Function) -> None:
         near = names.near(name.text, lambda: list(FUNCTIONS))
         message, label = f"unknown function `{name.text}`", "unknown function"
         help_ = f"did you mean `{near}`?" if near else f"functions are {', '.join(FUNCTIONS)}"
-    names.found.say("E227", message, name.span, label, helps=(help_,) if help_ else ())
+    names.report("E227", message, name.span, label, helps=(help_,) if help_ else ())
 
 
 def _unary(names: Names, node: tree.Unary) -> ExpressionType | None:
@@ -218,8 +218,8 @@ def _matrix(names: Names, node: tree.Matrix) -> ExpressionType | None:
     fault = pose_literals.check(node, names.units)
     if fault is not None:
         if len(node.items) == 3 and names.std is Standard.RLO_2:
-            fault = attrs.evolve(fault, helps=(f"for a step without a turn write `XYZ{written(node)}`",))
-        names.found.append(fault)
+            fault = attrs.evolve(fault, helps=(f"for a translation write `XYZ{written(node)}`",))
+        names.diagnostics.append(fault)
     for position, item in enumerate(node.items):
         if not isinstance(item, tree.Number):
             need(names, item, ExpressionType.SCALAR, "E216", "a matrix is made of numbers")

@@ -151,7 +151,7 @@ def _else(tokens: Tokens) -> bool:
     if token.kind is not TokenKind.NAME or after.key in ("=", ":=", "(", "["):
         return False
     if token.key in _ELSE_IF:
-        tokens.found.say(
+        tokens.report(
             "E105",
             f"unknown statement `{token.text}`",
             token.span,
@@ -223,7 +223,7 @@ def _counter(tokens: Tokens) -> tree.Name | tree.Poison:
     if token.kind in (TokenKind.NAME, TokenKind.ARM):
         body = mobile(tokens, "a name", "after FOR")
         text = "FOR counts with a variable of its own" if token.kind is TokenKind.NAME else "FOR counts with a SCALAR"
-        tokens.found.say("E111", text, body.span, "expected the name of a SCALAR")
+        tokens.report("E111", text, body.span, "expected the name of a SCALAR")
         return tree.Poison(body.span, frozenset((token.key,)))
     if reserved_as_name(tokens):
         tokens.refuse_reserved()

@@ -28,10 +28,10 @@ def var_part(tokens: Tokens) -> list[tree.Declaration]:
     """Read VAR and what it declares."""
     word = tokens.take()
     if tokens.sees(","):
-        tokens.found.say("E111", "expected a name after VAR", tokens.now.span, "found `,`")
+        tokens.report("E111", "expected a name after VAR", tokens.now.span, "found `,`")
         tokens.take()
     if tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM) and not _reserved(tokens):
-        tokens.found.say("E111", "VAR declares nothing", word.span, "expected a name after VAR")
+        tokens.report("E111", "VAR declares nothing", word.span, "expected a name after VAR")
         return []
     return declarations(tokens)
 
@@ -94,18 +94,18 @@ def names_of(tokens: Tokens, names: list[tree.Name | None]) -> None:
     while True:
         if tokens.accept(","):
             if tokens.sees(":"):
-                tokens.found.say("E111", "expected a name after `,`", tokens.now.span, "found `:`")
+                tokens.report("E111", "expected a name after `,`", tokens.now.span, "found `:`")
                 break
             names.append(_declared(tokens))
         elif tokens.now.kind is TokenKind.NAME and tokens.ahead().key in (",", ":"):
             gap = tokens.gap()
-            tokens.found.say("E112", "missing `,` between two names", gap, "expected `,` here", fixes=(Fix(gap, ","),))
+            tokens.report("E112", "missing `,` between two names", gap, "expected `,` here", fixes=(Fix(gap, ","),))
             names.append(_declared(tokens))
         else:
             break
     if not tokens.accept(":"):
         gap = tokens.gap()
-        tokens.found.say("E112", "missing `:` before the type", gap, "expected `:` and a type here")
+        tokens.report("E112", "missing `:` before the type", gap, "expected `:` and a type here")
         if not tokens.sees(*tokens.words.types, "ARRAY"):
             raise LostError
 
@@ -121,7 +121,7 @@ def _declared(tokens: Tokens) -> tree.Name | None:
         return name
     if token.kind is TokenKind.ARM:
         if not token.damaged:
-            tokens.found.say("E107", f"`{token.text}` is an arm and needs no declaration", token.span, "leave it out")
+            tokens.report("E107", f"`{token.text}` is an arm and needs no declaration", token.span, "leave it out")
         tokens.take()
         return None
     if _reserved(tokens):
@@ -151,7 +151,7 @@ def type_name(tokens: Tokens) -> tree.TypeName:
     if token.kind is not TokenKind.NAME:
         tokens.lost("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
     near = closest(token.text, types)
-    tokens.found.say(
+    tokens.report(
         "E205",
         f"unknown type `{token.text}`",
         token.span,
@@ -194,7 +194,7 @@ def _close(tokens: Tokens) -> None:
     if tokens.accept(";"):
         return
     gap = tokens.gap()
-    tokens.found.say(
+    tokens.report(
         "E104",
         "missing `;` after the declaration",
         gap,

@@ -62,7 +62,7 @@ def read(tokens: Tokens) -> tree.ReadVisions | tree.ReadSystem:
     if sensor is None and word.kind is TokenKind.NAME:
         sensor = closest(word.text, SENSORS)
         if sensor:
-            tokens.found.say(
+            tokens.report(
                 "E105",
                 f"unknown statement `READ {word.text}`",
                 word.span,
@@ -77,5 +77,5 @@ def read(tokens: Tokens) -> tree.ReadVisions | tree.ReadSystem:
         return tree.ReadVisions(tokens.since(start), targets)
     arms = listed(tokens, mobile, _ARM, "after SYSTEM")
     if len(arms) > 1:
-        tokens.found.say("E117", "READ SYSTEM reads one arm", arms[1].span, "does not belong here")
+        tokens.report("E117", "READ SYSTEM reads one arm", arms[1].span, "does not belong here")
     return tree.ReadSystem(tokens.since(start), arms[0] if arms else tree.Poison(tokens.gap()))

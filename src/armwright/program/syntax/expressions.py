@@ -144,7 +144,7 @@ def number(tokens: Tokens) -> tree.Number:
         token = tokens.now
         if start.key == "+":
             fix = Fix(start.span, "")
-            tokens.found.say("E113", "a number has no `+` in front", start.span, "leave it out", fixes=(fix,))
+            tokens.report("E113", "a number has no `+` in front", start.span, "leave it out", fixes=(fix,))
     if token.kind is not _NUMBER:
         tokens.lost("expected a number", f"found {shown(token)}")
     tokens.take()
@@ -315,7 +315,7 @@ def _unparenthesised(
     fixes = [Fix(gap, f" {opening}")]
     if not tokens.accept(closing):
         fixes.append(Fix(tokens.gap(), closing))
-    tokens.found.say("E112", f"missing `{opening}` {where}", gap, f"expected `{opening}` here", fixes=tuple(fixes))
+    tokens.report("E112", f"missing `{opening}` {where}", gap, f"expected `{opening}` here", fixes=tuple(fixes))
     return tuple(items)
 
 

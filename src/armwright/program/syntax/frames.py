@@ -31,7 +31,7 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
         return
     token = tokens.now
     if tokens.accept(":=", "=="):
-        tokens.found.say(
+        tokens.report(
             "E109",
             f"{what} gets its value with `=`, not `{token.text}`",
             token.span,
@@ -41,7 +41,7 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
     elif tokens.done or tokens.sees(";", ",", ")", "END") or token.kind is TokenKind.KEYWORD:
         tokens.lost(f"{what} needs `=` and a value", "expected `=` and a value here", code="E109")
     elif not token.damaged:
-        tokens.found.say(
+        tokens.report(
             "E109",
             f"{what} needs `=` before its value",
             token.span,

@@ -29,7 +29,7 @@ def head(tokens: Tokens) -> list[tree.Header]:
             headers_ += header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
             gap = Span(token.start, token.start)
-            tokens.found.say(
+            tokens.report(
                 "E112", "missing `VAR` before the declarations", gap, "expected `VAR` here", fixes=(Fix(gap, "VAR "),)
             )
             headers_ += declarations(tokens)
@@ -64,7 +64,7 @@ def _semicolons(tokens: Tokens) -> None:
     """Pass over each ``;`` in front of BEGIN, where there is none to spare."""
     while token := tokens.accept(";"):
         fix = Fix(token.span, "")
-        tokens.found.say("E117", "`;` does not belong here", token.span, "leave it out", fixes=(fix,))
+        tokens.report("E117", "`;` does not belong here", token.span, "leave it out", fixes=(fix,))
         while tokens.accept(";"):
             pass
 
@@ -80,7 +80,7 @@ def _misspelt_header(tokens: Tokens) -> str | None:
 
 def _misspelt(tokens: Tokens, near: str) -> None:
     token = tokens.now
-    tokens.found.say(
+    tokens.report(
         "E105", f"unknown word `{token.text}`", token.span, "not a word of RLO", helps=(f"did you mean `{near}`?",)
     )
     tokens.replace(near)
@@ -90,7 +90,7 @@ def _nonsense(tokens: Tokens) -> tree.Declaration:
     """Pass over what is neither a declaration nor BEGIN; the names in it may have been meant to be declared."""
     start = tokens.take()
     if not start.damaged:
-        tokens.found.say("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
+        tokens.report("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
     names: list[tree.Name | None] = []
     if start.kind is TokenKind.NAME:
         names.append(tree.Name(start.span, start.text, start.key))
@@ -166,7 +166,7 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
     while tokens.sees("VAR"):
         again = tokens.now
         fix = Fix(again.span, "")
-        tokens.found.say("E118", "a procedure has one VAR part", again.span, "leave the word out", fixes=(fix,))
+        tokens.report("E118", "a procedure has one VAR part", again.span, "leave the word out", fixes=(fix,))
         own += var_part(tokens)
     tokens.offer("BEGIN", starts=True)
     body = _body(tokens, above, name)
@@ -285,7 +285,7 @@ def _without_main(tokens: Tokens, above: Span, body: tree.Block) -> tree.Block:
     if not open_ended or last is None or body.end.start != body.end.end or not tokens.sees("END"):
         return body
     tokens.back_to(last.span.start)
-    tokens.found[:] = [diagnostic for diagnostic in tokens.found if diagnostic.span.start < last.span.start]
+    tokens.diagnostics[:] = [diagnostic for diagnostic in tokens.diagnostics if diagnostic.span.start < last.span.start]
     gap = tokens.gap()
     label = Label(above, "this procedure")
     tokens.say_once("E115", "the procedure has no END", gap, "expected `END ;` here", secondary=(label,))
@@ -305,7 +305,7 @@ def late(tokens: Tokens) -> tree.Statement:
     """Read a part that belongs in front of BEGIN, and keep what it declares."""
     word: Token = tokens.now
     what = "declarations belong" if word.key == "VAR" else "it belongs"
-    tokens.found.say("E118", f"{word.text} stands behind BEGIN", word.span, f"{what} in front of BEGIN")
+    tokens.report("E118", f"{word.text} stands behind BEGIN", word.span, f"{what} in front of BEGIN")
     tokens.late += header(tokens)
     # It has its own ``;``.
     tokens.hush()

@@ -9,7 +9,7 @@ import attrs
 
 from armwright.cell.names import arm_name
 from armwright.files.limits import beyond, limit
-from armwright.program.language.diagnostic import Diagnostic, Findings, Fix
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import UNITS
 from armwright.program.language.words import VOCABULARIES, Standard
@@ -61,12 +61,12 @@ class Scanned:
     Attributes:
         tokens: in order, the last being the end of the text; whatever can be guessed is a token all the same.
         comments: where each stands, from its first mark to its last.
-        found: what is wrong.
+        diagnostics: what is wrong.
     """
 
     tokens: tuple[Token, ...]
     comments: tuple[Span, ...]
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
 
 _BLANKS = " \t\r\n\f\v"
@@ -156,7 +156,7 @@ class _Scanner:
         self._known: dict[str, tuple[TokenKind, str]] = {}
         self._tokens: list[Token] = []
         self._comments: list[Span] = []
-        self._found = Findings()
+        self._found = DiagnosticList()
         # Of each character that does not belong to the language where the first stands, of those with a cure all.
         self._strays: dict[str, list[Span]] = {}
         self._counts: Counter[str] = Counter()
@@ -174,7 +174,7 @@ class _Scanner:
         for character, spans in self._strays.items():
             self._found.append(_stray(character, spans, max(len(spans), self._counts[character])))
         self._hush()
-        return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), found=tuple(self._found))
+        return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), diagnostics=tuple(self._found))
 
     def _stretch(self, position: int, last: int) -> int:
         """Read tokens one behind the other; return where the text goes on behind one that needs a closer look."""

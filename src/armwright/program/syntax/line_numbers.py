@@ -2,7 +2,7 @@
 
 import re
 
-from armwright.program.language.diagnostic import Diagnostic, Findings, Severity
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Severity
 from armwright.program.language.source import Source, Span
 
 _NUMBER = re.compile(r"[ \t]*([0-9]+)(?=[ \t\r\n]|\Z)")
@@ -22,7 +22,7 @@ def without_numbers(source: Source) -> tuple[str, list[Diagnostic]]:
     if not first or not _NUMBER.match(text, first.start()):
         return text, []
     pieces: list[str] = []
-    odd = Findings()
+    odd = DiagnosticList()
     done, last, last_span, numbered = 0, -1, Span(0, 0), True
     for start in source.line_starts:
         match = _NUMBER.match(text, start)

@@ -32,7 +32,7 @@ def move(tokens: Tokens) -> tree.Move:
     start = tokens.take()
     moved = mobile(tokens, "the name of a FRAME or an arm", "after MOVE")
     tokens.expect("TO", "after what is moved")
-    goal = expression(tokens, "a place", "after TO")
+    goal = expression(tokens, "a pose", "after TO")
     clauses: list[tree.Clause] = []
     while tokens.now.key != ";":
         comma = tokens.accept(",")
@@ -93,7 +93,7 @@ def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
     if key in tokens.words.with_clauses:
         gap = Span(token.start, token.start)
         if not token.damaged:
-            tokens.found.say(
+            tokens.report(
                 "E116",
                 f"{key} needs WITH in front",
                 token.span,
@@ -108,7 +108,7 @@ def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
 def _meant(tokens: Tokens, token: Token) -> bool:
     """Put the clause word that a misspelt one was meant to be in its pose; whether there is one."""
     near = closest(token.text, tokens.words.clauses)
-    tokens.found.say(
+    tokens.report(
         "E108",
         f"unknown clause `{token.text}`",
         token.span,
@@ -130,7 +130,7 @@ def _plain(tokens: Tokens, start: Token, key: str) -> tree.Clause | None:
     if key == "STRAIGHTLY":
         return tree.Straightly(start.span)
     if key == "VIA":
-        points = listed(tokens, expression, "a place", "after VIA")
+        points = listed(tokens, expression, "a pose", "after VIA")
         return tree.Via(tokens.since(start), points)
     return None
 
@@ -142,7 +142,7 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
     offered = tokens.offered.with_clauses
     expected = f"expected {', '.join(offered[:-1])} or {offered[-1]}"
     if tokens.sees(*plain):
-        tokens.found.say(
+        tokens.report(
             "E116",
             f"{token.key} stands without WITH",
             start.span,
@@ -155,7 +155,7 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
     key: str | None = token.key if tokens.sees(*with_words) else None
     if key is None and token.kind is TokenKind.NAME:
         key = closest(token.text, with_words)
-        tokens.found.say(
+        tokens.report(
             "E108",
             f"unknown clause `WITH {token.text}`",
             token.span,
@@ -176,7 +176,7 @@ def _assigned(tokens: Tokens, start: Token, key: str) -> tree.Clause:
         tokens.take()
     else:
         equals(tokens, f"`WITH {key}`", f"WITH {key}")
-    value = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a place", f"after {key} =")
+    value = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a pose", f"after {key} =")
     return _VALUES[key](tokens.since(start), value)
 
 
@@ -193,7 +193,7 @@ def _guard(tokens: Tokens) -> tree.On:
     if not isinstance(action, _ACTIONS):
         opening, closing = Span(word.start, word.start), tokens.gap()
         certain = not isinstance(action, tree.Move) or not action.clauses
-        tokens.found.say(
+        tokens.report(
             "E121",
             f"{word.text} cannot be the action of ON",
             word.span,

@@ -72,7 +72,7 @@ def parse(
     cursor = Tokens(source, tokens, _RULES, standard)
     cursor.declared.update(declared)
     cursor.procedures.update(procedures)
-    statements_, slips = program(cursor), cursor.found
+    statements_, slips = program(cursor), cursor.diagnostics
     if standard is Standard.RLO_83:
         statements_, slips = rlo83.conform(statements_, slips, source, cursor.tokens)
     return statements_, [*torn, *slips]
@@ -110,7 +110,7 @@ def program(tokens: Tokens) -> tree.Program:
         span = tokens.gap() if headers or begun else Span(0, 0)
         text = "the program has no statements" if headers else "there is no program here"
         text, expected = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
-        tokens.found.say("E115", text, span, f"expected `{expected}`")
+        tokens.report("E115", text, span, f"expected `{expected}`")
     return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(statements_), tokens.before.span)
 
 
@@ -129,14 +129,14 @@ def _ends(tokens: Tokens) -> bool:
     if tokens.accept("."):
         if not tokens.done:
             last = tokens.now
-            tokens.found.say("E114", "text after the end of the program", last.span, "the program ended with `END.`")
+            tokens.report("E114", "text after the end of the program", last.span, "the program ended with `END.`")
             while not tokens.done:
                 tokens.take()
             return True
     elif tokens.done or (tokens.sees(";") and tokens.ahead().kind is TokenKind.END):
         if not tokens.now.damaged:
             semicolon = tokens.accept(";")
-            tokens.found.say(
+            tokens.report(
                 "E110",
                 "the program does not end with `.`",
                 gap,
@@ -146,7 +146,7 @@ def _ends(tokens: Tokens) -> bool:
             )
     else:
         text, helps = "END closes the program, but more follows", ("leave it out, or write BEGIN before what it ends",)
-        tokens.found.say("E114", text, end.span, "the program would end here", helps=helps)
+        tokens.report("E114", text, end.span, "the program would end here", helps=helps)
         tokens.spare += 1
         return False
     return True

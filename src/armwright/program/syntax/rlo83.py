@@ -11,7 +11,7 @@ from typing import Any
 
 import attrs
 
-from armwright.program.language.diagnostic import Diagnostic, Findings, Fix
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import LATER_HEADERS, LATER_STATEMENTS, LATER_TYPES, is_later
 from armwright.program.syntax import tree
@@ -49,7 +49,7 @@ def reserve(tokens: Sequence[Token], declared: Collection[str]) -> Sequence[Toke
 
 def conform(
     program: tree.Program, slips: Sequence[Diagnostic], source: Source, tokens: Sequence[Token]
-) -> tuple[tree.Program, Findings]:
+) -> tuple[tree.Program, DiagnosticList]:
     """Name what a program has that belongs to RLO-2.
 
     Args:
@@ -64,9 +64,9 @@ def conform(
     visitor = _Visitor(source, tokens, program)
     headers = tuple(node_ for header in program.headers if (node_ := visitor.header(header)) is not None)
     statements = tuple(visitor.statement(statement) for statement in program.statements)
-    tokens_ = Findings()
+    tokens_ = DiagnosticList()
     tokens_ += [slip for slip in slips if not visitor.is_inside(slip.span)]
-    tokens_ += visitor.found
+    tokens_ += visitor.diagnostics
     return attrs.evolve(program, headers=headers, statements=statements), tokens_
 
 
@@ -74,7 +74,8 @@ class _Visitor:
     """Goes through a program, and remembers which stretches of it are no RLO-83 at all."""
 
     def __init__(self, source: Source, tokens: Sequence[Token], program: tree.Program) -> None:
-        self.found = Findings()
+        self.diagnostics = DiagnosticList()
+        self.report = self.diagnostics.report
         self._source, self._tokens = source, tokens
         self._starts = [token.start for token in tokens]
         self._declared = {name.key for declaration in program.declarations for name in declaration.names}
@@ -99,7 +100,7 @@ class _Visitor:
         return index >= 0 and span.start <= self._passed_over[index].end
 
     def _report(self, what: str, span: Span, instead: str) -> None:
-        self.found.say("E214", f"{what} belongs to RLO-2", span, instead)
+        self.report("E214", f"{what} belongs to RLO-2", span, instead)
 
     # ---- tokens, where the tree forgets
 
@@ -172,7 +173,7 @@ class _Visitor:
         if name.key not in self._declared:
             return self._none(node, f"the call of `{name.text}`", name.span, "RLO-83 has no procedures")
         bracket = self._tokens[self._at(name.span) + 1]
-        self.found.say(
+        self.report(
             "E109",
             f"`{name.text}` needs `=` before its value",
             bracket.span,
@@ -289,7 +290,7 @@ class _Visitor:
     def _goal(self, node: tree.Expression) -> tree.Expression:
         """Return the name of a frame to come to."""
         if isinstance(node, tree.ArmName):
-            self._report(f"`{node.text}` as a place", node.span, f"RLO-83 takes {_FRAME} here")
+            self._report(f"`{node.text}` as a pose", node.span, f"RLO-83 takes {_FRAME} here")
             return self._silent(node.span)
         return self._operand(node, _FRAME)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Sequence
 
-from armwright.program.language.diagnostic import Diagnostic, Findings, Fix
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.syntax.lexer import Token, TokenKind
 
@@ -39,7 +39,7 @@ def joined(
     names |= set(declared)
     imports = any(token.key == "IMPORT" and token.kind is _KEYWORD for token in tokens)
     kept: list[Token] = []
-    findings = Findings()
+    findings = DiagnosticList()
     done = 0
     for pair in pairs:
         first, number = tokens[pair - 1], tokens[pair]

@@ -112,7 +112,7 @@ def misspelt(tokens: Tokens, near: str) -> None:
     """Say that a word is misspelt, and put the one that was meant in its pose."""
     token = tokens.now
     helps = (f"did you mean `{near}`?",)
-    tokens.found.say("E105", f"unknown statement `{token.text}`", token.span, "not a statement", helps=helps)
+    tokens.report("E105", f"unknown statement `{token.text}`", token.span, "not a statement", helps=helps)
     tokens.replace(near)
 
 
@@ -196,7 +196,7 @@ def _no_statement(tokens: Tokens) -> tree.Statement:
     else:
         helps = ("statements begin with a word such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`",)
     notes = ("line numbers count only in a text whose first line has one",) if token.kind is _NUMBER else ()
-    tokens.found.say("E105", text, token.span, label, helps=helps, notes=notes)
+    tokens.report("E105", text, token.span, label, helps=helps, notes=notes)
     raise LostError
 
 

@@ -5,7 +5,7 @@ from itertools import accumulate
 from typing import NoReturn, TypeAlias
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Findings, Fix, Label
+from armwright.program.language.diagnostic import DiagnosticList, Fix, Label
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard, is_later
 from armwright.program.syntax import tree
@@ -39,7 +39,7 @@ class Tokens:
         words: those of RLO-2.
         offered: those of its own language, for messages.
         rules: how to read each statement, by the word that starts it, or the sign behind the name that does.
-        found: what is wrong.
+        diagnostics: what is wrong.
         at: how many tokens have been read.
         now: the token to be read next.
         before: the token read last; the first one where none has been read.
@@ -72,7 +72,8 @@ class Tokens:
         self.standard = standard
         self.words, self.offered = VOCABULARIES[Standard.RLO_2], VOCABULARIES[standard]
         self.rules = rules
-        self.found = Findings()
+        self.diagnostics = DiagnosticList()
+        self.report = self.diagnostics.report
         self.at = 0
         self.tokens = list(tokens)
         self._last = len(tokens) - 1
@@ -116,7 +117,7 @@ class Tokens:
             self.before = token
             self.now = self.tokens[self.at]
             if self.at == self._last - 1:
-                self._wrong_before = len(self.found)
+                self._wrong_before = len(self.diagnostics)
         return token
 
     def back(self, index: int) -> None:
@@ -172,7 +173,7 @@ class Tokens:
             self._wrong_before = -1
 
     def _at_cursor(self) -> bool:
-        if self.now.kind is not _END or len(self.found) != self._wrong_before or self.expected is None:
+        if self.now.kind is not _END or len(self.diagnostics) != self._wrong_before or self.expected is None:
             return False
         self.expected.target, self.expected.procedure = self.target, self.in_procedure
         self.expected.recovering = self.recovering > 0
@@ -257,7 +258,7 @@ class Tokens:
 
     @property
     def silent(self) -> bool:
-        """Whether something has been said about this pose already."""
+        """Whether something has been reported at this position already."""
         broken_text = self.before.damaged and self.before.kind is TokenKind.STRING
         return self.now.damaged or self._silent == self.at or broken_text
 
@@ -277,9 +278,9 @@ class Tokens:
         helps: tuple[str, ...] = (),
         fixes: tuple[Fix, ...] = (),
     ) -> None:
-        """Add an error, unless something has been said about this pose; the arguments are those of ``Diagnostic``."""
+        """Report an error, unless one has been reported at this position; the arguments are those of ``Diagnostic``."""
         if not self.silent:
-            self.found.say(code, message, span, label, secondary=secondary, notes=notes, helps=helps, fixes=fixes)
+            self.report(code, message, span, label, secondary=secondary, notes=notes, helps=helps, fixes=fixes)
         self._silent = self.at
 
     def lost(self, message: str, label: str, *, code: str = "E111", helps: tuple[str, ...] = ()) -> NoReturn:
@@ -324,7 +325,7 @@ class Tokens:
         if self.accept(key):
             return
         if self._misspelt(key):
-            self.found.say(
+            self.report(
                 "E112", f"expected `{key}` {where}", self.now.span, f"expected `{key}`", helps=(f"write `{key}`",)
             )
             self.take()
@@ -350,7 +351,7 @@ class Tokens:
         """Refuse a name that is too long."""
         longest = self.offered.longest_name
         if len(name.text) > longest:
-            self.found.say(
+            self.report(
                 "E103",
                 f"the name `{name.text}` is longer than {longest} characters",
                 name.span,
@@ -371,11 +372,11 @@ class Tokens:
         elif is_later(token.key):
             if self.standard is Standard.RLO_83:
                 text = f"`{token.text}` as a word belongs to RLO-2"
-                self.found.say("E214", text, token.span, "in RLO-83 it may be a name, and is declared nowhere")
+                self.report("E214", text, token.span, "in RLO-83 it may be a name, and is declared nowhere")
                 return
             helps = (f"take another name; a program of RLO-83 that uses `{token.text}` is translated with `--std=83`",)
         text = f"`{token.text}` is a reserved word and cannot be a name"
-        self.found.say("E107", text, token.span, "a word of the language", helps=helps)
+        self.report("E107", text, token.span, "a word of the language", helps=helps)
 
 
 Rule: TypeAlias = Callable[[Tokens], tree.Statement]
