@@ -40,7 +40,8 @@ test: $(VENV)/test   ## Run lint, types, the import contracts and all tests
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
+	@# Compiled modules are kept, for the processes that tests start.
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
 
 proof: $(VENV)/test  ## Run every random sample at its full size and write docs/proof.md (hours; ONLY=tests/motion)
 	rm -rf out/proof
