@@ -1,20 +1,17 @@
 """``armwright clearance sweep``: error-curve features of a linkage at many clearances, stored in a folder."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
 from armwright.cli.options import Json, Quiet
-from armwright.cli.output import print_json
+from armwright.cli.output import print_result
 from armwright.cli.progress import sweep_bar, waiting
 from armwright.cli.shell_completion import one_of
 
 if TYPE_CHECKING:
-    from xarray import Dataset
-
-    from armwright.arrays import Array
     from armwright.clearance.feature_sweep import FeatureSweep
     from armwright.sweep.designs import Design
 
@@ -71,6 +68,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.clearance.feature_sweep import FeatureSweep
     from armwright.clearance.reader import load_linkage
+    from armwright.clearance.sweep_summary import sweep_summary
     from armwright.sweep.extras import check_extras
     from armwright.sweep.folder import RESULTS
     from armwright.sweep.run import run
@@ -96,50 +94,8 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
             error.add_note(f"finished runs are stored in '{output}'; the same command resumes the sweep")
             raise
     with results:
-        failed = int((results["status"] != 0).sum())
-        chaos = _chaos(task, results)
-    if as_json:
-        summary = {"runs": len(plan.points), "failed": failed, "paths": list(task.paths), "folder": str(output)}
-        print_json({**summary, "chaos": chaos})
-    elif not quiet:
-        failures = f", {failed} of them failed" if failed else ""
-        print(f"{len(plan.points)} linkages on {', '.join(task.paths)}{failures}: {output}")
-        for path, limits in chaos.items():
-            chance = f"; dominated by chance: {', '.join(limits['chance'])}" if limits["chance"] else ""
-            print(
-                f"{path}: predictable until t = {limits['until']:.4g} s in half of the runs, "
-                f"{limits['earliest']:.4g} s in all, of {limits['duration']:.4g} s{chance}"
-            )
-
-
-def _chaos(task: "FeatureSweep", results: "Dataset") -> dict[str, dict[str, Any]]:
-    """Return, by path, until when its runs are predictions [s], and which features chance dominates."""
-    import numpy as np
-
-    from armwright.clearance.feature_sweep import is_chance
-    from armwright.clearance.features import Features
-    from armwright.clearance.paths import thesis_path
-
-    done = results["status"].to_numpy() == 0
-    if not task.replicates or not done.any():
-        return {}
-
-    def numbers(name: str) -> "Array":
-        return np.asarray(results[name].to_numpy()[done])
-
-    return {
-        path: {
-            "until": float(np.median(numbers(f"{path}_until"))),
-            "earliest": float(numbers(f"{path}_until").min()),
-            "duration": thesis_path(path).duration,
-            "chance": [
-                name
-                for name in Features._fields
-                if is_chance(numbers(f"{path}_{name}"), numbers(f"{path}_{name}_spread"), task.replicates + 1)
-            ],
-        }
-        for path in task.paths
-    }
+        summary = sweep_summary(task, results, output)
+    print_result(summary, as_json=as_json, quiet=quiet)
 
 
 def _plan(

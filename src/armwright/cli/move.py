@@ -9,22 +9,20 @@ import typer
 
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, OutputFolder, QuietButWarnings
-from armwright.cli.output import command_line, json_text, plain_console, print_json, print_table, table
+from armwright.cli.output import command_line, json_text, print_result
 from armwright.cli.progress import counting
 from armwright.cli.results import warn_of_stray, write_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from armwright.motion.certificate import LimitName
+    from armwright.motion.move_assessment import MoveAssessment
     from armwright.motion.moves import Move
     from armwright.motion.poses_file import PosesFile
     from armwright.report.move_page import PlannedMove
 
 # Bounds of the options [ms], [mm].
 _PERIOD_MS, _DEVIATION_MM = (0.01, 1000.0), (1e-4, 100.0)
-# Relative excess over a limit that is rounding.
-_ROUNDING = 1e-9
 
 
 class Kind(enum.StrEnum):
@@ -99,7 +97,8 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright move joint puma560 examples/puma_poses.toml -o out/joint`
     """
     from armwright.motion.certificate import slower
-    from armwright.motion.limit_utilization import limit_use, slowing_for_limits
+    from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
+    from armwright.motion.move_assessment import MoveAssessment
 
     _check_options(kind, orientation=orientation, deviation_mm=deviation_mm, around=around, servo_ms=servo_ms)
     planned, file = _planned(
@@ -107,23 +106,17 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     )
     notes = list(file.notes)
     factor, reason = slowing_for_limits(planned.arm, planned.trajectory)
-    if reason is not None and factor > 1 + _ROUNDING:
+    if reason is not None and factor > 1 + ROUNDING:
         slowing = slower(planned.arm, factor, reason)
         notes.append(f"run {slowing}" if keep_limits else f"the limits would hold {slowing}: --keep-limits does that")
         planned = planned.slowed(factor) if keep_limits else planned
     for note in notes:
         print(f"armwright: {poses}: {note}", file=sys.stderr)
-    uses = limit_use(planned.arm, planned.trajectory)
+    assessment = MoveAssessment(move=planned, names=file.names)
     if output is not None:
-        write_results(
-            output, _files(_report_data(planned, file, poses, servo_ms * 1e-3, notes), uses, film=film, quiet=quiet)
-        )
-    if as_json:
-        print_json(_summary(planned, file, uses))
-    elif not quiet:
-        _print(planned, file, uses)
-        if output is not None:
-            print(f"report: {output / 'report.html'}")
+        report = _report_data(planned, file, poses, servo_ms * 1e-3, notes)
+        write_results(output, _files(report, assessment, film=film, quiet=quiet))
+    print_result(assessment, as_json=as_json, quiet=quiet, output=output)
 
 
 def _check_options(
@@ -203,7 +196,7 @@ def _report_data(
     )
 
 
-def _files(moved: "PlannedMove", uses: "dict[LimitName, Any]", *, film: bool, quiet: bool) -> dict[str, Any]:
+def _files(moved: "PlannedMove", assessment: "MoveAssessment", *, film: bool, quiet: bool) -> dict[str, Any]:
     """Return the files of a move by name."""
     from armwright.kinematics.forward_kinematics import forward
     from armwright.report import move_figures
@@ -221,7 +214,7 @@ def _files(moved: "PlannedMove", uses: "dict[LimitName, Any]", *, film: bool, qu
     tool = move_figures.hand_panels(samples.times, X)
     files: dict[str, Any] = {
         "motion.csv": motion_csv(samples.times, samples.q, samples.qd, samples.qdd, moved.tau),
-        "move.json": json_text(_summary(planned, moved.file, uses)) + "\n",
+        "move.json": json_text(assessment.as_data()) + "\n",
         "joints.svg": move_figures.panels(f"{title}: joints", samples.times, joints, marks=pose_times),
         "hand.svg": move_figures.panels(f"{title}: tool", samples.times, tool, marks=pose_times, columns=2),
         "path.svg": move_figures.path_in_space(f"{title}: path of the tool, approach vectors", X, positions),
@@ -231,59 +224,3 @@ def _files(moved: "PlannedMove", uses: "dict[LimitName, Any]", *, film: bool, qu
         return files
     with counting("drawing the film", quiet=quiet) as progress:
         return {**files, **films(planned, progress)}
-
-
-def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> dict[str, Any]:
-    """Return a summary of a move as plain data in SI units."""
-    passages = zip(
-        file.names,
-        planned.times.tolist(),
-        planned.configurations.tolist(),
-        planned.passing_distances.tolist(),
-        strict=True,
-    )
-    return {
-        "arm": planned.arm.name,
-        "duration": planned.trajectory.duration,
-        "branch": planned.label,
-        "poses": [{"name": name, "time": t, "q": q, "deviation": deviation} for name, t, q, deviation in passages],
-        "certificate": None if planned.certificate is None else planned.certificate.as_data(),
-        "of_limits": {name: use.tolist() for name, use in uses.items()},
-        "segments": [
-            {
-                "method": detour.method,
-                "obstacle": None if detour.obstacle is None else str(detour.obstacle),
-                "position_deviation": detour.price.distance,
-                "rotation_deviation": detour.price.rotation,
-                "extra_time": detour.price.time,
-            }
-            for detour in planned.detours
-        ],
-    }
-
-
-def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> None:
-    from rich.text import Text
-
-    from armwright.cli.joints import unit_names, units
-
-    console = plain_console()
-    shown = table(("pose", "s", *unit_names(planned.arm), *(["deviation mm"] if planned.tool_path else [])))
-    scale = units(planned.arm)
-    for i, pose in enumerate(file.names):
-        configurations = [f"{q:z.1f}" for q in planned.configurations[i] / scale]
-        deviation = [f"{planned.passing_distances[i] * 1e3:.1f}"] if planned.tool_path else []
-        shown.add_row(
-            pose, f"{planned.times[i]:.3f}", *configurations, *deviation, end_section=i == len(file.names) - 1
-        )
-    for limit, use in uses.items():
-        parts = [Text(f"{part:.0%}", style="bold red" if part > 1 + _ROUNDING else "") for part in use]
-        shown.add_row(limit, "", *parts)
-    print_table(console, shown)
-    console.print("speed, acceleration and effort in percent of their limits")
-    console.print(f"{planned.arm.name}: {planned.trajectory.duration:.3f} s, {planned.label}")
-    if planned.certificate:
-        console.print(f"certificate {planned.certificate}")
-    for i, detour in enumerate(planned.detours):
-        method = "a line" if detour.method == "line" else f"no line, {detour.obstacle}; detour by {detour.method}"
-        console.print(f"{file.names[i]} to {file.names[i + 1]}: {method}: {detour.price}")

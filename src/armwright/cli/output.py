@@ -76,10 +76,18 @@ def print_result(
 
 
 def _print_result_table(console: "Console", result: "ResultTable") -> None:
+    from rich.text import Text
+
     words = [i for i in range(len(result.heads)) if i not in result.numbers]
-    shown = table(result.heads, result.rows, title=result.title or None, words=words)
+    rows = [
+        [Text(text, style="bold red" if (i, k) in result.exceeded else "") for k, text in enumerate(row)]
+        for i, row in enumerate(result.rows)
+    ]
+    shown = table(result.heads, rows, title=result.title or None, words=words)
     for row, mark in zip(shown.rows, result.marks, strict=False):
         row.style = "bold red" if mark == "over" else None
+    for i in result.section_ends:
+        shown.rows[i].end_section = True
     print_table(console, shown)
     if result.remark:
         console.print(result.remark)

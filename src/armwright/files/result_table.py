@@ -20,6 +20,8 @@ class ResultTable:
         rows: texts of each row.
         numbers: columns of numbers, from 0.
         marks: of the rows: ``over`` or ``holds`` a limit, or empty; none needs one.
+        exceeded: row and column, from 0, of the cells that exceed a limit.
+        section_ends: rows after which a section ends.
         remark: beside the title; may be empty.
     """
 
@@ -28,6 +30,8 @@ class ResultTable:
     rows: tuple[tuple[str, ...], ...] = attrs.field(converter=_rows)
     numbers: Collection[int] = ()
     marks: Sequence[str] = ()
+    exceeded: Collection[tuple[int, int]] = ()
+    section_ends: Collection[int] = ()
     remark: str = ""
 
 

@@ -10,6 +10,9 @@ from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.trajectory import Trajectory
 
+# Relative excess over a limit that is rounding.
+ROUNDING = 1e-9
+
 
 def limit_use(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
     """Return which part of its limits of speed, acceleration and effort each joint uses at most.

@@ -1,0 +1,105 @@
+"""The assessment of a planned move: its poses, their times and deviations, and how far limits are utilized."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.files.result_table import ResultTable
+from armwright.motion.certificate import LimitName
+from armwright.motion.limit_utilization import ROUNDING, limit_use
+from armwright.motion.moves import Move
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class MoveAssessment:
+    """A planned move with the names of its poses.
+
+    Attributes:
+        move: the move.
+        names: names of the poses.
+        uses: the utilization of each limit by every joint, (n,).
+    """
+
+    move: Move
+    names: tuple[str, ...]
+    uses: dict[LimitName, Array] = attrs.field(init=False)
+
+    @uses.default
+    def _uses(self) -> dict[LimitName, Array]:
+        return limit_use(self.move.arm, self.move.trajectory)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The duration and the branches, the certificate, and the detours."""
+        move = self.move
+        notes = [f"{move.arm.name}: {move.trajectory.duration:.3f} s, {move.label}"]
+        if move.certificate:
+            notes.append(f"certificate {move.certificate}")
+        for start, end, detour in zip(self.names, self.names[1:], move.detours, strict=False):
+            method = "a line" if detour.method == "line" else f"no line, {detour.obstacle}; detour by {detour.method}"
+            notes.append(f"{start} to {end}: {method}: {detour.price}")
+        return tuple(notes)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the assessment as plain data in SI units."""
+        move = self.move
+        passages = zip(
+            self.names,
+            move.times.tolist(),
+            move.configurations.tolist(),
+            move.passing_distances.tolist(),
+            strict=True,
+        )
+        return {
+            "arm": move.arm.name,
+            "duration": move.trajectory.duration,
+            "branch": move.label,
+            "poses": [{"name": name, "time": t, "q": q, "deviation": deviation} for name, t, q, deviation in passages],
+            "certificate": None if move.certificate is None else move.certificate.as_data(),
+            "of_limits": {name: use.tolist() for name, use in self.uses.items()},
+            "segments": [
+                {
+                    "method": detour.method,
+                    "obstacle": None if detour.obstacle is None else str(detour.obstacle),
+                    "position_deviation": detour.price.distance,
+                    "rotation_deviation": detour.price.rotation,
+                    "extra_time": detour.price.time,
+                }
+                for detour in move.detours
+            ],
+        }
+
+    def tables(self) -> Iterator[ResultTable]:
+        """Yield the table of the poses [deg, mm], followed by the utilization of the limits."""
+        move = self.move
+        units = [("deg", np.pi / 180) if joint.revolute else ("mm", 1e-3) for joint in move.arm.joints]
+        heads = ["pose", "s", *(f"j{i} {unit}" for i, (unit, _) in enumerate(units, 1))]
+        rows = []
+        for name, t, q, distance in zip(
+            self.names, move.times, move.configurations, move.passing_distances, strict=True
+        ):
+            values = [f"{x / scale:z.1f}" for x, (_, scale) in zip(q, units, strict=True)]
+            rows.append([name, f"{t:.3f}", *values, *([f"{distance * 1e3:.1f}"] if move.tool_path else [])])
+        if move.tool_path:
+            heads.append("deviation mm")
+        for limit, use in self.uses.items():
+            rows.append([limit, "", *(f"{part:.0%}" for part in use), *([""] if move.tool_path else [])])
+        exceeded = [
+            (len(self.names) + i, 2 + joint)
+            for i, use in enumerate(self.uses.values())
+            for joint in np.flatnonzero(use > 1 + ROUNDING).tolist()
+        ]
+        yield ResultTable(
+            title="",
+            heads=heads,
+            rows=rows,
+            numbers=range(1, len(heads)),
+            exceeded=exceeded,
+            section_ends=(len(self.names) - 1,),
+            remark="speed, acceleration and effort in percent of their limits",
+        )
