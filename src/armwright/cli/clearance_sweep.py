@@ -95,7 +95,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
             raise
     with results:
         summary = sweep_summary(task, results, output)
-    print_result(summary, as_json=as_json, quiet=quiet)
+    print_result(summary, as_json=as_json, quiet=quiet, wrap=False)
 
 
 def _plan(

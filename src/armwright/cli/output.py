@@ -51,6 +51,7 @@ def print_result(
     output: "Path | None" = None,
     file: str = "report.html",
     head: Mapping[str, Any] | None = None,
+    wrap: bool = True,
 ) -> None:
     """Print a result as JSON, or its tables, without empty ones, with its notes and the path of its report.
 
@@ -61,6 +62,7 @@ def print_result(
         output: folder of its files; None if they are not written.
         file: name of the file whose path is printed.
         head: data that precede those of the result in JSON.
+        wrap: whether the notes are broken into lines of the width of the terminal.
     """
     if as_json:
         print_json({**(head or {}), **result.as_data()})
@@ -70,7 +72,7 @@ def print_result(
             if shown.rows:
                 _print_result_table(console, shown)
         for note in result.notes:
-            console.print(note)
+            console.print(note, soft_wrap=not wrap)
         if output is not None:
             print(f"{file.partition('.')[0]}: {output / file}")
 
