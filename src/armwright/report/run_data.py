@@ -29,10 +29,7 @@ _T = TypeVar("_T")
 
 
 def page_of(
-    recording: Recording,
-    diagnostics: Sequence[Diagnostic],
-    command: str,
-    left_out: Sequence[str] = (),
+    recording: Recording, diagnostics: Sequence[Diagnostic], command: str, left_out: Sequence[str] = ()
 ) -> RunPage:
     """Return the page of a run, also of one that failed.
 
