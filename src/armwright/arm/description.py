@@ -1,0 +1,173 @@
+"""The tables of an arm: geometry, limits, inertia and drives in degrees and millimetres; as plain data in SI."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import attrs
+import numpy as np
+
+from armwright.arm.gravity import vector_text
+from armwright.arm.model import Arm, Joint
+from armwright.arrays import Array
+from armwright.files.result_table import ResultTable
+from armwright.spatial.euler import to_rpy
+from armwright.spatial.poses import to_noap
+
+# The origin of the gravity vector, in words.
+_GRAVITY_FROM = {
+    "standard": "the default; in a cell, that of the cell",
+    "stated": "stated by the arm; in a cell, that of the cell",
+    "root": "down in the root link of the file; in a cell, that of the cell",
+    "world": "that of the cell",
+}
+# Parameters of a drive that affect the motion of the joint.
+_DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
+
+
+def tables(model: Arm) -> Iterator[ResultTable]:
+    """Yield the tables of an arm [deg, mm]; a title without columns states that there are no data."""
+    if any(joint.name or link.name for joint, link in zip(model.joints, model.links, strict=True)):
+        yield _names(model)
+    yield _geometry(model)
+    if any(joint.fixed is not None for joint in model.joints):
+        yield _fixed(model)
+    yield _limits(model)
+    unknown = [f"link {i}: {link.unknown}" for i, link in enumerate(model.links, 1) if link.unknown]
+    if unknown:
+        yield ResultTable(
+            title=f"Mass and inertia are unknown, so there is no dynamics. {'; '.join(unknown)}", heads=(), rows=()
+        )
+    if any(link.mass or link.inertia.any() for link in model.links):
+        yield _links(model)
+        yield _inertia(model)
+    else:
+        yield ResultTable(title="Links: no masses or inertias are known", heads=(), rows=())
+    if any(any(getattr(motor, name) for name in _DRIVE) for motor in model.motors):
+        yield _motors(model)
+    else:
+        yield ResultTable(title="Drives: no inertia or friction is known", heads=(), rows=())
+
+
+def facts(model: Arm) -> list[tuple[str, str]]:
+    """Return the poses of base and tool, gravity, reach and speed, each with its name."""
+
+    def noap(X: Array) -> str:
+        numbers = to_noap(X) + 0.0
+        columns = ["  ".join(f"{x:z.6g}" for x in numbers[k : k + 3].round(12)) for k in (0, 3, 6)]
+        position = "  ".join(f"{x * 1e3:z.6g}" for x in numbers[9:].round(12))
+        return f"n ({columns[0]})  o ({columns[1]})  a ({columns[2]})  p ({position}) mm"
+
+    pairs = [("base", noap(model.base)), ("tool", noap(model.tool))]
+    pairs.append(("gravity", f"{vector_text(model.gravity)}, {_GRAVITY_FROM[model.gravity_from]}"))
+    if math.isfinite(model.reach):
+        pairs.append(("reach", _length(model.reach)))
+    if math.isfinite(model.tool_speed):
+        pairs.append(("tool speed", f"{_length(model.tool_speed)}/s at full reach"))
+    return pairs
+
+
+def as_data(model: Arm) -> dict[str, Any]:
+    """Return an arm as plain data in SI units; infinite limits are None."""
+
+    def plain(_owner: object, _field: object, value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            return value.tolist()
+        return None if isinstance(value, float) and math.isinf(value) else value
+
+    return attrs.asdict(model, value_serializer=plain)
+
+
+def _fixed(model: Arm) -> ResultTable:
+    rows = []
+    for i, joint in enumerate(model.joints, 1):
+        if joint.fixed is not None:
+            position = (f"{x * 1e3:z.6g}" for x in joint.fixed[:3, 3])
+            rotation = (f"{math.degrees(x):z.6g}°" for x in to_rpy(joint.fixed[:3, :3]))
+            rows.append((str(i), *position, *rotation))
+    return ResultTable(
+        title="Fixed transforms, after theta and d and before a and alpha",
+        heads=("joint", "x mm", "y mm", "z mm", "roll", "pitch", "yaw"),
+        rows=rows,
+    )
+
+
+def _names(model: Arm) -> ResultTable:
+    rows = [(str(i), j.name, k.name) for i, (j, k) in enumerate(zip(model.joints, model.links, strict=True), 1)]
+    return ResultTable(title="Names", heads=("number", "joint", "link"), rows=rows)
+
+
+def _geometry(model: Arm) -> ResultTable:
+    rows = []
+    for i, joint in enumerate(model.joints, 1):
+        theta, d = _angle(joint.theta), _length(joint.d)
+        if joint.revolute:
+            theta = f"q{i}" if joint.theta == 0 else f"q{i} {math.degrees(joint.theta):+g}°"
+        else:
+            d = f"q{i}" if joint.d == 0 else f"q{i} {joint.d * 1e3:+g} mm"
+        rows.append((str(i), joint.kind, theta, d, _length(joint.a), _angle(joint.alpha)))
+    return ResultTable(
+        title="Denavit-Hartenberg, standard", heads=("joint", "kind", "theta", "d", "a", "alpha"), rows=rows
+    )
+
+
+def _limits(model: Arm) -> ResultTable:
+    rows = []
+    for i, joint in enumerate(model.joints, 1):
+        limits = joint.limits
+        unit = "N m" if joint.revolute else "N"
+        effort = "-" if math.isinf(limits.effort) else f"{limits.effort:g} {unit}"
+        positions = _position(joint, limits.lower), _position(joint, limits.upper)
+        rates = _position(joint, limits.speed, "/s"), _position(joint, limits.acceleration, "/s²")
+        rows.append((str(i), *positions, *rates, effort))
+    return ResultTable(title="Limits", heads=("joint", "from", "to", "speed", "acceleration", "effort"), rows=rows)
+
+
+def _links(model: Arm) -> ResultTable:
+    rows = []
+    for i, link in enumerate(model.links, 1):
+        rows.append((str(i), f"{link.mass:g}", *(f"{x * 1e3:z.6g}" for x in link.com)))
+    return ResultTable(
+        title="Links: mass, and centre of mass in the frame of the link",
+        heads=("link", "kg", "x mm", "y mm", "z mm"),
+        rows=rows,
+    )
+
+
+def _inertia(model: Arm) -> ResultTable:
+    entries = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
+    rows = []
+    for i, link in enumerate(model.links, 1):
+        rows.append((str(i), *(f"{link.inertia[entry]:z.4g}" for entry in entries.values())))
+    return ResultTable(title="Inertia about the centre of mass, kg m²", heads=("link", *entries), rows=rows)
+
+
+def _motors(model: Arm) -> ResultTable:
+    rows = []
+    for i, (motor, joint) in enumerate(zip(model.motors, model.joints, strict=True), 1):
+        inertia, viscous, dry = ("kg m²", "N m s", "N m") if joint.revolute else ("kg", "N s/m", "N")
+        forward, backward = motor.coulomb_forward, motor.coulomb_backward
+        coulomb = f"{forward:g} {dry}" if forward == backward else f"+{forward:g} / -{backward:g} {dry}"
+        friction = f"{motor.viscous:g} {viscous}", coulomb
+        rows.append((str(i), f"{motor.inertia:g} {inertia}", *friction, f"{motor.gear_ratio:g}"))
+    return ResultTable(
+        title="Drives, reflected to the joint",
+        heads=("joint", "inertia", "viscous", "Coulomb friction", "gear ratio"),
+        rows=rows,
+    )
+
+
+def _angle(value: float) -> str:
+    return f"{math.degrees(value):g}°"
+
+
+def _length(value: float) -> str:
+    return f"{value * 1e3:zg} mm"
+
+
+def _position(joint: Joint, value: float, per: str = "") -> str:
+    if math.isinf(value):
+        return "-"
+    return f"{math.degrees(value):z.4g}°{per}" if joint.revolute else f"{value * 1e3:zg} mm{per}"
