@@ -65,7 +65,7 @@ def fed_to(
         return armwright(command, path, *options, cwd=folder, fed=typed)
     os.mkfifo(folder / path)
     with subprocess.Popen(["sh", "-c", 'printf %s "$0" > "$1"', piped, folder / path]) as writer:
-        result = armwright_process(command, path, *options, cwd=folder)
+        result = armwright(command, path, *options, cwd=folder)
         writer.kill()
     (folder / path).unlink()
     return result
