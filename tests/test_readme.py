@@ -29,8 +29,8 @@ def test_python_examples_run() -> None:
     assert scope["line"].certificate.holds
     assert scope["detour"].method == "line"
     assert scope["move"].certificate.deviation <= 1e-4
-    assert scope["quick"].trajectory.duration < scope["move"].trajectory.duration
-    assert armwright.motion.continuity(scope["other"]).order >= 2
+    assert scope["optimal"].trajectory.duration < scope["move"].trajectory.duration
+    assert armwright.motion.continuity(scope["replanned"]).order >= 2
 
 
 def test_links_lead_somewhere() -> None:
