@@ -66,7 +66,7 @@ def _all(values: Any) -> tuple[Array, ...]:
 
 
 @pytest.mark.parametrize("name", PLAIN)
-@pytest.mark.drawn(0.34)
+@pytest.mark.drawn(0.12)
 def test_agrees_with_the_plain_function(name: str, sample: Sample) -> None:
     """A compiled quantity has the values and shapes of the plain function, for many configurations and for one."""
     rng = np.random.default_rng(sample.seed)

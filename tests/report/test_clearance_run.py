@@ -285,8 +285,7 @@ def test_bearing_in_the_ground() -> None:
 class Opened:
     """An opened page, and everything it complained about or asked the network for."""
 
-    def __init__(self, browser: Any, file: Path, run: ClearanceRun) -> None:
-        file.write_text(page_of(run), encoding="utf-8")
+    def __init__(self, browser: Any, file: Path) -> None:
         self.said: list[str] = []
         self.page = browser.new_page(viewport={"width": 1280, "height": 900})
         self.page.on("console", lambda message: self.said.append(message.text))
@@ -309,9 +308,20 @@ class Opened:
         return str(self.page.evaluate("s => document.querySelector(s).toDataURL()", selector))
 
 
+def written(file: Path, run: ClearanceRun) -> Path:
+    """Write the page of a run."""
+    file.write_text(page_of(run), encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory, run: ClearanceRun) -> Path:
+    return written(tmp_path_factory.mktemp("page") / "report.html", run)
+
+
 @pytest.fixture
-def opened(browser: Any, tmp_path: Path, run: ClearanceRun) -> Any:
-    shown = Opened(browser, tmp_path / "report.html", run)
+def opened(browser: Any, report: Path) -> Any:
+    shown = Opened(browser, report)
     yield shown
     shown.page.close()
 
@@ -395,7 +405,7 @@ def test_charts_lead(opened: Opened) -> None:
 @pytest.mark.drawn(0.5)
 def test_other_pages(browser: Any, tmp_path: Path, cranked: dict[str, ClearanceRun], name: str) -> None:
     """The pages of slider-crank and four-bar open, and end where their runs end."""
-    shown = Opened(browser, tmp_path / f"{name}.html", cranked[name])
+    shown = Opened(browser, written(tmp_path / f"{name}.html", cranked[name]))
     shown.page.keyboard.press("End")
 
     assert shown.state()["time"] == pytest.approx(cranked[name].time[-1], rel=1e-6)
@@ -406,7 +416,7 @@ def test_other_pages(browser: Any, tmp_path: Path, cranked: dict[str, ClearanceR
 @pytest.mark.browser
 def test_diverged_page(browser: Any, tmp_path: Path, simulation: Simulation) -> None:
     """The page of a run that diverged ends where it was last sound, and says so."""
-    shown = Opened(browser, tmp_path / "diverged.html", diverged(simulation))
+    shown = Opened(browser, written(tmp_path / "diverged.html", diverged(simulation)))
 
     shown.page.keyboard.press("End")
 
