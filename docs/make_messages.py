@@ -1,4 +1,4 @@
-"""The page of all messages, made from what `armwright explain` knows; `make messages` runs this."""
+"""The page of all messages, generated from the pages of `armwright explain`; `make messages` runs this."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,32 +9,30 @@ PAGE = Path(__file__).parent / "messages.md"
 HEAD = """\
 # Messages
 
-What `armwright check`, `armwright run` and the editors say of a program has a code, which stays the same whatever \
-the words. `armwright explain E206` prints what stands here, with the message that the wrong program gets; `armwright \
-explain` lists all codes. What the language is stands in [language.md](language.md).
+Every diagnostic of `armwright check`, `armwright run` and the editors has a code, which does not change when its \
+text does. `armwright explain E206` prints the explanation below, and the message for the wrong program; `armwright \
+explain` lists all codes. The language is described in [language.md](language.md).
 
-| Codes | About | Said |
+| Codes | Subject | Reported by |
 |---|---|---|
-| E1.. | syntax: words and signs | by the translator |
-| E2.. | names, types, values and clauses | by the translator; of values that are worked out, while the program runs |
-| E3.. | frames: where they are and what they hang on | by the translator; while the program runs where it could not \
-tell before |
-| E4.. | motion: what an arm cannot do | while the program runs, before the MOVE begins |
-| E5.. | processes that cannot go on, programs without end | by the translator where it can see it, else while the \
-program runs |
-| R6.. | devices and cameras | by the translator if the cell is known, else while the program runs |
-| W... | what is allowed, and most likely not meant | both; a warning keeps no program from running |
-| L3.. | the style of working: a closed hand, a name without use | by the translator; a warning too |
+| E1.. | syntax: tokens and grammar | the compiler |
+| E2.. | names, types, values and clauses | the compiler; for computed values, at run time |
+| E3.. | frames: their poses and parents | the compiler; at run time where the compiler cannot decide |
+| E4.. | motion: what an arm cannot do | at run time, before the MOVE begins |
+| E5.. | deadlocks, and programs that do not end | the compiler where it can decide, otherwise at run time |
+| R6.. | devices and cameras | the compiler if the cell is known, otherwise at run time |
+| W... | allowed, but probably not intended | both; a program with warnings runs |
+| L3.. | style: closed grippers, unused names | the compiler; these are warnings too |
 
-With an error of syntax the statements are read, and names and types checked, but not followed: what stands where, \
-what hangs on what and who waits for whom is judged once the syntax is right. One mistake is told once; what follows \
-from it is not told again.
+After a syntax error the remaining statements are parsed, and their names and types are checked, but the flow of the \
+program is not analysed: poses, parents of frames and deadlocks are checked only when the syntax is correct. Each \
+mistake is reported once; errors that follow from it are not reported.
 
-Comments at the beginning of a program below say how it is looked at: `// std=83` and `// strict` are options of \
-`armwright check`; `// cell: arms ARM_1` tells what is in the cell it is checked against, and `// import:` what is in \
-the file that it imports. `// run in one_arm` means that the message comes while it runs, in one of four small cells: \
-a Stanford arm (`one_arm`), the same above a plane of contact (`plane`), a PUMA 560 (`puma`) and a UR5 (`ur5`), with \
-`// limits:`, `// around:` and `// effort:` for the options and limits that matter.
+Comments at the beginning of a program below state how it is checked: `// std=83` and `// strict` are options of \
+`armwright check`; `// cell: arms ARM_1` describes the cell against which the program is checked, and `// import:` the \
+contents of the imported file. `// run in one_arm` means that the message appears at run time, in one of four small \
+cells: a Stanford arm (`one_arm`), the same above a plane of contact (`plane`), a PUMA 560 (`puma`) and a UR5 \
+(`ur5`); `// limits:`, `// around:` and `// effort:` give the options and limits of the run.
 """
 
 
@@ -43,7 +41,7 @@ def lines() -> Iterator[str]:
     yield HEAD
     for name, codes in ranges().items():
         yield f"**{name}**\n"
-        yield "| Code | Says |\n|---|---|"
+        yield "| Code | Title |\n|---|---|"
         for code in codes:
             yield f"| [{code}](#{code.lower()}) | {explanation(code).title} |"
         yield ""

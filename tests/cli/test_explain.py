@@ -75,7 +75,7 @@ def test_on_a_terminal() -> None:
     """Who watches sees the page in colour, every line of the message whole."""
     shown = watched("E403")
 
-    assert "\x1b[1mE403: the arm is singular on the path" in shown
+    assert "\x1b[1mE403: a singularity on the path" in shown
     assert "\x1b[94" in shown  # a word of the language
     assert "\x1b[1;31merror[E403]" in shown
     assert "the arm is singular there (wrist)" in shown

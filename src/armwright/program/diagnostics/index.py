@@ -19,7 +19,7 @@ _RANGES = {
     "E5": "Processes, and programs without end",
     "R6": "Devices",
     "W": "Warnings",
-    "L": "Style of working",
+    "L": "Style",
 }
 _CODE = re.compile(r"([EWLR]?)0*(\d{3})")
 _PAGE = re.compile(
