@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 import typer.main
@@ -106,7 +106,7 @@ def test_bash(tmp_path: Path) -> None:
     assert done.stdout.splitlines() == ["arms", "complete -o default -F _armwright_completion armwright"], done
 
 
-@pytest.mark.parametrize("shell", Shell)
+@pytest.mark.parametrize("shell", get_args(Shell))
 def test_scripts(shell: Shell) -> None:
     """Every shell has a script, which asks by the variable that the program listens to."""
     assert "_ARMWRIGHT_COMPLETE" in script(shell)

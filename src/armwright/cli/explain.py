@@ -9,7 +9,7 @@ import typer
 
 from armwright.cli.options import Json
 from armwright.cli.output import print_json
-from armwright.cli.shell_completion import codes
+from armwright.cli.shell_completion import listed_in
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,7 +28,10 @@ _BLANK = "\N{NO-BREAK SPACE}"
 def explain(
     code: Annotated[
         str | None,
-        typer.Argument(help="Code of a diagnostic, as in E206; without it all codes are listed.", autocompletion=codes),
+        typer.Argument(
+            help="Code of a diagnostic, as in E206; without it all codes are listed.",
+            autocompletion=listed_in("armwright.program.diagnostics.index", "codes"),
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:

@@ -6,7 +6,7 @@ import typer
 
 from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_json
-from armwright.cli.shell_completion import quantities
+from armwright.cli.shell_completion import listed_in
 
 
 def kernel(
@@ -15,7 +15,7 @@ def kernel(
         str,
         typer.Argument(
             help="Quantity: forward, jacobian, inverse_branches, inverse_dynamics, forward_dynamics ...",
-            autocompletion=quantities,
+            autocompletion=listed_in("armwright.compiled.quantities", "quantity_names"),
         ),
     ],
     count: Annotated[bool, typer.Option("--count", help="Print the operation count only.")] = False,

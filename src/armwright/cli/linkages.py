@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from armwright.cli.numbers import named_numbers
-from armwright.cli.shell_completion import linkages, setting
+from armwright.cli.shell_completion import listed_in, setting
 from armwright.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 LinkageName: TypeAlias = Annotated[
     str,
-    typer.Argument(help="Name in the catalogue, or path of a TOML file (docs/clearance.md).", autocompletion=linkages),
+    typer.Argument(
+        help="Name in the catalogue, or path of a TOML file (docs/clearance.md).",
+        autocompletion=listed_in("armwright.clearance.reader", "linkage_names", or_file=True),
+    ),
 ]
 FrictionVelocity: TypeAlias = Annotated[
     str,

@@ -5,10 +5,14 @@ from typing import Annotated, TypeAlias
 
 import typer
 
-from armwright.cli.shell_completion import arms
+from armwright.cli.shell_completion import listed_in
 
 ArmName: TypeAlias = Annotated[
-    str, typer.Argument(help="Name in the catalogue, or path of an arm file.", autocompletion=arms)
+    str,
+    typer.Argument(
+        help="Name in the catalogue, or path of an arm file.",
+        autocompletion=listed_in("armwright.arm.load", "arm_names", or_file=True),
+    ),
 ]
 Configuration: TypeAlias = Annotated[
     str | None, typer.Option("-q", help="Joint positions in degrees and mm, as in 10,20,30.")

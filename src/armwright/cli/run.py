@@ -1,9 +1,8 @@
 """``armwright run``: run a program in a simulated cell and report its results."""
 
-import enum
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn, TypeAlias
 
 import typer
 
@@ -30,12 +29,8 @@ if TYPE_CHECKING:
     from armwright.report.files import Origin
 
 
-class Around(enum.StrEnum):
-    """The kind of detour where the arm cannot follow a straight line."""
-
-    VIA = "via"
-    DAMPED = "damped"
-    NONE = "none"
+# The kind of detour where the arm cannot follow a straight line.
+Around: TypeAlias = Literal["via", "damped", "none"]
 
 
 def run(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -96,7 +91,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         "servo_ms": used_cell.period * 1e3,
         "deviation_mm": used_cell.deviation * 1e3,
         "corner_mm": used_cell.corner_room * 1e3,
-        "around": used_cell.around or Around.NONE.value,
+        "around": used_cell.around or "none",
         "std": std.value,
         "strict": strict,
     }
@@ -187,7 +182,7 @@ def _adjusted(cell: "Cell", servo_ms: float | None, deviation_mm: float | None, 
     deviation = cell.deviation
     if deviation_mm is not None:
         deviation = within(deviation_mm, DEVIATION_MM, "--deviation-mm") * 1e-3
-    detour = cell.around if around is None else DETOURS[around.value]
+    detour = cell.around if around is None else DETOURS[around]
     return attrs.evolve(cell, period=period, deviation=deviation, around=detour)
 
 

@@ -1,23 +1,19 @@
 """Completion by the shell: the completions of arguments, and the script that a shell needs for them."""
 
 import contextlib
-import enum
 import os
 from collections.abc import Callable, Iterable
+from importlib import import_module
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 from armwright.cli.commands import COMPLETE, NAME
 
 Complete = Callable[[str], list[str]]
 
 
-class Shell(enum.StrEnum):
-    """A shell for which there is a completion script."""
-
-    BASH = "bash"
-    ZSH = "zsh"
-    FISH = "fish"
-    POWERSHELL = "powershell"
+# Shells for which there is a completion script.
+Shell: TypeAlias = Literal["bash", "zsh", "fish", "powershell"]
 
 
 def prepare() -> None:
@@ -32,7 +28,7 @@ def script(shell: Shell) -> str:
     """Return the completion script of a shell."""
     from typer.completion import get_completion_script  # type: ignore[attr-defined]
 
-    return get_completion_script(prog_name=NAME, complete_var=COMPLETE, shell=shell.value)
+    return get_completion_script(prog_name=NAME, complete_var=COMPLETE, shell=shell)
 
 
 def install(shell: Shell) -> Path:
@@ -49,7 +45,7 @@ def install(shell: Shell) -> Path:
     try:
         for name in (".bashrc", ".zshrc"):
             regular(Path.home() / name)
-        return install_script(shell=shell.value, prog_name=NAME, complete_var=COMPLETE)[1]
+        return install_script(shell=shell, prog_name=NAME, complete_var=COMPLETE)[1]
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: the home folder is unknown
         text = f"cannot install the completion for {shell}: {error}; --show-completion {shell} prints its script"
         raise OutputError(text) from error
@@ -58,39 +54,32 @@ def install(shell: Shell) -> Path:
 # ---- completions ---------------------------------------------------------------------------------------------------
 
 
-def arms(incomplete: str) -> list[str]:
-    """Complete the name of an arm, or the path of an arm file."""
-    from armwright.arm.load import arm_names
-
-    return _or_files(arm_names(), incomplete)
+def one_of(*words: str) -> Complete:
+    """Return a function that completes a word of a list."""
+    return lambda incomplete: _beginning(words, incomplete)
 
 
-def linkages(incomplete: str) -> list[str]:
-    """Complete the name of a linkage, or the path of its file."""
-    from armwright.clearance.reader import linkage_names
+def listed_in(module: str, name: str, *, or_file: bool = False) -> Complete:
+    """Return a function that completes a word of a list, whose module is imported only then.
 
-    return _or_files(linkage_names(), incomplete)
+    Args:
+        module: the module.
+        name: name of the list, or of the function that returns it.
+        or_file: the argument may be the path of a file instead.
+    """
 
+    def complete(incomplete: str) -> list[str]:
+        known = getattr(import_module(module), name)
+        words = _beginning(known() if callable(known) else known, incomplete)
+        # Without a match the shell itself completes paths.
+        return words + _files(incomplete) if or_file and words and incomplete else words
 
-def codes(incomplete: str) -> list[str]:
-    """Complete the code of a message."""
-    from armwright.program.diagnostics.index import codes as known
-
-    return _beginning(known(), incomplete)
-
-
-def quantities(incomplete: str) -> list[str]:
-    """Complete the name of a compiled quantity."""
-    from armwright.compiled.quantities import quantity_names
-
-    return _beginning(quantity_names(), incomplete)
+    return complete
 
 
-def studies(incomplete: str) -> list[str]:
-    """Complete the name of a study."""
-    from armwright.study.study import STUDIES
-
-    return _beginning(STUDIES, incomplete)
+def setting(name: str) -> Complete:
+    """Return a function that completes a word of a constant of ``clearance.settings`` with this name."""
+    return listed_in("armwright.clearance.settings", name)
 
 
 def paths(incomplete: str) -> list[str]:
@@ -107,35 +96,11 @@ def limits(incomplete: str) -> list[str]:
     return _beginning((f"{name}=" for name in LIMITS), incomplete)
 
 
-def one_of(*words: str) -> Complete:
-    """Return a function that completes a word of a list."""
-
-    def complete(incomplete: str) -> list[str]:
-        return _beginning(words, incomplete)
-
-    return complete
-
-
-def setting(name: str) -> Complete:
-    """Return a function that completes a word of a constant of ``clearance.settings`` with this name."""
-
-    def complete(incomplete: str) -> list[str]:
-        from armwright.clearance import settings
-
-        return _beginning(getattr(settings, name), incomplete)
-
-    return complete
-
-
 def _beginning(words: Iterable[str], incomplete: str) -> list[str]:
     return [word for word in words if word.startswith(incomplete)]
 
 
-def _or_files(names: Iterable[str], incomplete: str) -> list[str]:
-    """Complete a name, or a path if a name matches too; without a match the shell itself completes paths."""
-    choices = _beginning(names, incomplete)
-    if choices and incomplete:
-        with contextlib.suppress(OSError):
-            paths = Path().glob(f"{incomplete}*")
-            choices += sorted(f"{path.name}/" if path.is_dir() else path.name for path in paths)
-    return choices
+def _files(incomplete: str) -> list[str]:
+    with contextlib.suppress(OSError):
+        return sorted(f"{path.name}/" if path.is_dir() else path.name for path in Path().glob(f"{incomplete}*"))
+    return []

@@ -1,7 +1,6 @@
 """``armwright simulate``: simulate the motion of an arm with its drives off or holding its weight."""
 
-import enum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -12,20 +11,6 @@ from armwright.cli.output import print_result
 from armwright.cli.results import write_results
 
 
-class Drives(enum.StrEnum):
-    """The control of the drives."""
-
-    OFF = "off"
-    GRAVITY = "gravity"
-
-
-class Method(enum.StrEnum):
-    """The method of integration."""
-
-    GILL = "gill"
-    ADAPTIVE = "adaptive"
-
-
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
     configuration: Annotated[
@@ -33,8 +18,12 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     ],
     speeds: Annotated[str | None, typer.Option("--qd", help="Initial joint velocities in degrees/s and mm/s.")] = None,
     duration: Annotated[float, typer.Option(help="Duration in s.")] = 1.0,
-    drives: Annotated[Drives, typer.Option(help="Drives off, or holding the weight of the arm.")] = Drives.OFF,
-    method: Annotated[Method, typer.Option(help="Runge-Kutta-Gill in fixed steps, or adaptive.")] = Method.ADAPTIVE,
+    drives: Annotated[
+        Literal["off", "gravity"], typer.Option(help="Drives off, or holding the weight of the arm.")
+    ] = "off",
+    method: Annotated[
+        Literal["gill", "adaptive"], typer.Option(help="Runge-Kutta-Gill in fixed steps, or adaptive.")
+    ] = "adaptive",
     step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and period of the rows.")] = 1.0,
     load: Load = None,
     output: OutputFolder = None,
@@ -65,8 +54,8 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         joint_values(model, configuration, "-q"),
         None if speeds is None else joint_values(model, speeds, "--qd"),
         duration=duration,
-        controller=gravity_compensation(model) if drives is Drives.GRAVITY else no_effort(model),
-        integrator=Gill(length=step_ms * 1e-3) if method is Method.GILL else Adaptive(),
+        controller=gravity_compensation(model) if drives == "gravity" else no_effort(model),
+        integrator=Gill(length=step_ms * 1e-3) if method == "gill" else Adaptive(),
         period=step_ms * 1e-3,
     )
     if output is not None:

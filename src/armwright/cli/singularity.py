@@ -1,14 +1,11 @@
 """``armwright singularity``: how near a joint configuration is to a singularity, and its effects."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_json
-
-if TYPE_CHECKING:
-    pass
 
 
 def singularity(

@@ -8,7 +8,7 @@ from armwright.cli.options import Json, OutputFolder
 from armwright.cli.output import json_text, print_result
 from armwright.cli.progress import parts, waiting
 from armwright.cli.results import write_results
-from armwright.cli.shell_completion import studies
+from armwright.cli.shell_completion import listed_in
 
 # Studies that show progress bars.
 _WITH_BARS = {"five-bar-clearance"}
@@ -19,7 +19,7 @@ def study(
         str,
         typer.Argument(
             help="Name of the study: stanford-torque, puma-moves, five-bar-clearance or dh-calibration.",
-            autocompletion=studies,
+            autocompletion=listed_in("armwright.study.study", "STUDIES"),
         ),
     ],
     output: OutputFolder = None,

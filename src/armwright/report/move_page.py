@@ -1,8 +1,7 @@
 """The page of a move through poses: the moving arm, the poses, and the charts of its joints."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-import attrs
 import numpy as np
 
 from armwright.arrays import Array
@@ -22,45 +21,42 @@ _INSTANTS, _FPS, _MAX_FRAMES = 240, (30.0, 60.0), 1200
 _ARM = "ARM"
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class PlannedMove:
-    """A planned move, and the data of its page.
+def move_page(
+    move: Move,
+    file: PosesFile,
+    samples: Samples,
+    tau: Array,
+    *,
+    title: str,
+    name: str,
+    command: str,
+    notes: Iterable[str],
+) -> RunPage:
+    """Return the page of a move.
 
-    Attributes:
+    Args:
         move: the move.
-        file: the file of the poses.
-        name: name of that file.
+        file: the file of its poses.
         samples: the motion at the ticks of a servo.
         tau: (k, n) efforts at the samples, drives included [N m] or [N].
+        title: heading of the page.
+        name: name of the file of the poses.
         command: the command line.
         notes: warnings and remarks.
     """
-
-    move: Move
-    file: PosesFile
-    name: str
-    samples: Samples
-    tau: Array
-    command: str
-    notes: tuple[Message, ...]
-
-
-def move_page(planned: PlannedMove) -> RunPage:
-    """Return the page of a move."""
-    move, samples = planned.move, planned.samples
     rows = thinned(len(samples.times))
     return RunPage(
-        title=planned.file.title or f"{move.arm.name} through {planned.name}",
-        program_name=planned.name,
-        program_text=planned.file.text,
+        title=title,
+        program_name=name,
+        program_text=file.text,
         text_kind="Poses",
         cell_name="",
         generated_by=f"armwright {__version__}",
-        command=planned.command,
+        command=command,
         duration=move.trajectory.duration,
-        messages=planned.notes,
-        effects=_effects(move, planned.file),
-        stages=_stages(planned),
+        messages=[Message(severity="note", text=note) for note in notes],
+        effects=_effects(move, file),
+        stages=_stages(move, file, samples, tau),
         arms=[
             ArmRecord(
                 name=_ARM,
@@ -70,11 +66,11 @@ def move_page(planned: PlannedMove) -> RunPage:
                 q=samples.q[rows],
                 qd=samples.qd[rows],
                 qdd=samples.qdd[rows],
-                tau=planned.tau[rows],
+                tau=tau[rows],
                 hand=forward(move.arm, samples.q[rows])[:, :3, 3],
             )
         ],
-        animation=_animation(move, planned.file),
+        animation=_animation(move, file),
     )
 
 
@@ -87,8 +83,7 @@ def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
         yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {passage}")
 
 
-def _stages(planned: PlannedMove) -> Iterator[StageRow]:
-    move, file, samples = planned.move, planned.file, planned.samples
+def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array) -> Iterator[StageRow]:
     for i, (t0, t1) in enumerate(zip(move.times[:-1].tolist(), move.times[1:].tolist(), strict=True)):
         hand = forward(move.arm, move.trajectory(np.linspace(t0, t1, _SAMPLES)))[:, :3, 3]
         during = (samples.times >= t0 - 1e-12) & (samples.times <= t1 + 1e-12)
@@ -104,7 +99,7 @@ def _stages(planned: PlannedMove) -> Iterator[StageRow]:
             to=(file.names[i + 1],),
             speed=100.0,
             peak_speed=np.abs(samples.qd[during]).max(axis=0).tolist(),
-            peak_effort=np.abs(planned.tau[during]).max(axis=0).tolist(),
+            peak_effort=np.abs(tau[during]).max(axis=0).tolist(),
             hand_length=float(np.linalg.norm(np.diff(hand, axis=0), axis=-1).sum()),
             deviation=detour.price.distance if detour else move.certificate.deviation if move.certificate else None,
             note=f"by {detour.method}: {detour.price}" if detour and detour.method != "line" else "",
