@@ -5,12 +5,13 @@ from pathlib import Path
 
 import attrs
 import pytest
+from lsprotocol import types as lsp
 
 from armwright.errors import InvalidValueError
 from armwright.program import KnownCell, Source, compile as translate
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
-from armwright.program.language.text_edits import apply_edits
+from armwright.program.language.text_edits import Edit, apply_edits
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.language_server.analyse import Settings, analyse
 from armwright.program.language_server.analysis import Analysis
@@ -21,6 +22,7 @@ from armwright.program.language_server.hover import hover
 from armwright.program.language_server.inlay_hints import hints
 from armwright.program.language_server.keyword_docs import WORDS, explained
 from armwright.program.language_server.outline import folds, outline
+from armwright.program.language_server.positions import position, span_of, span_range
 from armwright.program.language_server.rename import rename
 from armwright.program.language_server.semantic_tokens import difference, encoded, line_stretches
 from armwright.program.language_server.signature_help import signature_at
@@ -33,14 +35,14 @@ STANFORD = CORPUS / "cell1.json"
 
 def analysis_of(text: str, *, cell: Path | None = None, std: Standard = Standard.RLO_2) -> Analysis:
     """Return what is known of a program."""
-    return analyse("test.rlo", text, None, Cells(), Settings(cell=cell, std=std))
+    return analyse("test.rlo", PositionCodec(text), None, Cells(), Settings(cell=cell, std=std))
 
 
 def labels(text: str, **how: Standard) -> list[str]:
     """Return what can be written where a bar stands in a text."""
     offset = text.index("|")
     text = text.replace("|", "")
-    return [one.label for one in completions(text, analysis_of(text, **how), offset)]
+    return [one.label for one in completions(PositionCodec(text), analysis_of(text, **how), offset, snippets=True)]
 
 
 # ---- words ---------------------------------------------------------------------------------------------------------
@@ -70,10 +72,11 @@ def test_every_word_is_explained() -> None:
 def test_word_with_several_meanings(statement: str, form: str) -> None:
     """TO and ON mean what they mean in their statement."""
     text = f"VAR f, g : FRAME ; n : SCALAR ; BEGIN {statement} ; END."
-    found = hover(analysis_of(text.replace("|", "")), text.index("|"))
+    found = hover(analysis_of(text.replace("|", "")), text.index("|"), markdown=False)
 
     assert found is not None
-    assert found.code.startswith(form)
+    assert isinstance(found.contents, lsp.MarkupContent)
+    assert found.contents.value.startswith(form)
 
 
 def test_names_that_are_variables_only_sometimes() -> None:
@@ -173,7 +176,8 @@ def test_completion_of_what_is_not_looked_at_yet(known: str, since: str, first: 
     """What was written since the program was last looked at as a whole counts for what may stand behind it."""
     text, place = f"{HEAD}{known}{since} ; END.", len(HEAD) + len(known) + len(since)
 
-    found = [one.label for one in completions(text, analysis_of(f"{HEAD}{known} ; END."), place)]
+    analysis = analysis_of(f"{HEAD}{known} ; END.")
+    found = [one.label for one in completions(PositionCodec(text), analysis, place, snippets=True)]
     assert found[: len(first)] == first
     assert first or not found
 
@@ -286,7 +290,7 @@ def test_colours_that_are_sent_again() -> None:
         text = path.read_text(encoding="utf-8")
         at = chance.randrange(len(text))
         changed = text[:at] + chance.choice([" ", "7", ";", "\n", "{"]) + text[at:]
-        old, new = (line_stretches(analysis_of(one), "utf-16") for one in (text, changed))
+        old, new = (line_stretches(analysis_of(one)) for one in (text, changed))
         start, gone, come = difference(old, new)
         numbers = encoded(old)
         numbers[start : start + gone] = come
@@ -316,33 +320,42 @@ def test_words_that_were_meant(line: str, title: str) -> None:
     text = f"VAR part : FRAME ;\nBEGIN\n  READ VISIONS (part) ;\n  {line} ;\nEND.\n"
     cell = KnownCell(arms=frozenset({"ARM_1"}), frames={"FEEDER": "WORLD"})
     analysis = attrs.evolve(analysis_of(text), compiled=translate(Source("t.rlo", text), cell))
-    [fix] = quickfixes(analysis, Span(0, len(text)))
+    [fix] = quickfixes(analysis, "t.rlo", span_range(analysis.codec, Span(0, len(text))), ())
 
     assert fix.title == title
-    assert not fix.diagnostic.fixes
-    [edit] = fix.edits
-    mended = translate(Source("t.rlo", apply_edits(text, fix.edits)), cell)
-    assert edit.text in mended.source.text
+    assert not fix.is_preferred
+    assert fix.edit is not None
+    assert fix.edit.changes is not None
+    [edit] = fix.edit.changes["t.rlo"]
+    changed = apply_edits(text, (Edit(span_of(analysis.codec, edit.range), edit.new_text),))
+    mended = translate(Source("t.rlo", changed), cell)
+    assert edit.new_text in mended.source.text
     assert {one.code for one in mended.diagnostics} <= {"E202"}
     assert all_fixes(analysis.compiled.diagnostics) == ()
 
 
 def ask_everything(analysis: Analysis, text: str, offset: int, new: str) -> None:
     """Ask all questions at one place; each gives a sensible answer."""
-    for one in completions(text, analysis, offset):
-        assert one.span.start <= offset == one.span.end
-    signature = signature_at(text, analysis, offset)
-    assert signature is None or all(start < end <= len(signature.label) for start, end in signature.parameters)
-    assert len(line_stretches(analysis, "utf-16")) == len(PositionCodec(analysis.text).starts)
+    codec = PositionCodec(text)
+    for one in completions(codec, analysis, offset, snippets=True):
+        assert isinstance(one.text_edit, lsp.TextEdit)
+        word = span_of(codec, one.text_edit.range)
+        assert word.start <= offset == word.end
+    for signature in getattr(signature_at(text, analysis, offset), "signatures", ()):
+        assert all(one.label[0] < one.label[1] <= len(signature.label) for one in signature.parameters)
+    assert len(line_stretches(analysis)) == len(analysis.codec.starts)
     place = min(offset, len(analysis.text))
-    found = hover(analysis, place)
-    assert found is None or found.span.start <= place <= found.span.end
-    for hint in hints(analysis, Span(0, len(analysis.text))):
-        assert 0 <= hint.place <= len(analysis.text)
-    for entry in outline(analysis):
-        assert entry.span.start <= entry.place.start <= entry.place.end <= entry.span.end
-    assert all(fold.first < fold.last for fold in folds(analysis))
-    quickfixes(analysis, Span(place, place))
+    where = position(analysis.codec, place)
+    found = hover(analysis, place, markdown=True)
+    assert found is None or (found.range is not None and found.range.start <= where <= found.range.end)
+    whole = span_range(analysis.codec, Span(0, len(analysis.text)))
+    for hint in hints(analysis, whole):
+        assert whole.start <= hint.position <= whole.end
+    for symbol in outline(analysis):
+        name = symbol.selection_range
+        assert symbol.range.start <= name.start <= name.end <= symbol.range.end
+    assert all(0 <= fold.start_line < fold.end_line < len(analysis.codec.starts) for fold in folds(analysis))
+    quickfixes(analysis, "test.rlo", lsp.Range(where, where), ())
     apply_edits(analysis.text, all_fixes(analysis.compiled.diagnostics))
     try:
         rename(analysis, place, new)

@@ -5,6 +5,7 @@ from pathlib import Path
 import attrs
 
 from armwright.program.api import compile as compile_program, with_imports
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.language_server.analysis import Analysis
@@ -27,17 +28,17 @@ class Settings:
     strict: bool = False
 
 
-def analyse(name: str, text: str, folder: Path | None, cells: Cells, settings: Settings) -> Analysis:
+def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: Cells, settings: Settings) -> Analysis:
     """Analyse a program with its cell and its imports; intermediate code is not generated.
 
     Args:
         name: the name of the program, as messages show it.
-        text: the text of the program.
+        codec: of the text of the program.
         folder: the folder of the program; None for a text without a file.
         cells: the cells read so far.
         settings: cell, standard and strictness.
     """
-    around = cells.around(folder, text, settings.cell)
+    around = cells.around(folder, codec.text, settings.cell)
     cell = None if around.file is None else around.file.cell
     imports: list[Path] = []
 
@@ -48,7 +49,7 @@ def analyse(name: str, text: str, folder: Path | None, cells: Cells, settings: S
         return imported
 
     compiled = compile_program(
-        Source(name, text),
+        Source(name, codec.text),
         None if cell is None else known_cell(cell),
         strict=settings.strict,
         std=settings.std,
@@ -64,4 +65,4 @@ def analyse(name: str, text: str, folder: Path | None, cells: Cells, settings: S
     frames = None if cell is None else cell.tree()
     if around.file is not None and around.file.cell is cell:
         frames = around.file.frames
-    return Analysis(compiled=compiled, cell=cell, frames=frames, files=lines, problem=around.problem)
+    return Analysis(compiled=compiled, codec=codec, cell=cell, frames=frames, files=lines, problem=around.problem)

@@ -11,6 +11,7 @@ import attrs
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
 from armwright.program.api import Compilation
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.language_server.symbol_index import Extents, Occurrence, extents_of, occurrences
@@ -25,6 +26,7 @@ class Analysis:
 
     Attributes:
         compiled: the translation.
+        codec: of its text.
         cell: what it acts on, with what it imports; None where that is not known.
         frames: the frames of the cell at the start; None without a cell.
         files: where frames and arms are declared, by name: the URI of the file, and the line from 1.
@@ -32,6 +34,7 @@ class Analysis:
     """
 
     compiled: Compilation
+    codec: PositionCodec
     cell: Cell | None = None
     frames: FrameTree | None = None
     files: Mapping[str, tuple[str, int]] = attrs.field(factory=dict)

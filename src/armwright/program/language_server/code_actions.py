@@ -1,17 +1,21 @@
 """Cures of diagnostics as an editor offers them: one at a time where the cursor is, or all that are certain."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import chain
 
 import attrs
+from lsprotocol import types as lsp
 
 from armwright.program.diagnostics.fixes import apart
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.text_edits import Edit
 from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.positions import position, span_of, text_edits
 
+# Of one's own, so that an editor may fix programs when it saves them, and nothing else.
+FIX_ALL = f"{lsp.CodeActionKind.SourceFixAll.value}.armwright"
 # A longer text is not repeated in a title.
 _MAX_SHOWN_LENGTH = 30
 _DID_YOU_MEAN = re.compile(r"did you mean `([A-Za-z][\w-]*)`")
@@ -19,30 +23,60 @@ _DID_YOU_MEAN = re.compile(r"did you mean `([A-Za-z][\w-]*)`")
 _LAST_WORD = re.compile(r"(?<![\w-])[^\W\d_][\w-]*\Z")
 
 
-@attrs.frozen
-class QuickFix:
-    """A cure.
+def code_actions(
+    analysis: Analysis, uri: str, range_: lsp.Range, context: lsp.CodeActionContext
+) -> list[lsp.CodeAction]:
+    """Return the cures that an editor asks for: of what is wrong in a stretch of text, and all that are certain.
 
-    Attributes:
-        title: what it does.
-        edits: how.
-        diagnostic: what it cures.
+    Args:
+        analysis: of the program.
+        uri: of its document.
+        range_: the stretch of text.
+        context: the kinds of cures that are asked for, and the diagnostics that the editor shows.
     """
+    actions = []
+    if _wanted(lsp.CodeActionKind.QuickFix.value, context):
+        actions += quickfixes(analysis, uri, range_, context.diagnostics)
+    certain = all_fixes(analysis.compiled.diagnostics)
+    if certain and _wanted(FIX_ALL, context):
+        edit = _workspace_edit(analysis, uri, certain)
+        actions.append(lsp.CodeAction("fix all that is certain", kind=FIX_ALL, edit=edit))
+    return actions
 
-    title: str
-    edits: tuple[Edit, ...]
-    diagnostic: Diagnostic
+
+def _wanted(kind: str, context: lsp.CodeActionContext) -> bool:
+    """Whether an editor asks for a kind of cures, or for all kinds."""
+    only = context.only
+    prefixes = [prefix.value if isinstance(prefix, lsp.CodeActionKind) else prefix for prefix in only or ()]
+    return only is None or any(f"{kind}.".startswith(f"{prefix}.") for prefix in prefixes)
 
 
-def quickfixes(analysis: Analysis, span: Span) -> tuple[QuickFix, ...]:
+def quickfixes(
+    analysis: Analysis, uri: str, range_: lsp.Range, published: Sequence[lsp.Diagnostic]
+) -> list[lsp.CodeAction]:
     """Return the cures of what is wrong in a stretch of text: those that are certain, and names that were meant."""
-    source = analysis.compiled.source
-    pairs = [(_meant(diagnostic, source), diagnostic) for diagnostic in analysis.compiled.diagnostics]
-    return tuple(
-        QuickFix(_title(cured, source), _edits(cured), diagnostic)
-        for cured, diagnostic in pairs
-        if cured.fixes and any(_touch(part, span) for part in (cured.span, *(fix.span for fix in cured.fixes)))
-    )
+    source, span = analysis.compiled.source, span_of(analysis.codec, range_)
+    actions = []
+    for diagnostic in analysis.compiled.diagnostics:
+        cured = _meant(diagnostic, source)
+        if not any(_touch(part, span) for part in (cured.span, *(fix.span for fix in cured.fixes)) if cured.fixes):
+            continue
+        key = diagnostic.code, position(analysis.codec, diagnostic.span.start)
+        shown = [one for one in published if (one.code, one.range.start) == key]
+        actions.append(
+            lsp.CodeAction(
+                title=_title(cured, source),
+                kind=lsp.CodeActionKind.QuickFix,
+                diagnostics=shown[:1] or None,
+                is_preferred=bool(diagnostic.fixes),
+                edit=_workspace_edit(analysis, uri, _edits(cured)),
+            )
+        )
+    return actions
+
+
+def _workspace_edit(analysis: Analysis, uri: str, edits: Iterable[Edit]) -> lsp.WorkspaceEdit:
+    return lsp.WorkspaceEdit(changes={uri: text_edits(analysis.codec, edits)})
 
 
 def _meant(diagnostic: Diagnostic, source: Source) -> Diagnostic:

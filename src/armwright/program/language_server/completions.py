@@ -4,16 +4,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 
 import attrs
-from lsprotocol.types import CompletionItemKind as Kind
+from lsprotocol.types import CompletionItem, CompletionItemKind as Kind, InsertTextFormat, Range, TextEdit
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
-from armwright.program.language.source import Source, Span
+from armwright.program.language.position_codec import PositionCodec
+from armwright.program.language.source import Source
 from armwright.program.language.units import DECLARABLE
 from armwright.program.language.words import CLOSING, SENSORS, VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Analysis, Before, before
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import explained
+from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import open_call
 from armwright.program.semantics.builtins import AXES, FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
@@ -22,30 +24,7 @@ from armwright.program.syntax.expected_tokens import Expected
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.parser import expected
 
-
-@attrs.frozen
-class Completion:
-    """One thing that can be written.
-
-    Attributes:
-        label: how it is shown.
-        text: what is written; in a snippet ``${1:name}`` are the places to fill in, in order.
-        kind: what it is.
-        span: what it takes the place of.
-        detail: what it is, in a word or two.
-        documentation: what it does.
-        snippet: whether the text has places to fill in.
-    """
-
-    label: str
-    text: str
-    kind: Kind
-    span: Span
-    detail: str = ""
-    documentation: str = ""
-    snippet: bool = False
-
-
+# Whole statements; ``${1:name}`` are the parts to fill in, in order.
 _MOVE_WITH = "MOVE ${1:ARM_1} TO ${2:goal} WITH APPROACH = ${3:above} ;"
 _SNIPPETS = {
     "MOVE": (("MOVE ... WITH APPROACH", _MOVE_WITH), ("MOVE ... TO", "MOVE ${1:ARM_1} TO ${2:goal} ;")),
@@ -140,15 +119,23 @@ _TAKEN: Mapping[str, _Operand] = {
 }
 
 
-def completions(text: str, analysis: Analysis, offset: int) -> list[Completion]:
-    """Return what can be written at a place, the likeliest first: what the parser would accept there.
+def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippets: bool) -> list[CompletionItem]:
+    """Return what can be written at a position, the likeliest first: what the parser would accept there.
 
     Args:
-        text: the program as it is now.
+        codec: of the program as it is now.
         analysis: of the program, or of what it was before, for its names.
-        offset: the place.
+        offset: the position.
+        snippets: whether the editor leads from part to part of what is to be filled in.
     """
-    compiled = analysis.compiled
+    items = _items(codec, analysis, offset, snippets=snippets)
+    for number, item in enumerate(items):
+        item.sort_text = f"{number:04d}"
+    return items
+
+
+def _items(codec: PositionCodec, analysis: Analysis, offset: int, *, snippets: bool) -> list[CompletionItem]:
+    text, compiled = codec.text, analysis.compiled
     around = before(text, offset, compiled.standard)
     if around is None:
         return []
@@ -156,8 +143,9 @@ def completions(text: str, analysis: Analysis, offset: int) -> list[Completion]:
     source = Source(compiled.source.name, text)
     expectation = expected(source, (*around.tokens, end), compiled.standard, declared=compiled.symbols.types)
     procedure = expectation.procedure if expectation.procedure in compiled.symbols.procedures else None
-    maker = _Maker(analysis, around.word, compiled.symbols.scope(procedure))
-    operand = _NOTHING if expectation.operand is None else _operand(expectation, around.tokens, maker.scope)
+    scope = compiled.symbols.scope(procedure)
+    maker = _Maker(analysis, span_range(codec, around.word), scope, snippets=snippets)
+    operand = _NOTHING if expectation.operand is None else _operand(expectation, around.tokens, scope)
     words = (*operand.words, *_words(expectation, around, compiled.standard))
     if not expectation.starts:
         operands = [*maker.arms(operand), *maker.names(operand.kinds), *maker.devices(operand)]
@@ -225,20 +213,32 @@ _STOPS = frozenset((*VOCABULARIES[Standard.RLO_2].closing, *VOCABULARIES[Standar
 
 
 class _Maker:
-    """Makes completions for one place."""
+    """Makes completions for one position."""
 
-    def __init__(self, analysis: Analysis, span: Span, scope: Scope) -> None:
-        self.scope = scope
-        self._analysis, self._span, self._lower = analysis, span, analysis.lower
+    def __init__(self, analysis: Analysis, word: Range, scope: Scope, *, snippets: bool) -> None:
+        self._analysis, self._word, self._scope, self._snippets = analysis, word, scope, snippets
 
-    def _offer(self, label: str, kind: Kind, text: str = "", detail: str = "", documentation: str = "") -> Completion:
-        return Completion(label, text or label, kind, self._span, detail, documentation, "$" in text)
+    def _item(
+        self, label: str, kind: Kind, text: str = "", detail: str = "", documentation: str = ""
+    ) -> CompletionItem:
+        """Return one thing that can be written; a text with parts to fill in is a snippet."""
+        is_snippet = "$" in text
+        return CompletionItem(
+            label=label,
+            kind=kind,
+            detail=detail or None,
+            documentation=documentation or None,
+            insert_text_format=InsertTextFormat.Snippet
+            if is_snippet and self._snippets
+            else InsertTextFormat.PlainText,
+            text_edit=TextEdit(self._word, label if is_snippet and not self._snippets else text or label),
+        )
 
     def _cased(self, text: str) -> str:
         """Return words of the language as this program writes them; names to be filled in are lower case anyway."""
-        return text.lower() if self._lower else text
+        return text.lower() if self._analysis.lower else text
 
-    def words(self, words: Iterable[str], *, starts: bool = False) -> Iterator[Completion]:
+    def words(self, words: Iterable[str], *, starts: bool = False) -> Iterator[CompletionItem]:
         """Give words of the language and, where a statement starts, statements that begin with them."""
         for word in words:
             last = word.rpartition(" ")[2]
@@ -247,13 +247,13 @@ class _Maker:
             written = _GOES_ON.get(last, "")
             written = (f"WITH {written}" if word != last else written) if written else ""
             kind = Kind.TypeParameter if word in _TYPES else Kind.Keyword
-            yield self._offer(self._cased(word), kind, self._cased(written or word), form, text)
-            for label, snippet in _SNIPPETS.get(word, ()) if starts else ():
-                yield self._offer(self._cased(label), Kind.Snippet, self._cased(snippet), form, text)
+            yield self._item(self._cased(word), kind, self._cased(written or word), form, text)
+            for label, snippet in _SNIPPETS.get(word, ()) if starts and self._snippets else ():
+                yield self._item(self._cased(label), Kind.Snippet, self._cased(snippet), form, text)
 
-    def names(self, kinds: frozenset[VariableKind], *, starts: bool = False) -> Iterator[Completion]:
+    def names(self, kinds: frozenset[VariableKind], *, starts: bool = False) -> Iterator[CompletionItem]:
         """Give the variables that can be seen and are of the right kind."""
-        symbols, local = self.scope.symbols, self.scope.procedure
+        symbols, local = self._scope.symbols, self._scope.procedure
         own = {} if local is None else local.types
         others = [(key, kind) for key, kind in symbols.types.items() if key not in own]
         # What the program declares comes before what there is without it.
@@ -261,21 +261,21 @@ class _Maker:
         for key, kind in (*own.items(), *others):
             if kind is None or kind.kind not in kinds or (starts and key == WORLD):
                 continue
-            declared = self.scope.declared(key)
+            declared = self._scope.declared(key)
             name = declared.text if declared else self._cased(key)
             where = "predeclared" if declared is None and key in PREDECLARED else "imported" if declared is None else ""
             where = f"of {local.node.name.text}" if local is not None and key in own else where
             text = f"{name}[${{1:1}}]" if kind.sizes else name
             item, detail = _KINDS.get(kind.kind, Kind.Variable), f"{kind} {where}".rstrip()
-            yield self._offer(name, item, text, detail, self._parent(key, kind))
+            yield self._item(name, item, text, detail, self._parent(key, kind))
 
     def _parent(self, key: str, kind: VariableType) -> str:
         frames = self._analysis.frames
-        if kind != VariableType(VariableKind.FRAME) or frames is None or key not in frames or self.scope.is_local(key):
+        if kind != VariableType(VariableKind.FRAME) or frames is None or key not in frames or self._scope.is_local(key):
             return ""
         return f"hangs on {frames.parent(key)} in the cell"
 
-    def arms(self, operand: _Operand) -> Iterator[Completion]:
+    def arms(self, operand: _Operand) -> Iterator[CompletionItem]:
         """Give the arms of the cell, or those of the program where there is none."""
         if not operand.arms:
             return
@@ -283,24 +283,24 @@ class _Maker:
         used = dict.fromkeys(("ARM_1", *filter(is_arm, self._analysis.by_key)), "arm")
         arms = used if cell is None else {name: arm.arm.name for name, arm in cell.arms.items()}
         for name in sorted(arms):
-            yield self._offer(name, Kind.Constant, "", arms[name])
+            yield self._item(name, Kind.Constant, "", arms[name])
 
-    def devices(self, operand: _Operand) -> Iterator[Completion]:
+    def devices(self, operand: _Operand) -> Iterator[CompletionItem]:
         """Give the devices of the cell."""
         if operand.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):
-                yield self._offer(self._cased(name), Kind.Property, "", "device")
+                yield self._item(self._cased(name), Kind.Property, "", "device")
 
-    def functions(self, operand: _Operand) -> Iterator[Completion]:
+    def functions(self, operand: _Operand) -> Iterator[CompletionItem]:
         """Give functions of the language, which RLO-83 has none of."""
         for name in operand.functions if self._analysis.compiled.standard is Standard.RLO_2 else ():
             meaning = explained(name)
             form, text = (meaning.form, meaning.text) if meaning else ("", "")
-            yield self._offer(self._cased(name), Kind.Function, f"{self._cased(name)}($1)", form, text)
+            yield self._item(self._cased(name), Kind.Function, f"{self._cased(name)}($1)", form, text)
 
-    def procedures(self) -> Iterator[Completion]:
+    def procedures(self) -> Iterator[CompletionItem]:
         """Give the procedures of the program."""
-        for procedure in self.scope.symbols.procedures.values():
+        for procedure in self._scope.symbols.procedures.values():
             name = procedure.node.name.text
             text = f"{name}($1) ;" if procedure.parameters else f"{name}() ;"
-            yield self._offer(name, Kind.Function, text, signature(procedure.node)[0])
+            yield self._item(name, Kind.Function, text, signature(procedure.node)[0])

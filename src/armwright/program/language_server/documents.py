@@ -11,8 +11,7 @@ from pygls.uris import to_fs_path
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language_server.analysis import Analysis
-from armwright.program.language_server.lsp_types import span_of
-from armwright.program.language_server.semantic_tokens import Stretch, line_stretches
+from armwright.program.language_server.positions import span_of
 
 # How many lines a program may have that is analysed at every change.
 SHORT_LINES = 2000
@@ -43,7 +42,6 @@ class Document:
         self._analyse = analyse
         self._timer: asyncio.TimerHandle | None = None
         self._analysed = asyncio.Event()
-        self._stretches: tuple[Analysis, list[list[Stretch]]] | None = None
         self.outdate()
 
     @property
@@ -95,13 +93,6 @@ class Document:
         if not self.is_short:
             await self._analysed.wait()
         return self.last if self.last is not None and self._analysed.is_set() else self.analyse()
-
-    async def stretches(self) -> list[list[Stretch]]:
-        """Return the coloured stretches of each line."""
-        analysis = await self.analysis()
-        if self._stretches is None or self._stretches[0] is not analysis:
-            self._stretches = analysis, line_stretches(analysis, self.codec.encoding)
-        return self._stretches[1]
 
     def _stop_timer(self) -> None:
         if self._timer is not None:

@@ -1,15 +1,18 @@
 """What there is to say about a place of a program: names with their types and poses, words, numbers with units."""
 
-import attrs
+from collections.abc import Sequence
+from typing import TypeAlias
+
+from lsprotocol import types as lsp
 
 from armwright.arrays import Array
 from armwright.cell.model import base_name
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
-from armwright.program.language.source import Span
 from armwright.program.language.units import UNITS, UnitSystem, convert, dimension
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.keyword_docs import explained
+from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.symbol_index import Occurrence, What
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
@@ -21,35 +24,38 @@ from armwright.program.vm.value_text import shown
 _STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE"))
 
 
-@attrs.frozen
-class Hover:
-    """What to say of a stretch of text.
+# What something is, as the language would write it; and what there is to say about it, a sentence or fact each.
+_Description: TypeAlias = tuple[str, Sequence[str]]
 
-    Attributes:
-        span: the stretch.
-        code: what it is, as the language would write it.
-        lines: more, a sentence or fact each.
+
+def hover(analysis: Analysis, offset: int, *, markdown: bool) -> lsp.Hover | None:
+    """Return what there is to say about a position; None where there is nothing.
+
+    Args:
+        analysis: of the program.
+        offset: the position.
+        markdown: whether the editor shows Markdown.
     """
-
-    span: Span
-    code: str
-    lines: tuple[str, ...] = ()
-
-
-def hover(analysis: Analysis, offset: int) -> Hover | None:
-    """Return what there is to say about a place; None where there is nothing."""
-    occurrence = analysis.at(offset)
-    if occurrence is not None:
-        return _of_name(analysis, occurrence)
-    token = analysis.token_at(offset)
-    if token is None:
+    item = analysis.at(offset) or analysis.token_at(offset)
+    if item is None:
         return None
+    described = _of_name(analysis, item) if isinstance(item, Occurrence) else _of_token(analysis, item)
+    if described is None:
+        return None
+    code, lines = described
+    if markdown:
+        content = lsp.MarkupContent(lsp.MarkupKind.Markdown, "\n\n".join((f"```rlo\n{code}\n```", *lines)))
+    else:
+        content = lsp.MarkupContent(lsp.MarkupKind.PlainText, "\n".join((code, *lines)).replace("`", ""))
+    return lsp.Hover(content, span_range(analysis.codec, item.span))
+
+
+def _of_token(analysis: Analysis, token: Token) -> _Description | None:
+    """Return what there is to say about a word of the language or a number with a unit."""
     if token.kind is TokenKind.NUMBER:
         return _of_number(token, analysis.compiled.symbols.units)
-    if token.kind is not TokenKind.KEYWORD:
-        return None
-    word = explained(token.key, _statement(analysis, token))
-    return None if word is None else Hover(token.span, word.form, (word.text,))
+    word = explained(token.key, _statement(analysis, token)) if token.kind is TokenKind.KEYWORD else None
+    return None if word is None else (word.form, [word.text])
 
 
 def signature(procedure: tree.Procedure) -> tuple[str, tuple[tuple[int, int], ...]]:
@@ -85,36 +91,29 @@ def _statement(analysis: Analysis, token: Token) -> str:
 # ---- names ---------------------------------------------------------------------------------------------------------
 
 
-def _of_name(analysis: Analysis, occurrence: Occurrence) -> Hover | None:
-    text = analysis.text[occurrence.start : occurrence.end]
+def _of_name(analysis: Analysis, occurrence: Occurrence) -> _Description | None:
+    key, text = occurrence.key, analysis.text[occurrence.start : occurrence.end]
+    entry: _Description | None = None
     match occurrence.what:
         case What.VARIABLE:
-            entry: tuple[str, list[str]] | None = _variable(analysis, occurrence, text)
+            entry = _variable(analysis, occurrence, text)
         case What.ARM:
-            entry = f"{occurrence.key} : FRAME", _arm(analysis, occurrence.key)
+            entry = f"{key} : FRAME", _arm(analysis, key)
         case What.PROCEDURE:
-            entry = _procedure(analysis, occurrence.key)
+            entry = _procedure(analysis, key)
         case What.DEVICE:
-            entry = text, [_device(analysis, occurrence.key)]
-        case What.UNIT:
-            entry = (occurrence.key, [f"a unit of {dimension(occurrence.key)}"]) if occurrence.key in UNITS else None
+            entry = text, [_device(analysis, key)]
+        case What.UNIT if key in UNITS:
+            entry = key, [f"a unit of {dimension(key)}"]
         case What.AXIS:
-            entry = occurrence.key, [f"the {occurrence.key.lower()} axis"]
-        case _:
-            entry = _word(occurrence)
-    return None if entry is None else Hover(occurrence.span, entry[0], tuple(entry[1]))
+            entry = key, [f"the {key.lower()} axis"]
+        case What.FUNCTION | What.SENSOR if (word := explained(key)) is not None:
+            value = f" : {FUNCTIONS[key].gives.name}" if occurrence.what is What.FUNCTION else ""
+            entry = word.form + value, [word.text]
+    return entry
 
 
-def _word(occurrence: Occurrence) -> tuple[str, list[str]] | None:
-    """Return what there is to say about a function of the language, or a word that is one only here."""
-    word = explained(occurrence.key) if occurrence.what in (What.FUNCTION, What.SENSOR) else None
-    if word is None:
-        return None
-    gives = f" : {FUNCTIONS[occurrence.key].gives.name}" if occurrence.what is What.FUNCTION else ""
-    return word.form + gives, [word.text]
-
-
-def _procedure(analysis: Analysis, key: str) -> tuple[str, list[str]] | None:
+def _procedure(analysis: Analysis, key: str) -> _Description | None:
     procedure = analysis.compiled.symbols.procedures.get(key)
     if procedure is None:
         return None
@@ -122,7 +121,7 @@ def _procedure(analysis: Analysis, key: str) -> tuple[str, list[str]] | None:
     return signature(procedure.node)[0], [f"declared in line {line}"]
 
 
-def _variable(analysis: Analysis, occurrence: Occurrence, text: str) -> tuple[str, list[str]]:
+def _variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:
     symbols = analysis.compiled.symbols
     declared = analysis.declaration(occurrence)
     code = f"{declared.text if declared else text} : {occurrence.type or 'of a type that is wrong'}"
@@ -198,11 +197,11 @@ def pose_text(X: Array, units: UnitSystem) -> str:
 # ---- numbers -------------------------------------------------------------------------------------------------------
 
 
-def _of_number(token: Token, units: UnitSystem) -> Hover | None:
+def _of_number(token: Token, units: UnitSystem) -> _Description | None:
     """Return what a number with a unit is worth in the program."""
     unit = token.text[len(token.key) :].upper()
     if unit not in UNITS or token.damaged:
         return None
     value = convert(float(token.key), unit, units)
     own = {"length": units.length.lower(), "angle": units.angle.lower(), "time": "s", "force": "N"}[dimension(unit)]
-    return Hover(token.span, f"{token.text} = {value:.12g} {own}", (f"a {dimension(unit)} in the unit of the program",))
+    return f"{token.text} = {value:.12g} {own}", [f"a {dimension(unit)} in the unit of the program"]

@@ -2,49 +2,33 @@
 
 from bisect import bisect_left
 from collections.abc import Iterator
+from itertools import takewhile
 
-import attrs
+from lsprotocol import types as lsp
 
 from armwright.program.bytecode.instructions import stages_text
 from armwright.program.bytecode.move import form_of
 from armwright.program.language.names import is_arm
-from armwright.program.language.source import Span
 from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.positions import offset_of, position
 from armwright.program.syntax import tree
 
 # A statement that starts further in front of a place does not reach it.
 _REACH = 4000
 
 
-@attrs.frozen
-class Hint:
-    """Words that stand at a place without being written there.
-
-    Attributes:
-        place: where.
-        text: the words.
-        tooltip: what they mean.
-        parameter: whether they name what follows, and do not add to what is in front.
-    """
-
-    place: int
-    text: str
-    tooltip: str
-    parameter: bool = False
-
-
-def hints(analysis: Analysis, span: Span) -> tuple[Hint, ...]:
+def hints(analysis: Analysis, within: lsp.Range) -> list[lsp.InlayHint]:
     """Return the words that belong to a stretch of text, in order."""
     statements = analysis.statements
-    index = bisect_left(statements, span.start - _REACH, key=lambda statement: statement.span.start)
-    result: list[Hint] = []
-    while index < len(statements) and statements[index].span.start <= span.end:
-        result += _of(analysis, statements[index])
-        index += 1
-    return tuple(sorted((hint for hint in result if span.start <= hint.place <= span.end), key=lambda hint: hint.place))
+    start, end = offset_of(analysis.codec, within.start), offset_of(analysis.codec, within.end)
+    first = bisect_left(statements, start - _REACH, key=lambda statement: statement.span.start)
+    near = takewhile(lambda statement: statement.span.start <= end, statements[first:])
+    found = [hint for statement in near for hint in _of(analysis, statement)]
+    own = (hint for hint in found if within.start <= hint.position <= within.end)
+    return sorted(own, key=lambda hint: (hint.position.line, hint.position.character))
 
 
-def _of(analysis: Analysis, statement: tree.Move | tree.Call | tree.Grasp) -> Iterator[Hint]:
+def _of(analysis: Analysis, statement: tree.Move | tree.Call | tree.Grasp) -> Iterator[lsp.InlayHint]:
     match statement:
         case tree.Move():
             yield from _move(analysis, statement)
@@ -52,12 +36,24 @@ def _of(analysis: Analysis, statement: tree.Move | tree.Call | tree.Grasp) -> It
             flow = analysis.compiled.flow
             arm = None if flow is None else flow.arms.get(statement.span.start)
             if arm:
-                yield Hint(statement.span.end, arm, "the arm that was named or moved last")
+                yield _hint(analysis, statement.span.end, arm, "the arm that was named or moved last")
         case tree.Call():
             yield from _call(analysis, statement)
 
 
-def _move(analysis: Analysis, move: tree.Move) -> Iterator[Hint]:
+def _hint(analysis: Analysis, offset: int, text: str, tooltip: str, *, names_parameter: bool = False) -> lsp.InlayHint:
+    """Return words that name what follows them, or else add to what is in front."""
+    return lsp.InlayHint(
+        position=position(analysis.codec, offset),
+        label=text,
+        kind=lsp.InlayHintKind.Parameter if names_parameter else lsp.InlayHintKind.Type,
+        tooltip=tooltip,
+        padding_left=not names_parameter,
+        padding_right=names_parameter,
+    )
+
+
+def _move(analysis: Analysis, move: tree.Move) -> Iterator[lsp.InlayHint]:
     if isinstance(move.moved, tree.Poison) or any(isinstance(node, tree.Poison) for node in tree.walk(move)):
         return
     source, flow = analysis.compiled.source, analysis.compiled.flow
@@ -68,10 +64,10 @@ def _move(analysis: Analysis, move: tree.Move) -> Iterator[Hint]:
         text = f"{arm}: {text}"
     if flow is not None and move.span.start in flow.implied:
         tooltip += "; the frame is hung on the arm first, as if by AFFIX"
-    yield Hint(move.span.end, text, tooltip)
+    yield _hint(analysis, move.span.end, text, tooltip)
 
 
-def _call(analysis: Analysis, call: tree.Call) -> Iterator[Hint]:
+def _call(analysis: Analysis, call: tree.Call) -> Iterator[lsp.InlayHint]:
     procedure = analysis.compiled.symbols.procedures.get(call.name.key)
     if procedure is None:
         return
@@ -80,5 +76,5 @@ def _call(analysis: Analysis, call: tree.Call) -> Iterator[Hint]:
         # An argument that reads like its parameter needs no word.
         if isinstance(argument, tree.Poison) or (isinstance(argument, tree.Name) and argument.key == name.key):
             continue
-        kind = procedure.types.get(name.key)
-        yield Hint(argument.span.start, f"{name.text}:", f"parameter {name.text}: {kind}", parameter=True)
+        tooltip = f"parameter {name.text}: {procedure.types.get(name.key)}"
+        yield _hint(analysis, argument.span.start, f"{name.text}:", tooltip, names_parameter=True)

@@ -1,151 +1,127 @@
 """The shape of a program: what it declares, and what can be folded away."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from typing import TypeAlias
 
-import attrs
-from lsprotocol.types import SymbolKind
+from lsprotocol.types import DocumentSymbol, FoldingRange, FoldingRangeKind, SymbolKind
 
 from armwright.program.language.kinds import VariableKind, VariableType
-from armwright.program.language.source import Source, Span
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.hover import signature
+from armwright.program.language_server.positions import span_range
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
-
-
-@attrs.frozen
-class Entry:
-    """Something that a program declares.
-
-    Attributes:
-        name: as declared.
-        kind: what it is.
-        detail: its type or parameters.
-        span: all of it.
-        place: its name.
-        inside: what it declares in turn.
-    """
-
-    name: str
-    kind: SymbolKind
-    detail: str
-    span: Span
-    place: Span
-    inside: tuple["Entry", ...] = ()
-
 
 _KINDS = {VariableKind.FRAME: SymbolKind.Struct, VariableKind.EVENT: SymbolKind.Event}
 
 
-def outline(analysis: Analysis) -> tuple[Entry, ...]:
+def outline(analysis: Analysis) -> list[DocumentSymbol]:
     """Return what a program declares, in the order of the text."""
-    symbols = analysis.compiled.symbols
-    entries: list[Entry] = []
+    symbols, codec = analysis.compiled.symbols, analysis.codec
+    declared: list[DocumentSymbol] = []
     for header in analysis.compiled.tree.headers:
         if isinstance(header, tree.Declaration):
-            entries += _variables(header, symbols.types)
+            declared += _variables(codec, header, symbols.types)
         elif isinstance(header, tree.Procedure):
             own = symbols.procedures.get(header.name.key)
             types = {} if own is None else own.types
-            inside = [entry for part in header.parameters for entry in _variables(part, types, parameter=True)]
-            inside += [entry for part in header.declarations for entry in _variables(part, types)]
+            children = [
+                symbol for part in header.parameters for symbol in _variables(codec, part, types, parameters=True)
+            ]
+            children += [symbol for part in header.declarations for symbol in _variables(codec, part, types)]
+            whole, name = span_range(codec, header.span), span_range(codec, header.name.span)
+            # A name that is missing may stand anywhere.
+            name = name if whole.start <= name.start and name.end <= whole.end else whole
             _, opening, parameters = signature(header)[0].partition("(")
-            name = _within(header.name.span, header.span)
-            kind, detail = SymbolKind.Function, opening + parameters
-            entries.append(Entry(header.name.text, kind, detail, header.span, name, tuple(inside)))
-    return tuple(sorted(entries, key=lambda entry: entry.span.start))
+            detail = opening + parameters or None
+            symbol = DocumentSymbol(header.name.text or "?", SymbolKind.Function, whole, name, detail)
+            symbol.children = children or None
+            declared.append(symbol)
+    return sorted(declared, key=lambda symbol: (symbol.range.start.line, symbol.range.start.character))
 
 
 def _variables(
-    declaration: tree.Declaration, types: Mapping[str, VariableType | None], *, parameter: bool = False
-) -> list[Entry]:
-    entries = []
+    codec: PositionCodec,
+    declaration: tree.Declaration,
+    types: Mapping[str, VariableType | None],
+    *,
+    parameters: bool = False,
+) -> Iterator[DocumentSymbol]:
     for name in declaration.names:
         type_, kind = types.get(name.key), SymbolKind.Variable
-        if type_ is not None and not parameter:
+        if type_ is not None and not parameters:
             kind = SymbolKind.Array if type_.sizes else _KINDS.get(type_.kind, kind)
         detail = declaration.type.text if type_ is None else str(type_)
-        entries.append(Entry(name.text, kind, detail, name.span, name.span))
-    return entries
+        where = span_range(codec, name.span)
+        yield DocumentSymbol(name.text or "?", kind, where, where, detail or None)
 
 
-def _within(inner: Span, outer: Span) -> Span:
-    """Return a span that is not outside of another: a name that is missing may stand anywhere."""
-    return inner if outer.start <= inner.start and inner.end <= outer.end else outer
+# ---- folding -------------------------------------------------------------------------------------------------------
 
-
-@attrs.frozen
-class Fold:
-    """Lines that can be folded away, from 1, both included; of comments or of the program."""
-
-    first: int
-    last: int
-    comment: bool = False
-
-
+# The first and the last line of a stretch, from 0.
+_Lines: TypeAlias = tuple[int, int]
 _OPENING = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
 _CLOSING = frozenset(("END", "COEND", "UNTIL"))
 
 
-def folds(analysis: Analysis) -> tuple[Fold, ...]:
+def folds(analysis: Analysis) -> list[FoldingRange]:
     """Return what can be folded away: blocks, declarations, statements and comments of several lines."""
-    source, tokens = analysis.compiled.source, analysis.compiled.tokens
-    found = {*_blocks(source, tokens), *_parts(source, tokens), *_comments(source, analysis.compiled.comments)}
-    for statement in analysis.statements:
-        found.add(Fold(source.line(statement.span.start), source.line(statement.span.end)))
-    longest: dict[int, Fold] = {}
-    for fold in found:
-        if fold.last > fold.first and fold.last > longest.get(fold.first, Fold(0, 0)).last:
-            longest[fold.first] = fold
-    return tuple(longest[first] for first in sorted(longest))
+    line_of = analysis.codec.line_of
+    comments = _comments(analysis)
+    stretches = {*_blocks(analysis), *_parts(analysis), *comments}
+    stretches |= {(line_of(node.span.start), line_of(node.span.end)) for node in analysis.statements}
+    # Of those that begin in one line the longest comes last.
+    longest = dict(sorted(stretches))
+    kinds = dict.fromkeys(comments, FoldingRangeKind.Comment)
+    return [FoldingRange(*lines, kind=kinds.get(lines)) for lines in longest.items() if lines[0] < lines[1]]
 
 
-def _blocks(source: Source, tokens: Sequence[Token]) -> list[Fold]:
-    found, opened = [], []
-    for token in tokens:
+def _blocks(analysis: Analysis) -> Iterator[_Lines]:
+    line_of, opened = analysis.codec.line_of, []
+    for token in analysis.compiled.tokens:
         if token.kind is not TokenKind.KEYWORD:
             continue
         if token.key in _OPENING:
             opened.append(token)
         elif token.key == "RECOVER" and opened:
-            found.append(Fold(source.line(opened.pop().start), source.line(token.start) - 1))
+            yield line_of(opened.pop().start), line_of(token.start) - 1
             opened.append(token)
         elif token.key in _CLOSING and opened:
-            found.append(Fold(source.line(opened.pop().start), source.line(token.end)))
-    return found
+            yield line_of(opened.pop().start), line_of(token.end)
 
 
-def _parts(source: Source, tokens: Sequence[Token]) -> list[Fold]:
-    """Return VAR parts and procedures."""
-    found = []
+def _parts(analysis: Analysis) -> Iterator[_Lines]:
+    """Give VAR parts and procedures."""
+    line_of = analysis.codec.line_of
     part: Token | None = None
     head: Token | None = None
     depth = 0
-    for before, token in pairwise(tokens):
+    for before, token in pairwise(analysis.compiled.tokens):
         if token.kind is not TokenKind.KEYWORD and before.kind is not TokenKind.KEYWORD:
             continue
         if part is not None and token.key in ("VAR", "BEGIN", "PROCEDURE", "IMPORT", "UNITS"):
-            found.append(Fold(source.line(part.start), source.line(before.end)))
+            yield line_of(part.start), line_of(before.end)
             part = None
         part = before if before.key == "VAR" else part
         if before.key == "PROCEDURE" and depth == 0:
             head = before
         depth += (before.key in _OPENING) - (before.key in _CLOSING)
         if before.key == "END" and depth <= 0 and head is not None:
-            found.append(Fold(source.line(head.start), source.line(before.end)))
+            yield line_of(head.start), line_of(before.end)
             head = None
-    return found
 
 
-def _comments(source: Source, comments: Sequence[Span]) -> list[Fold]:
-    found: list[Fold] = []
-    for comment in comments:
-        fold = Fold(source.line(comment.start), source.line(comment.end), comment=True)
-        alone = source.text[source.line_starts[fold.first - 1] : comment.start].isspace()
-        alone = alone or source.column(comment.start) == 1
-        if found and alone and found[-1].last + 1 == fold.first:
-            fold = Fold(found.pop().first, fold.last, comment=True)
-        if alone or fold.last > fold.first:
-            found.append(fold)
-    return found
+def _comments(analysis: Analysis) -> list[_Lines]:
+    """Return the lines of comments, those that follow one another together."""
+    line_of, source = analysis.codec.line_of, analysis.compiled.source
+    comments: list[_Lines] = []
+    for comment in analysis.compiled.comments:
+        first, last = line_of(comment.start), line_of(comment.end)
+        alone = not source.text[source.line_starts[first] : comment.start].strip()
+        if comments and alone and comments[-1][1] + 1 == first:
+            first, _ = comments.pop()
+        if alone or last > first:
+            comments.append((first, last))
+    return comments

@@ -1,6 +1,7 @@
 """Colours by meaning: what each word of a program is, line by line, so that only lines that differ are sent again."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.position_codec import PositionCodec
@@ -33,10 +34,11 @@ _WHATS = {
 Stretch = tuple[int, int, int, int]
 
 
-def line_stretches(analysis: Analysis, encoding: str) -> list[list[Stretch]]:
+# An editor asks for the colours of what it shows and for those of the whole, of the same text.
+@lru_cache(maxsize=4)
+def line_stretches(analysis: Analysis) -> list[list[Stretch]]:
     """Return the coloured stretches of each line of a program."""
-    codec = PositionCodec(analysis.text, encoding)
-    compiled = analysis.compiled
+    codec, compiled = analysis.codec, analysis.compiled
     lines: list[list[Stretch]] = [[] for _ in codec.starts]
     _put(lines, codec, analysis)
     for comment in compiled.comments:

@@ -17,12 +17,13 @@ from pygls.uris import to_fs_path
 from armwright.errors import InvalidValueError
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.words import Standard
-from armwright.program.language_server import lsp_types
 from armwright.program.language_server.analyse import Settings, analyse
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.cell_lookup import Cells
+from armwright.program.language_server.diagnostics import diagnostics
 from armwright.program.language_server.documents import Document
 from armwright.program.language_server.message_limits import Incoming
+from armwright.program.language_server.positions import offset_of
 from armwright.version import __version__
 
 SECTION = "armwright"
@@ -97,6 +98,23 @@ class RloServer(LanguageServer):
         except KeyError:
             raise refusal(f"{uri} is not open") from None
 
+    async def analysis(self, document: lsp.TextDocumentIdentifier) -> Analysis:
+        """Return the analysis of an open document as it is now.
+
+        Raises:
+            JsonRpcException: it is not open.
+        """
+        return await self.document(document.uri).analysis()
+
+    async def located(self, document: lsp.TextDocumentIdentifier, where: lsp.Position) -> tuple[Analysis, int]:
+        """Return the analysis of an open document, and the offset of a position in it.
+
+        Raises:
+            JsonRpcException: it is not open.
+        """
+        analysis = await self.analysis(document)
+        return analysis, offset_of(analysis.codec, where)
+
     def outdate(self) -> None:
         """Take the analyses of all documents for old: what they depend on has changed."""
         for document in self.documents.values():
@@ -112,17 +130,17 @@ class RloServer(LanguageServer):
         """Analyse a document as it is now, and tell the editor what is wrong with it."""
         folder = None if document.path is None else document.path.parent
         try:
-            analysis = analyse(document.name, document.text, folder, self.cells, self.settings)
+            analysis = analyse(document.name, document.codec, folder, self.cells, self.settings)
         except Exception as error:  # noqa: BLE001 - a conversation goes on, whatever happens in it
             text = f"armwright: this should not happen: {type(error).__name__}: {error}"
             self.window_log_message(lsp.LogMessageParams(lsp.MessageType.Error, text))
             # Of a program without words nothing is known, and nothing is wrong with what is known.
-            return analyse(document.name, "", None, self.cells, Settings())
+            return analyse(document.name, PositionCodec("", self.encoding), None, self.cells, Settings())
         if self.documents.get(document.uri, document) is not document:
             return analysis
         related = bool(self.can("text_document", "publish_diagnostics", "related_information"))
-        diagnostics = lsp_types.diagnostics(analysis, document.codec, document.uri, related=related)
-        params = lsp.PublishDiagnosticsParams(document.uri, diagnostics, document.version)
+        published = diagnostics(analysis, document.uri, related=related)
+        params = lsp.PublishDiagnosticsParams(document.uri, published, document.version)
         self.text_document_publish_diagnostics(params)
         if analysis.problem and analysis.problem != self._last_problem:
             self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {analysis.problem}"))

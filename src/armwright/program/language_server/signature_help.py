@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-import attrs
+from lsprotocol import types as lsp
 
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language_server.analysis import Analysis, before
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import explained
 from armwright.program.semantics.builtins import FUNCTIONS
-from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
 
 _TAKES = {
@@ -20,45 +20,32 @@ _TAKES = {
 }
 
 
-@attrs.frozen
-class Signature:
-    """What a procedure or function takes.
-
-    Attributes:
-        label: its head.
-        parameters: what it takes, each a part of the label: its first character and the one after its last.
-        active: which of them is being written.
-        text: what it does; empty for procedures.
-    """
-
-    label: str
-    parameters: tuple[tuple[int, int], ...]
-    active: int
-    text: str = ""
-
-
-def signature_at(text: str, analysis: Analysis, offset: int) -> Signature | None:
-    """Return what the call takes whose arguments are being written at a place; None where there is none.
+def signature_at(text: str, analysis: Analysis, offset: int) -> lsp.SignatureHelp | None:
+    """Return what the call takes whose arguments are being written at a position; None where there is none.
 
     Args:
         text: the program as it is now.
         analysis: of the program, or of what it was before.
-        offset: the place.
+        offset: the position.
     """
     around = before(text, offset, analysis.compiled.standard)
-    found = None if around is None else open_call(around.tokens)
-    if found is None:
+    call = None if around is None else open_call(around.tokens)
+    if call is None:
         return None
-    name, active = found
-    procedure = analysis.compiled.symbols.procedures.get(name.key)
+    name, argument = call
+    procedure, meaning = analysis.compiled.symbols.procedures.get(name.key), None
     if procedure is not None:
-        return _of_procedure(procedure.node, active)
-    word = explained(name.key) if name.key in FUNCTIONS else None
-    if word is None:
+        label, parameters = signature(procedure.node)
+    elif name.key in FUNCTIONS and (word := explained(name.key)) is not None:
+        takes, meaning = _TAKES[name.key], word.text
+        label = f"{name.key} ({', '.join(takes)}) : {FUNCTIONS[name.key].gives.name}"
+        parameters = _places(label, takes)
+    else:
         return None
-    takes = _TAKES[name.key]
-    label = f"{name.key} ({', '.join(takes)}) : {FUNCTIONS[name.key].gives.name}"
-    return Signature(label, _places(label, takes), min(active, len(takes) - 1), word.text)
+    codec = PositionCodec(label, analysis.codec.encoding)
+    columns = [lsp.ParameterInformation((codec.width(0, start), codec.width(0, end))) for start, end in parameters]
+    active = min(argument, len(parameters) - 1) if parameters else None
+    return lsp.SignatureHelp([lsp.SignatureInformation(label, meaning, columns, active)], 0, active)
 
 
 def open_call(tokens: Sequence[Token]) -> tuple[Token, int] | None:
@@ -82,11 +69,6 @@ def open_call(tokens: Sequence[Token]) -> tuple[Token, int] | None:
         elif key == ";" or key in ("BEGIN", "END"):
             return None
     return None
-
-
-def _of_procedure(node: tree.Procedure, active: int) -> Signature:
-    label, places = signature(node)
-    return Signature(label, places, min(active, max(0, len(places) - 1)))
 
 
 def _places(label: str, parts: Sequence[str]) -> tuple[tuple[int, int], ...]:

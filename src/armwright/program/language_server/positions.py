@@ -1,0 +1,35 @@
+"""Positions and edits in the words of the Language Server Protocol: lines and columns in place of offsets."""
+
+from collections.abc import Iterable
+
+from lsprotocol import types as lsp
+
+from armwright.program.language.position_codec import PositionCodec
+from armwright.program.language.source import Span
+from armwright.program.language.text_edits import Edit
+
+
+def span_range(codec: PositionCodec, span: Span) -> lsp.Range:
+    """Return a stretch of text as lines and columns."""
+    return lsp.Range(position(codec, span.start), position(codec, span.end))
+
+
+def position(codec: PositionCodec, offset: int) -> lsp.Position:
+    """Return the line and the column of an offset."""
+    return lsp.Position(*codec.place(offset))
+
+
+def offset_of(codec: PositionCodec, where: lsp.Position) -> int:
+    """Return the offset of a position."""
+    return codec.offset(where.line, where.character)
+
+
+def span_of(codec: PositionCodec, range_: lsp.Range) -> Span:
+    """Return the stretch of text between two positions."""
+    start = offset_of(codec, range_.start)
+    return Span(start, max(start, offset_of(codec, range_.end)))
+
+
+def text_edits(codec: PositionCodec, edits: Iterable[Edit]) -> list[lsp.TextEdit]:
+    """Return changes of a text."""
+    return [lsp.TextEdit(span_range(codec, edit.span), edit.text) for edit in edits]
