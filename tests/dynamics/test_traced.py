@@ -13,9 +13,10 @@ from armwright.dynamics.inertia_matrix import composite_rigid_body
 from armwright.dynamics.lagrange_euler import lagrange_euler
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import gravity_shares, speed_shares
-from armwright.tracing.graph import Graph, Traced, evaluate, operation_count
+from armwright.tracing.graph import Graph, Traced, operation_count
 from armwright.tracing.scalar import Scalar
 from oracles.arms import random_arm
+from oracles.graphs import evaluate
 
 ROUNDING = 1e-9  # relative to the largest number: a graph adds in its own order
 

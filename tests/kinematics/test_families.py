@@ -18,8 +18,9 @@ from armwright.kinematics.inverse_kinematics.solution import Outcome
 from armwright.kinematics.inverse_kinematics.solve import BRANCHES, inverse, inverse_branches
 from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
-from armwright.tracing.graph import Graph, evaluate
+from armwright.tracing.graph import Graph
 from oracles.arms import random_arm, random_configurations, random_pose
+from oracles.graphs import evaluate
 
 SAME_CONFIGURATION = 1e-9  # two configurations are equal where the Jacobian is regular
 RESIDUAL = 1e-12  # a pose met, in m and rad

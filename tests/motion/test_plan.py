@@ -64,7 +64,7 @@ def test_half_steps_at_both_ends(stanford: Arm) -> None:
 
     knots = place_knots(stanford, path, deviation=1e-3, speed=100)
 
-    steps = np.diff(knots.poses(path)[:, 1, 3])
+    steps = np.diff(path.at(0, knots.fractions)[:, 1, 3])
     np.testing.assert_allclose(steps / steps[1], [0.5, *[1.0] * (len(steps) - 2), 0.5])
     np.testing.assert_allclose(np.diff(knots.times), knots.times[1])
     assert steps[1] / knots.times[1] == pytest.approx(

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.motion.continuity_report import continuity
-from armwright.motion.cubic_polynomials import cubic, cubic_through, shortest_cubic
+from armwright.motion.cubic_polynomials import cubic, cubic_through
 from armwright.motion.trapezoidal_profile import shortest_trapezoid, trapezoid
 
 ROUNDING = 1e-12
@@ -143,15 +143,6 @@ def test_cubic_with_rates_against_scipy(rng: np.random.Generator) -> None:
     move = cubic(q[0], q[1], 1.7, m[0], m[1])
 
     np.testing.assert_allclose(move(t), CubicHermiteSpline([0, 1.7], q, m)(t), atol=ROUNDING)
-
-
-@given(way=ways, speed=limits, acceleration=limits)
-def test_shortest_cubics(way: list[float], speed: float, acceleration: float) -> None:
-    """In its shortest time a cubic passes no limit and is at one."""
-    move = cubic(np.zeros(len(way)), way, shortest_cubic(way, speed, acceleration))
-
-    used = max(move.peaks(1).max() / speed, move.peaks(2).max() / acceleration)
-    assert used == pytest.approx(1, abs=AT_LIMIT)
 
 
 def test_cubics_through_points() -> None:

@@ -6,10 +6,11 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.certified_motion import CertifiedMotion
 from armwright.motion.continuity_report import continuity
 from armwright.motion.obstruction import PathError
 from armwright.motion.path import Path
-from armwright.motion.rounded_corners import RoundedMotion, rounded_move
+from armwright.motion.rounded_corners import rounded_move
 from armwright.spatial.poses import homogeneous
 
 ARM = load_arm("stanford")
@@ -23,10 +24,10 @@ def start() -> np.ndarray:
     return inverse(ARM, homogeneous(DOWN, (0.45, 0.0, 0.25))).best.q
 
 
-def corner(blend: float, *places: tuple[float, float, float]) -> RoundedMotion:
+def corner(blend: float, *places: tuple[float, float, float]) -> CertifiedMotion:
     q = start()
     path = Path(poses=np.stack([forward(ARM, q), *(homogeneous(DOWN, place) for place in places)]))
-    return rounded_move(ARM, path, q, blend=blend, deviation=DEVIATION, speed=100.0)
+    return rounded_move(ARM, path, q, blend=blend, deviation=DEVIATION, speed=100.0).motion
 
 
 @pytest.mark.parametrize("blend", [0.005, 0.02, 0.05])
@@ -42,7 +43,7 @@ def test_a_corner_is_left_no_sooner_than_allowed(blend: float) -> None:
 
     assert off[away > blend + 1e-3].max() <= DEVIATION * 1.01
     assert 0.05 * blend < away.min() < blend
-    assert off.max() <= move.motion.certificate.deviation
+    assert off.max() <= move.certificate.deviation
     np.testing.assert_allclose(hand[-1], C, atol=1e-9)
 
 
@@ -67,7 +68,7 @@ def test_a_short_way_is_rounded_from_its_middle() -> None:
     """A blend longer than the ways begins where they are half over."""
     move = corner(5.0, (0.45, 0.1, 0.25), (0.45, 0.1, 0.15))
 
-    assert move.motion.certificate.deviation > 0.005
+    assert move.certificate.deviation > 0.005
     np.testing.assert_allclose(move.trajectory(0.0), start(), atol=1e-9)
 
 

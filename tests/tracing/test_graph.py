@@ -10,9 +10,10 @@ from hypothesis import given
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.kinematics.jacobians import jacobian_columns
-from armwright.tracing.graph import Graph, Traced, evaluate, operation_count, reachable
+from armwright.tracing.graph import Graph, Traced, operation_count, reachable
 from armwright.tracing.scalar import Scalar, atan2, cos, select, sin, sqrt
 from oracles.arms import random_arm
+from oracles.graphs import evaluate
 
 ROUNDING = 1e-12
 

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, one_per_joint
-from armwright.motion.knots import check_duration, limit_per_joint, one_way, timed_points, two_ends
+from armwright.arrays import LARGEST, ArrayLike, exact_shape, one_per_joint
+from armwright.motion.knots import check_duration, timed_points, two_ends
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.scalar import Scalar
-
-# Peaks of 3 u² - 2 u³ on [0, 1]: of its first and of its second derivative.
-PEAK_SPEED = 3 / 2
-PEAK_ACCELERATION = 6.0
 
 
 def hermite(q_last: Scalar, m_last: Scalar, q: Scalar, m: Scalar, h: Scalar) -> tuple[Scalar, ...]:
@@ -51,25 +47,6 @@ def cubic(
     ]
     coefficients = np.stack(hermite(here, rates[0], goal, rates[1], duration))
     return Trajectory(times=(0.0, duration), coefficients=coefficients[None])
-
-
-def shortest_cubic(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike) -> float:
-    """Return the shortest time of a cubic from rest to rest inside limits [s].
-
-    Args:
-        way: (n,) of the joints [rad] or [m].
-        speed: (n,) limits, or one for all; infinite where there is none.
-        acceleration: (n,) limits, or one for all.
-
-    Raises:
-        KindError: an argument is something else than real numbers.
-        ShapeError: the limits do not fit the path.
-        InvalidValueError: a limit is not above 0.
-    """
-    way = np.abs(one_way(way))
-    by_speed: Array = PEAK_SPEED * way / limit_per_joint(speed, len(way), "speed")
-    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * way / limit_per_joint(acceleration, len(way), "acceleration"))
-    return float(max(by_speed.max(), by_acceleration.max()))
 
 
 def cubic_through(times: ArrayLike, points: ArrayLike, rates: ArrayLike | None = None) -> Trajectory:

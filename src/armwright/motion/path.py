@@ -68,14 +68,6 @@ class Knots:
     segments: tuple[int, ...]
     fractions: tuple[float, ...]
 
-    def poses(self, path: Path) -> Array:
-        """Return the poses of the knots, (m, 4, 4)."""
-        segments, fractions = np.array(self.segments), np.array(self.fractions)
-        X = np.empty((len(segments), 4, 4))
-        for i in np.unique(segments):
-            X[segments == i] = path.at(i, fractions[segments == i])
-        return X
-
 
 def closest_to_axis(A: ArrayLike, B: ArrayLike) -> float:
     """Return the shortest distance from the base axis to the segment between two positions (3,) [m]."""

@@ -36,7 +36,6 @@ from armwright.motion.timing_law import Timed, timed
 from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
 from armwright.motion.tool_path import tool_path
 from armwright.motion.tracking import Task, Tracking, path_error, track
-from armwright.motion.trajectory import Trajectory
 from armwright.motion.trapezoidal_profile import shortest_trapezoid
 from armwright.spatial.rotations import rotation_vector
 
@@ -75,16 +74,6 @@ class RoundedMotion:
     motion: CertifiedMotion
     stops: str = ""
     stopped_by: PathError | None = None
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """Of the joints."""
-        return self.motion.trajectory
-
-    @property
-    def duration(self) -> float:
-        """How long it takes [s]."""
-        return self.motion.trajectory.duration
 
 
 class _Legs(NamedTuple):

@@ -93,13 +93,11 @@ class Tracking(NamedTuple):
         trajectory: of the joints.
         error: of the tool on each interval between two knots.
         speed: (m, n) the largest speeds of the joints on these intervals, exactly.
-        acceleration: (m, n) the same of their accelerations.
     """
 
     trajectory: Trajectory
     error: TrackingError
     speed: Array
-    acceleration: Array
 
 
 def track(task: Task, knots: Array, *, diagnose: bool = True) -> Tracking | Obstruction:
@@ -203,7 +201,7 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
         speed, acceleration = cubic_peaks(trajectory.coefficients, h)
         hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
         error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)
-        tracking = Tracking(trajectory, error, speed, acceleration)
+        tracking = Tracking(trajectory, error, speed)
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
             return _between_knots(arm, trajectory) or tracking

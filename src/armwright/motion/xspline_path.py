@@ -25,7 +25,7 @@ from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_per_joint
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.motion.continuity_report import continuity
 from armwright.motion.cubic_polynomials import hermite
-from armwright.motion.knots import limit_per_joint, timed_points
+from armwright.motion.knots import divided, limit_per_joint, timed_points
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.scalar import Scalar
 
@@ -71,44 +71,6 @@ def rate_of_knot(knots: Triple, m_last: Scalar, steps: Pair) -> Scalar:
     return right_side(((q - q_last) / h_last, (q_next - q) / h_next), steps, a, 0.0) - a * m_last
 
 
-def xspline_rates(
-    times: ArrayLike,
-    knots: ArrayLike,
-    start: ArrayLike,
-    end: ArrayLike,
-    *,
-    a: ArrayLike | None = None,
-    b: ArrayLike | None = None,
-) -> Array:
-    """Return the rate at every knot of an X-spline.
-
-    Args:
-        times: (k,) of the knots, rising [s].
-        knots: (k, n) joint positions.
-        start: (n,) rate at the first knot.
-        end: (n,) rate at the last knot.
-        a: parameters of the k - 2 inner knots, or one for all; when left out, what makes it exact for cubics.
-        b: the same; 0 when left out.
-
-    Returns:
-        (k, n).
-
-    Raises:
-        KindError: an argument is something else than real numbers.
-        ShapeError: fewer than two knots, or shapes that do not fit.
-        InvalidValueError: times do not rise, a number is not finite, or at some knot |a| + |b| is not below 1, which
-            is what makes sure that there is one such spline and no other.
-
-    Source:
-        Clenshaw & Negus (1978); Behforooz, Papamichael & Worsey (1980); TR-83-008, "straight line motion", (26), (27).
-    """
-    t, q = timed_points("X-spline", times, knots, "knots")
-    ends = one_per_joint(start, q.shape[1], "start"), one_per_joint(end, q.shape[1], "end")
-    h = np.diff(t)
-    weights = _parameters(h, a, b)
-    return _rates(h, q, ends, *weights)
-
-
 def xspline(
     times: ArrayLike,
     knots: ArrayLike,
@@ -134,10 +96,11 @@ def xspline(
     Raises:
         KindError: an argument is something else than real numbers.
         ShapeError: fewer than two knots, or shapes that do not fit.
-        InvalidValueError: times do not rise from 0, a number is not finite, or |a| + |b| is not below 1 at some knot.
+        InvalidValueError: times do not rise from 0, a number is not finite, or at some knot |a| + |b| is not below 1,
+            which is what makes sure that there is one such spline and no other.
 
     Source:
-        As ``xspline_rates``.
+        Clenshaw & Negus (1978); Behforooz, Papamichael & Worsey (1980); TR-83-008, "straight line motion", (26), (27).
     """
     t, q = timed_points("X-spline", times, knots, "knots")
     joints = q.shape[1]
@@ -185,12 +148,10 @@ def xspline_along(
             return spline
         # A knot asks for more of both steps beside it.
         reduction = np.maximum(np.append(excess, 0.0), np.append(0.0, excess))
-        parts = np.where(reduction > 1, np.clip(np.ceil(_CLOSER * np.sqrt(reduction)), 2, _PARTS), 1).astype(int)
+        parts = np.where(reduction > 1, np.clip(np.ceil(_CLOSER * np.sqrt(reduction)), 2, _PARTS), 1).astype(np.intp)
         if parts.sum() > _MAX_PARTS:
             break
-        h = np.repeat(np.diff(spline.times) / parts, parts)
-        rank = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
-        finer = np.append(np.repeat(spline.times[:-1], parts) + rank * h, spline.duration)
+        finer = divided(spline.times, parts)
         if not (np.diff(finer) > 0).all():
             break
         spline = xspline(finer, curve(finer), start, end)

@@ -6,7 +6,7 @@ an arm's twists and offsets cost nothing.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, TypeAlias
 
 # Of each operation: how many numbers it takes. Comparisons and select work on truth values too.
@@ -164,20 +164,6 @@ def operation_count(graph: Graph, outputs: Iterable[int]) -> dict[str, int]:
         if ARITY[op]:
             counts[op] = counts.get(op, 0) + 1
     return dict(sorted(counts.items()))
-
-
-def evaluate(graph: Graph, outputs: Sequence[int], inputs: Sequence[float]) -> list[float]:
-    """Run the graph on floats, node by node: what an emitted kernel must agree with."""
-    values: dict[int, float] = {}
-    for i in reachable(graph, outputs):
-        node = graph.nodes[i]
-        if node.op == "input":
-            values[i] = inputs[int(node.value)]
-        elif node.op == "constant":
-            values[i] = node.value
-        else:
-            values[i] = _FOLD[node.op](*(values[j] for j in node.operands))
-    return [values[i] for i in outputs]
 
 
 def _ratio(a: float, b: float) -> float:
