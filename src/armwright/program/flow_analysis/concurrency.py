@@ -6,7 +6,7 @@ import attrs
 
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
 from armwright.program.flow_analysis.state import FlowState, Use, Uses
-from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label, Severity
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Source
 from armwright.program.semantics.expression_types import written
@@ -54,14 +54,9 @@ def _priorities(findings: DiagnosticList, fork: tree.Cobegin, source: Source) ->
             continue
         first = first_use.setdefault(branch.priority.value, branch)
         if first is not branch:
-            findings.report(
-                "W502",
-                f"{'both' if len(fork.branches) == 2 else 'two'} branches have priority {branch.priority.text}",
-                branch.head,
-                f"same as line {source.line(first.head.start)}",
-                notes=("frame-table requests of equal priority are served in the order of the text",),
-                severity=Severity.WARNING,
-            )
+            text = f"{'both' if len(fork.branches) == 2 else 'two'} branches have priority {branch.priority.text}"
+            note = "frame-table requests of equal priority are served in the order of the text"
+            findings.report("W502", text, branch.head, f"same as line {source.line(first.head.start)}", note=note)
 
 
 def shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
@@ -86,8 +81,8 @@ def shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
                 use.span,
                 "second branch",
                 secondary=(Label(first.span, "first branch"), *dict.fromkeys((*first.hung, *use.hung))),
-                notes=("each arm belongs to one process at a time",),
-                helps=(f"use {free} in one branch, or give the arm over with SIGNAL and WAIT outside COBEGIN",),
+                note="each arm belongs to one process at a time",
+                advice=f"use {free} in one branch, or give the arm over with SIGNAL and WAIT outside COBEGIN",
             )
 
 
@@ -237,7 +232,7 @@ def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
             node.span,
             "waits for ever",
             secondary=(Label(declared.span, "declared here"),) if declared else (),
-            helps=(f"write `SIGNAL {text}` in another branch",),
+            advice=f"write `SIGNAL {text}` in another branch",
         )
 
 
@@ -305,7 +300,7 @@ def _too_few(findings: DiagnosticList, step: _Step, branches: list[list[_Step]])
         step.node.span,
         "waits for ever",
         secondary=tuple(Label(span, "signalled here") for span in signals[:_MAX_LOCATIONS]),
-        notes=(f"{len(nodes) - len(signals)} WAITs, and {len(signals)} SIGNAL{plural}",),
+        note=f"{len(nodes) - len(signals)} WAITs, and {len(signals)} SIGNAL{plural}",
     )
 
 

@@ -6,7 +6,7 @@ from itertools import combinations, islice, product
 import attrs
 
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
-from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label, Severity
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import Scope, Symbols
@@ -175,9 +175,8 @@ def _say(findings: DiagnosticList, first: _Write, second: _Write) -> None:
         second.span,
         "second branch",
         secondary=(Label(first.span, "first branch"),),
-        notes=("which of them writes last depends on how long each takes",),
-        helps=(f"write `LOCK ({unlocked.text}) DO ...` around what reads and writes it in each branch",),
-        severity=Severity.WARNING,
+        note="which of them writes last depends on how long each takes",
+        advice=f"write `LOCK ({unlocked.text}) DO ...` around what reads and writes it in each branch",
     )
 
 

@@ -64,14 +64,9 @@ def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
     if kind is VariableKind.FRAME:
         _no_place(state, node, secondary, from_cell=slot == head.key and head is node)
         return
-    state.report(
-        "E303",
-        f"`{written(node)}` is used before it has a value",
-        node.span,
-        "no value here",
-        secondary=secondary,
-        helps=(f"write `{written(node)} = {'100' if kind is VariableKind.SCALAR else '( twelve numbers )'} ;` before",),
-    )
+    text = f"`{written(node)}` is used before it has a value"
+    advice = f"write `{written(node)} = {'100' if kind is VariableKind.SCALAR else '( twelve numbers )'} ;` before"
+    state.report("E303", text, node.span, "no value here", secondary=secondary, advice=advice)
 
 
 def _uncertain(state: FlowState, node: tree.Name | tree.Index, name: str, parting: Divergence) -> None:
@@ -82,14 +77,9 @@ def _uncertain(state: FlowState, node: tree.Name | tree.Index, name: str, partin
     open_cell = state.cell is None and _kind(state, node) is VariableKind.FRAME
     if open_cell or not state.settle(name):
         return
+    text = f"`{written(node)}` may have no value here"
     state.report(
-        "W207",
-        f"`{written(node)}` may have no value here",
-        node.span,
-        "needs a value",
-        secondary=(Label(parting.span, parting.says),),
-        helps=(parting.help,),
-        severity=Severity.WARNING,
+        "W207", text, node.span, "needs a value", secondary=(Label(parting.span, parting.says),), advice=parting.help
     )
 
 
@@ -106,6 +96,6 @@ def _no_place(state: FlowState, node: tree.Name | tree.Index, secondary: tuple[L
         node.span,
         "no value here",
         secondary=() if nothing_yet and certain else secondary,
-        notes=(note,) if nothing_yet or not certain else (),
+        note=note if nothing_yet or not certain else "",
         severity=Severity.ERROR if certain else Severity.WARNING,
     )

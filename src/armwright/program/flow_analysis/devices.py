@@ -8,7 +8,7 @@ from armwright.program.flow_analysis.definite_assignment import need, need_indic
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import set_pose
 from armwright.program.flow_analysis.state import LAST, FlowState
-from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.diagnostic import Label, did_you_mean
 from armwright.program.language.names import is_arm
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import WORLD
@@ -39,7 +39,7 @@ def grasp(state: FlowState, node: tree.Grasp) -> None:
         if state.symbols.std is Standard.RLO_83:
             help_ = f"name one before, as `OPEN {state.some_arm()}` does"
         text = "GRASP does not say which arm, and none has been used yet"
-        state.report("E307", text, node.span, "which arm?", helps=(help_,))
+        state.report("E307", text, node.span, "which arm?", advice=help_)
         return
     state.record(node, None if arm == UNKNOWN else arm)
     if arm == UNKNOWN:
@@ -63,8 +63,7 @@ def _closed_on_arrival(state: FlowState, arm: str) -> None:
         hand.arrival,
         "it arrives here",
         secondary=(Label(hand.opened, "they open only here"),) if hand.opened else (),
-        helps=(f"write `OPEN {arm}` before this MOVE",),
-        severity=Severity.WARNING,
+        advice=f"write `OPEN {arm}` before this MOVE",
     )
 
 
@@ -96,14 +95,8 @@ def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
         own = "'" in frame or "[" in frame
         if visions is not None and not own and frame not in visions and state.settle(frame):
             near = closest(written(target), visions)
-            state.report(
-                "W601",
-                f"the camera of the cell has no answer for `{written(target)}`",
-                target.span,
-                "will not be found",
-                helps=(f"did you mean `{near}`?",) if near else (),
-                severity=Severity.WARNING,
-            )
+            text = f"the camera of the cell has no answer for `{written(target)}`"
+            state.report("W601", text, target.span, "will not be found", advice=did_you_mean(near))
         set_pose(state, frame, target, node.span)
 
 
@@ -117,13 +110,9 @@ def operate(state: FlowState, node: tree.Operate) -> None:
         return
     near = closest(device.text, known)
     listed = ", ".join(sorted(known)) or "none"
+    text = f"the cell has no device `{device.text}`"
     state.report(
-        "R602",
-        f"the cell has no device `{device.text}`",
-        device.span,
-        "no such device",
-        notes=(f"devices of the cell: {listed}",),
-        helps=(f"did you mean `{near}`?",) if near else (),
+        "R602", text, device.span, "no such device", note=f"devices of the cell: {listed}", advice=did_you_mean(near)
     )
 
 

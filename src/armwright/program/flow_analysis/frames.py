@@ -6,7 +6,7 @@ from armwright.program.flow_analysis import plausibility, poses
 from armwright.program.flow_analysis.context import Step, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.state import FlowState
-from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.diagnostic import Label
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
@@ -52,7 +52,7 @@ def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) ->
             node.span,
             "cannot be placed",
             secondary=(Label(link.span, "hung rigidly here"),) if link and link.span else (),
-            helps=(f"leave RIGIDLY out, or write `UNFIX {name}` before this",),
+            advice=f"leave RIGIDLY out, or write `UNFIX {name}` before this",
         )
         return
     state.table.assign(frame, span)
@@ -105,9 +105,8 @@ def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
         span,
         f"from here on it hangs on {name(parent)}",
         secondary=(Label(link.span, f"affixed to {name(link.parent)} here"),) if link.span else (),
-        notes=() if link.span else (f"in the cell it hangs on {name(link.parent)}",),
-        helps=(f"write `UNFIX {name(child)} FROM {name(link.parent)}` first to say so",),
-        severity=Severity.WARNING,
+        note="" if link.span else f"in the cell it hangs on {name(link.parent)}",
+        advice=f"write `UNFIX {name(child)} FROM {name(link.parent)}` first to say so",
     )
 
 
@@ -129,14 +128,9 @@ def _ring(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
         if link and link.span and link.parent:
             chain.append(Label(link.span, f"{name(below)} hangs on {name(link.parent)}"))
     on = "itself" if child == parent else name(parent)
-    state.report(
-        "E305",
-        "this AFFIX would close a ring",
-        node.link,
-        f"{name(child)} cannot hang on {on}",
-        secondary=tuple(chain),
-        notes=("frames form a tree; each hangs on one other and in the end on WORLD",),
-    )
+    text = "this AFFIX would close a ring"
+    note = "frames form a tree; each hangs on one other and in the end on WORLD"
+    state.report("E305", text, node.link, f"{name(child)} cannot hang on {on}", secondary=tuple(chain), note=note)
 
 
 def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
@@ -151,8 +145,7 @@ def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
         node.link,
         f"{name(child)} follows only from here on",
         secondary=(Label(above.span, f"{name(child)} did not follow this"),),
-        helps=("put the AFFIX before the assignment, or give the step with AT",),
-        severity=Severity.WARNING,
+        advice="put the AFFIX before the assignment, or give the step with AT",
     )
 
 
@@ -190,7 +183,7 @@ def _not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
         node.parent.span,
         "not the frame it hangs on" if on else f"{name(child)} hangs on nothing",
         secondary=(where,) if where else (),
-        helps=(instead,),
+        advice=instead,
     )
 
 

@@ -111,8 +111,7 @@ def _left_hanging(state: FlowState, node: tree.Move, arm: str) -> None:
         node.span,
         f"{name} goes along",
         secondary=(Label(opened, "they open here"), *((Label(link.span, "affixed here"),) if link.span else ())),
-        helps=(f"write `UNFIX {name} FROM {arm}` behind OPEN",),
-        severity=Severity.WARNING,
+        advice=f"write `UNFIX {name} FROM {arm}` behind OPEN",
     )
 
 
@@ -155,7 +154,7 @@ def _imply(state: FlowState, node: tree.Move, moved: str, arm: str) -> None:
         node.span,
         f"`AFFIX {name} TO {arm}` is implied",
         secondary=(Label(grip.span, f"{arm} grasped it here"),) if grip and grip.span else (),
-        helps=(f"write `AFFIX {name} TO {arm}` after GRASP",),
+        advice=f"write `AFFIX {name} TO {arm}` after GRASP",
         severity=Severity.ERROR if state.strict else Severity.WARNING,
     )
     leaves(state, moved, arm, node.span)
@@ -170,21 +169,16 @@ def _not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
         node.moved.span,
         f"hangs on {state.name(link.parent) if link and link.parent else WORLD}, not on an arm",
         secondary=(Label(link.span, "affixed here"),) if link and link.span else (),
-        helps=(f"grasp it and write `AFFIX {name} TO {state.last_arm() or state.some_arm()}` first",)
+        advice=f"grasp it and write `AFFIX {name} TO {state.last_arm() or state.some_arm()}` first"
         if moved != WORLD
-        else (),
+        else "",
     )
 
 
 def _relative(state: FlowState, node: tree.Move, arm: str) -> None:
-    state.report(
-        "L302",
-        f"`{written(node.goal)}` moves together with {arm}, which is to come to it",
-        node.goal.span,
-        f"hangs on {arm}",
-        notes=("the goal is taken where it is when the motion starts, so this is a relative motion",),
-        severity=Severity.WARNING,
-    )
+    text = f"`{written(node.goal)}` moves together with {arm}, which is to come to it"
+    note = "the goal is taken where it is when the motion starts, so this is a relative motion"
+    state.report("L302", text, node.goal.span, f"hangs on {arm}", note=note)
 
 
 def _speed(state: FlowState, node: tree.Expression) -> None:
@@ -203,7 +197,7 @@ def _speed(state: FlowState, node: tree.Expression) -> None:
             node.span,
             "out of range",
             secondary=(Label(span, f"{node.text} gets its value here"),),
-            notes=(SPEED_NOTE,),
+            note=SPEED_NOTE,
         )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.state import FlowState
-from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.units import convert
 from armwright.program.syntax import tree
@@ -79,15 +79,9 @@ def _typed(node: tree.Expression) -> Iterator[list[tree.Number]]:
 
 def _odd(state: FlowState, what: str, numbers: list[tree.Number], reach: float, advice: str) -> None:
     unit = _UNITS[state.symbols.units.length]
-    state.report(
-        "W208",
-        f"{what}, in a cell whose arm reaches {_length(reach)}",
-        numbers[0].span.to(numbers[-1].span),
-        unit,
-        notes=(f"lengths in this program are {unit}",),
-        helps=(advice,),
-        severity=Severity.WARNING,
-    )
+    text = f"{what}, in a cell whose arm reaches {_length(reach)}"
+    note = f"lengths in this program are {unit}"
+    state.report("W208", text, numbers[0].span.to(numbers[-1].span), unit, note=note, advice=advice)
 
 
 def _length(metres: float) -> str:
@@ -115,6 +109,5 @@ def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
         node.link,
         f"the hand stands at {name(frame)}",
         secondary=(Label(hand.arrival, f"it came to {name(frame)} here"),) if hand.arrival else (),
-        helps=(f"write `AFFIX {name(frame)} TO {arm}`, or move the arm to {name(child)} first",),
-        severity=Severity.WARNING,
+        advice=f"write `AFFIX {name(frame)} TO {arm}`, or move the arm to {name(child)} first",
     )

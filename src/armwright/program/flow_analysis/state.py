@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import Unpack
 
 import attrs
 
@@ -11,7 +12,7 @@ from armwright.program.flow_analysis.frame_state import FrameState
 from armwright.program.flow_analysis.lattice import EVERYTHING, Facts, FactTable, same
 from armwright.program.flow_analysis.poses import Pose
 from armwright.program.flow_analysis.side_effects import ANY_ARM, SideEffects, Writing
-from armwright.program.language.diagnostic import DiagnosticList, Label, Severity
+from armwright.program.language.diagnostic import Details, DiagnosticList, Label
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Source, Span
@@ -240,8 +241,7 @@ class FlowState:
             span,
             "no way leads here",
             secondary=(Label(self.ended, "nothing behind this is done"),),
-            helps=("leave it out, or put a condition in front of what ends the way",),
-            severity=Severity.WARNING,
+            advice="leave it out, or put a condition in front of what ends the way",
         )
 
     # ---- arms ------------------------------------------------------------------------------------------------------
@@ -267,7 +267,7 @@ class FlowState:
         if self.cell is None or arm in self.cell.arms or not self.settle(arm):
             return
         known = ", ".join(sorted(self.cell.arms)) or "none"
-        self.report("E302", f"the cell has no arm {arm}", span, "no such arm", notes=(f"arms of the cell: {known}",))
+        self.report("E302", f"the cell has no arm {arm}", span, "no such arm", note=f"arms of the cell: {known}")
 
     def lose_arms(self, *, grasps: bool) -> None:
         """Take note that an arm was used, nobody knows which, perhaps to grasp something."""
@@ -350,26 +350,14 @@ class FlowState:
         self._settled.add(key)
         return news
 
-    def report(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        label: str,
-        *,
-        severity: Severity = Severity.ERROR,
-        secondary: tuple[Label, ...] = (),
-        notes: tuple[str, ...] = (),
-        helps: tuple[str, ...] = (),
-    ) -> None:
+    def report(self, code: str, message: str, span: Span, label: str, **details: Unpack[Details]) -> None:
         """Say something once of each statement; of one in a procedure, with the calls that lead there."""
         if (code, span) in self._said:
             return
         self._said.add((code, span))
         calls = tuple(Label(call.span, f"{call.text} is called here") for call in self.calls[: -_MAX_CALLS - 1 : -1])
-        self.diagnostics.report(
-            code, message, span, label, severity=severity, secondary=(*secondary, *calls), notes=notes, helps=helps
-        )
+        details["secondary"] = (*details.get("secondary", ()), *calls)
+        self.diagnostics.report(code, message, span, label, **details)
 
     @contextmanager
     def perhaps(self) -> Iterator[None]:

@@ -3,7 +3,7 @@
 import enum
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any, Self
+from typing import Any, Self, TypedDict, Unpack
 
 import attrs
 
@@ -21,12 +21,22 @@ class Severity(enum.StrEnum):
     WARNING = "warning"
 
 
+def severity_of(code: str) -> Severity:
+    """Return how bad it is what a code stands for: W and L warn."""
+    return Severity.WARNING if code[0] in "WL" else Severity.ERROR
+
+
 @attrs.frozen
 class Label:
     """A word on a place."""
 
     span: Span
     text: str = attrs.field(converter=shortened)
+
+
+def labels(span: Span | None, text: str) -> tuple[Label, ...]:
+    """Return a label; none where there is no place for it."""
+    return () if span is None else (Label(span, text),)
 
 
 @attrs.frozen
@@ -42,13 +52,18 @@ def _all_shortened(texts: Iterable[str]) -> tuple[str, ...]:
     return tuple(shortened(text) for text in texts)
 
 
+def did_you_mean(word: str | None) -> str:
+    """Return advice to write a word; empty where there is none."""
+    return f"did you mean `{word}`?" if word else ""
+
+
 @attrs.frozen(kw_only=True)
 class Diagnostic:
     """One thing to say.
 
     Attributes:
         code: stable, such as ``E206``; E errors, W warnings, L style of working, R devices.
-        severity: error or warning.
+        severity: error or warning; by its code unless something else is given.
         message: what is wrong, in the user's words.
         span: the place.
         label: what is at that place.
@@ -59,7 +74,7 @@ class Diagnostic:
     """
 
     code: str
-    severity: Severity = Severity.ERROR
+    severity: Severity = attrs.field()
     message: str = attrs.field(converter=shortened)
     span: Span
     label: str = attrs.field(default="", converter=shortened)
@@ -67,6 +82,10 @@ class Diagnostic:
     notes: tuple[str, ...] = attrs.field(default=(), converter=_all_shortened)
     helps: tuple[str, ...] = attrs.field(default=(), converter=_all_shortened)
     fixes: tuple[Fix, ...] = ()
+
+    @severity.default
+    def _severity_of_code(self) -> Severity:
+        return severity_of(self.code)
 
     @property
     def is_error(self) -> bool:
@@ -77,6 +96,24 @@ class Diagnostic:
     def is_syntax(self) -> bool:
         """Whether the parser had to guess, so that what the program does cannot be judged."""
         return self.code.startswith("E1")
+
+
+class Details(TypedDict, total=False):
+    """What ``DiagnosticList.report`` may say of a diagnostic beside its first line.
+
+    Attributes:
+        severity: other than that of its code.
+        secondary: other places that matter.
+        note: what one has to know; empty for none.
+        advice: what to write instead; empty for none.
+        fixes: changes that cure it.
+    """
+
+    severity: Severity
+    secondary: tuple[Label, ...]
+    note: str
+    advice: str
+    fixes: tuple[Fix, ...]
 
 
 class DiagnosticList(list[Diagnostic]):
@@ -110,33 +147,21 @@ class DiagnosticList(list[Diagnostic]):
         self.extend(several)
         return self
 
-    def report(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        label: str,
-        *,
-        severity: Severity = Severity.ERROR,
-        secondary: tuple[Label, ...] = (),
-        notes: tuple[str, ...] = (),
-        helps: tuple[str, ...] = (),
-        fixes: tuple[Fix, ...] = (),
-    ) -> None:
-        """Add an error, or what ``severity`` says; the arguments are those of ``Diagnostic``."""
+    def report(self, code: str, message: str, span: Span, label: str, **details: Unpack[Details]) -> None:
+        """Add a diagnostic, made of what is given."""
         if self._counts[code] >= MAX_PER_CODE:
             return
         self.append(
             Diagnostic(
                 code=code,
-                severity=severity,
+                severity=details.get("severity", severity_of(code)),
                 message=message,
                 span=span,
                 label=label,
-                secondary=secondary,
-                notes=notes,
-                helps=helps,
-                fixes=fixes,
+                secondary=details.get("secondary", ()),
+                notes=filter(None, (details.get("note"),)),
+                helps=filter(None, (details.get("advice"),)),
+                fixes=details.get("fixes", ()),
             )
         )
 

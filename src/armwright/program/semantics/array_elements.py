@@ -15,14 +15,9 @@ def single(names: Names, name: tree.Name, kind: VariableType) -> ExpressionType 
         return OF_KIND[kind.kind]
     if names.first("E222", name.key):
         first = ",".join("1" * len(kind.sizes))
-        names.report(
-            "E222",
-            f"`{name.text}` is an {kind} and needs an index",
-            name.span,
-            "which element?",
-            secondary=names.where_declared(name.key),
-            helps=(f"write `{name.text}[{first}]` for the first element",),
-        )
+        text = f"`{name.text}` is an {kind} and needs an index"
+        advice = f"write `{name.text}[{first}]` for the first element"
+        names.report("E222", text, name.span, "which element?", secondary=names.where_declared(name.key), advice=advice)
     return None
 
 
@@ -41,14 +36,9 @@ def element(names: Names, node: tree.Index, sorts: Sequence[ExpressionType | Non
     if not kind.sizes:
         what = OF_KIND[kind.kind].value
         if names.first("E222", name.key):
-            names.report(
-                "E222",
-                f"`{name.text}` is {what} and has no index",
-                node.span,
-                "no array",
-                secondary=names.where_declared(name.key),
-                helps=(f"write `{name.text}` alone, or declare it as an ARRAY",),
-            )
+            text = f"`{name.text}` is {what} and has no index"
+            advice = f"write `{name.text}` alone, or declare it as an ARRAY"
+            names.report("E222", text, node.span, "no array", secondary=names.where_declared(name.key), advice=advice)
         return None
     if len(node.indices) != len(kind.sizes):
         names.report(
@@ -57,7 +47,7 @@ def element(names: Names, node: tree.Index, sorts: Sequence[ExpressionType | Non
             node.span,
             f"{_indices(len(node.indices))} here",
             secondary=names.where_declared(name.key),
-            notes=(f"it is an {kind}",),
+            note=f"it is an {kind}",
         )
         return OF_KIND[kind.kind]
     for index, sort, size in zip(node.indices, sorts, kind.sizes, strict=True):

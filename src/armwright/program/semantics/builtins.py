@@ -63,12 +63,8 @@ def result(names: Names, node: tree.Function, sorts: Sequence[ExpressionType | N
     signature = FUNCTIONS[node.name.key]
     if len(node.arguments) != signature.count:
         plural = "s" * (len(node.arguments) != 1)
-        names.report(
-            "E220",
-            f"{node.name.key} takes {signature.takes}, not {len(node.arguments)} argument{plural}",
-            node.span,
-            f"{len(node.arguments)} argument{plural} here",
-        )
+        text = f"{node.name.key} takes {signature.takes}, not {len(node.arguments)} argument{plural}"
+        names.report("E220", text, node.span, f"{len(node.arguments)} argument{plural} here")
         return signature.gives if node.name.key != "INV" else None
     if node.name.key == "FORCE":
         _axis(names, node.arguments[0])
@@ -90,11 +86,7 @@ def _axis(names: Names, node: tree.Expression) -> None:
         return
     names.use(plain_keys(node))
     names.report(
-        "E220",
-        f"FORCE takes one axis, X, Y or Z, not {called(node)}",
-        node.span,
-        "no axis",
-        helps=("write `FORCE(Z)`",),
+        "E220", f"FORCE takes one axis, X, Y or Z, not {called(node)}", node.span, "no axis", advice="write `FORCE(Z)`"
     )
 
 

@@ -82,7 +82,7 @@ class Calls:
                 argument.span,
                 "an arm" if isinstance(argument, tree.ArmName) else "the root of all frames",
                 secondary=(Label(changed, "changed here"),),
-                notes=("a procedure works on the FRAME that it is given, not on a copy",),
+                note="a procedure works on the FRAME that it is given, not on a copy",
             )
 
     def _follow(self) -> None:
@@ -124,13 +124,8 @@ def _fits(names: Names, argument: tree.Expression, procedure: Procedure, paramet
     argument_type = names.type(argument)
     if argument_type is None or argument_type == kind:
         return
-    names.report(
-        "E220",
-        f"{what}an {kind}, but `{argument.text}` is {a_type(argument_type)}",
-        argument.span,
-        f"{argument_type}",
-        secondary=names.where_declared(argument.key),
-    )
+    message = f"{what}an {kind}, but `{argument.text}` is {a_type(argument_type)}"
+    names.report("E220", message, argument.span, f"{argument_type}", secondary=names.where_declared(argument.key))
 
 
 def _text(procedure: Procedure, parameter: str) -> str:
@@ -149,7 +144,7 @@ def _wrong_count(names: Names, node: tree.Call, procedure: Procedure) -> None:
         node.span,
         f"{argument_type} given here",
         secondary=(Label(procedure.node.head, "declared here"),),
-        helps=(f"its parameters are ({listed})",) if takes else (),
+        advice=f"its parameters are ({listed})" if takes else "",
     )
 
 
@@ -178,7 +173,7 @@ def _unknown(names: Names, node: tree.Call) -> None:
         message, label = f"unknown procedure `{name.text}`", "unknown procedure"
         otherwise = ABSENT.get(name.key, "declare it with PROCEDURE before BEGIN")
         help_ = f"did you mean `{near}`?" if near else otherwise
-    names.report("E227", message, name.span, label, secondary=secondary, helps=(help_,) if help_ else (), fixes=fixes)
+    names.report("E227", message, name.span, label, secondary=secondary, advice=help_, fixes=fixes)
 
 
 def _spelled(names: Names) -> list[str]:

@@ -47,19 +47,14 @@ def for_(context: Context, node: tree.For) -> None:
         kind = names.type(variable)
         if kind is not None and kind != VariableType(VariableKind.SCALAR):
             names.poison(variable.key)
-            names.report(
-                "E229",
-                f"FOR counts with a SCALAR, but `{variable.text}` is {a_type(kind)}",
-                variable.span,
-                str(kind),
-                secondary=names.where_declared(variable.key),
-            )
+            message = f"FOR counts with a SCALAR, but `{variable.text}` is {a_type(kind)}"
+            names.report("E229", message, variable.span, str(kind), secondary=names.where_declared(variable.key))
     for bound in (node.first, node.last, node.step):
         if bound is not None:
             need(names, bound, ExpressionType.SCALAR, "E229", "FOR counts in numbers")
     if isinstance(node.step, tree.Number) and node.step.value == 0:
         text = "a FOR with STEP 0 would never end"
-        names.report("E229", text, node.step.span, "goes nowhere", helps=("leave STEP out to count by 1",))
+        names.report("E229", text, node.step.span, "goes nowhere", advice="leave STEP out to count by 1")
     context.check(node.body)
 
 
@@ -89,7 +84,7 @@ def _event(names: Names, node: tree.Variable, who: str) -> None:
         ExpressionType.EVENT,
         "E223",
         f"{who} needs an EVENT",
-        helps=lambda _: "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`",
+        advice=lambda _: "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`",
     )
 
 
@@ -118,13 +113,10 @@ def try_(context: Context, node: tree.Try) -> None:
 def retry(context: Context, node: tree.Retry) -> None:
     """Check that a RETRY stands in a RECOVER part."""
     if not context.recovering:
+        text = "RETRY is outside of RECOVER"
+        note = "RETRY runs the TRY part again to whose RECOVER it belongs"
         context.names.report(
-            "E225",
-            "RETRY stands outside of RECOVER",
-            node.span,
-            "retry what?",
-            notes=("RETRY runs the TRY part again to whose RECOVER it belongs",),
-            helps=("write `TRY ... RECOVER ... RETRY END`",),
+            "E225", text, node.span, "retry what?", note=note, advice="write `TRY ... RECOVER ... RETRY END`"
         )
 
 

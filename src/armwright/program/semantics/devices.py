@@ -46,7 +46,7 @@ def _vision_target(names: Names, target: tree.Mobile) -> None:
     if isinstance(target, tree.ArmName):
         help_ = f"write `READ SYSTEM ({target.key})` to read the arm"
         text = f"READ VISIONS finds a FRAME, but `{target.text}` is an arm"
-        names.report("E215", text, target.span, "an arm", helps=(help_,))
+        names.report("E215", text, target.span, "an arm", advice=help_)
     elif is_world(target):
         refuse_world(names, target)
     else:
@@ -77,14 +77,9 @@ def _arm(names: Names, node: tree.Mobile | None, who: str) -> None:
             return
         kind = VariableType(VariableKind[sort_.name])
     is_one = "is no arm" if kind is None else f"is {a_type(kind)}"
-    names.report(
-        "E201",
-        f"{who} needs an arm, but {called(node)} {is_one}",
-        node.span,
-        str(kind or "not an arm"),
-        secondary=declared(names, node),
-        helps=(f"did you mean `{near}`?",) if near else (f"write the name of an arm, such as `{names.arms()[0]}`",),
-    )
+    text = f"{who} needs an arm, but {called(node)} {is_one}"
+    advice = f"did you mean `{near}`?" if near else f"write the name of an arm, such as `{names.arms()[0]}`"
+    names.report("E201", text, node.span, str(kind or "not an arm"), secondary=declared(names, node), advice=advice)
 
 
 CHECKS: Mapping[type, Check] = {

@@ -17,5 +17,5 @@ def refuse(names: Names, node: tree.Expression, what: str = "computed with") -> 
             node.span,
             "EVENT",
             secondary=tuple(label for key in keys for label in names.where_declared(key)),
-            notes=(_NOTE,),
+            note=_NOTE,
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.language.words import Standard
 from armwright.program.semantics import events
 from armwright.program.semantics.context import Check, Context
@@ -29,7 +30,7 @@ def assign(context: Context, node: tree.Assign) -> None:
     if isinstance(target, tree.ArmName):
         help_ = f"move it, or write `READ SYSTEM ({target.key})`"
         names.report(
-            "E218", f"`{target.text}` is an arm and cannot be given a value", target.span, "an arm", helps=(help_,)
+            "E218", f"`{target.text}` is an arm and cannot be given a value", target.span, "an arm", advice=help_
         )
     elif is_world(target):
         refuse_world(names, target)
@@ -55,14 +56,8 @@ def _misfit(names: Names, node: tree.Assign, takes: ExpressionType, actual: Expr
         what, is_one = _TAKES[takes], is_what(value, actual)
         message, label = f", but {called(value)} is {is_one}", bare(is_one)
     help_ = _advice(target, value, takes, actual) if message else ""
-    names.report(
-        "E217",
-        f"{called(target)} is {takes.value} and takes {what}{message}",
-        value.span,
-        label,
-        secondary=declared(names, target),
-        helps=(help_,) if help_ else (),
-    )
+    text = f"{called(target)} is {takes.value} and takes {what}{message}"
+    names.report("E217", text, value.span, label, secondary=declared(names, target), advice=help_)
 
 
 def _advice(target: tree.Expression, value: tree.Expression, takes: ExpressionType, actual: ExpressionType) -> str:
@@ -89,8 +84,13 @@ def affix(context: Context, node: tree.Affix) -> None:
         context.changes(node.parent, node.link)
     whence = written(node.parent)
     swap = isinstance(node.child, tree.ArmName) and isinstance(node.parent, tree.Name | tree.Index)
-    helps = (f"did you mean `AFFIX {whence} TO {written(node.child)}`?",) if swap else ()
-    _child(names, node.child, "AFFIX hangs", "affixed to a frame", helps)
+    _child(
+        names,
+        node.child,
+        "AFFIX hangs",
+        "affixed to a frame",
+        did_you_mean(f"AFFIX {whence} TO {written(node.child)}" if swap else None),
+    )
     need(names, node.parent, ExpressionType.FRAME, "E215", "AFFIX ... TO needs a FRAME or an arm")
     if node.at is None:
         return
@@ -106,8 +106,8 @@ def affix(context: Context, node: tree.Affix) -> None:
         ExpressionType.TRANS,
         "E210",
         "AT needs a TRANS",
-        notes=("a FRAME is a pose in the cell; a TRANS is the transformation from one frame to another",),
-        helps=advice,
+        note="a FRAME is a pose in the cell; a TRANS is the transformation from one frame to another",
+        advice=advice,
     )
 
 
@@ -119,11 +119,11 @@ def unfix(context: Context, node: tree.Unfix) -> None:
         need(context.names, node.parent, ExpressionType.FRAME, "E215", "FROM needs a FRAME or an arm")
 
 
-def _child(names: Names, node: tree.Mobile, verb: str, done: str, helps: tuple[str, ...] = ()) -> None:
+def _child(names: Names, node: tree.Mobile, verb: str, done: str, advice: str = "") -> None:
     """Check the frame that AFFIX hangs or UNFIX cuts."""
     if isinstance(node, tree.ArmName):
         text = f"an arm cannot be {done}"
-        names.report("E308", text, node.span, "an arm hangs on its own base", helps=helps)
+        names.report("E308", text, node.span, "an arm hangs on its own base", advice=advice)
     elif is_world(node):
         text = f"{called(node)} cannot be {done.partition(' ')[0]}"
         names.report("E309", text, node.span, "the root of all frames")

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 
 from armwright.errors import ArmwrightError
-from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.diagnostic import Label, did_you_mean
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
 from armwright.program.semantics.builtins import FUNCTIONS
@@ -53,7 +53,7 @@ def _variables(names: Names, table: Table, declaration: tree.Declaration) -> Non
         elif name.key == WORLD or (name.key in PREDECLARED and not _is_frame(declaration.type)):
             note = "the station may be declared again as a FRAME" if name.key == STATION else ""
             text = f"`{name.text}` is predeclared as a FRAME"
-            names.report("E203", text, name.span, "declared again here", notes=(note,) if note else ())
+            names.report("E203", text, name.span, "declared again here", note=note)
         elif table is names.main and name.key in names.imported and not _is_frame(declaration.type):
             text = f"`{name.text}` is a FRAME that an IMPORT brings"
             names.report("E203", text, name.span, "declared as something else here")
@@ -68,13 +68,8 @@ def _is_frame(written: tree.TypeName) -> bool:
 
 
 def _twice(names: Names, name: tree.Name, first: tree.Name) -> None:
-    names.report(
-        "E203",
-        f"`{name.text}` is declared twice",
-        name.span,
-        "again here",
-        secondary=(Label(first.span, "first declared here"),),
-    )
+    text = f"`{name.text}` is declared twice"
+    names.report("E203", text, name.span, "again here", secondary=(Label(first.span, "first declared here"),))
 
 
 def _type(names: Names, written: tree.TypeName) -> VariableType | None:
@@ -121,15 +116,10 @@ def _units(names: Names, program: tree.Program) -> None:
             earlier = first.setdefault(dimension(unit.key), unit)
             if earlier is not unit:
                 what = f"{dimension(unit.key)}s"
+                text = f"a program has one unit of {dimension(unit.key)}, but UNITS names two"
+                advice = f"leave one out; a number may carry a unit of its own where {what} are mixed: `25{unit.text}`"
                 names.report(
-                    "E224",
-                    f"a program has one unit of {dimension(unit.key)}, but UNITS names two",
-                    unit.span,
-                    "second",
-                    secondary=(Label(earlier.span, "first"),),
-                    helps=(
-                        f"leave one out; a number may carry a unit of its own where {what} are mixed: `25{unit.text}`",
-                    ),
+                    "E224", text, unit.span, "second", secondary=(Label(earlier.span, "first"),), advice=advice
                 )
     chosen = {dimension: unit.key for dimension, unit in first.items()}
     names.units = UnitSystem(length=chosen.get("length", "M"), angle=chosen.get("angle", "DEG"))
@@ -139,17 +129,11 @@ def _no_unit(names: Names, unit: tree.Name) -> None:
     if unit.key in UNITS:
         what = {"time": "times are always in seconds", "force": "forces are always in newtons"}[dimension(unit.key)]
         text = f"UNITS settles lengths and angles, but `{unit.text}` is a unit of {dimension(unit.key)}"
-        names.report("E224", text, unit.span, "leave this out", notes=(what,))
+        names.report("E224", text, unit.span, "leave this out", note=what)
         return
     near = _LONG_UNITS.get(unit.key) or names.near(unit.text, lambda: DECLARABLE)
-    names.report(
-        "E224",
-        f"unknown unit `{unit.text}`",
-        unit.span,
-        "unknown unit",
-        notes=(f"units are {', '.join(DECLARABLE)}",),
-        helps=(f"did you mean `{near}`?",) if near else (),
-    )
+    note = f"units are {', '.join(DECLARABLE)}"
+    names.report("E224", f"unknown unit `{unit.text}`", unit.span, "unknown unit", note=note, advice=did_you_mean(near))
 
 
 # ---- imports -------------------------------------------------------------------------------------------------------
@@ -159,21 +143,15 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
     path = header.path
     if read_import is None:
         names.open_import = True
-        names.report(
-            "W205",
-            f"the frames of `{path.value}` are not looked up",
-            header.span,
-            "not looked up",
-            severity=Severity.WARNING,
-            notes=("a name that is not declared may be one of them",),
-        )
+        note = "a name that is not declared may be one of them"
+        names.report("W205", f"the frames of `{path.value}` are not looked up", header.span, "not looked up", note=note)
         return
     try:
         brought = read_import(path.value)
     except ArmwrightError as error:
         # What the file would have brought is unknown, so nothing is asked of unknown names.
         names.open_import = True
-        names.report("E228", f"`{path.value}` cannot be imported", path.span, "not read", notes=(str(error),))
+        names.report("E228", f"`{path.value}` cannot be imported", path.span, "not read", note=str(error))
         return
     names.imports.append(brought)
     for frame in brought.frames:

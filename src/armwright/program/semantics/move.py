@@ -67,14 +67,14 @@ def move(context: Context, node: tree.Move) -> None:
 def _pose(names: Names, node: tree.Expression, code: str, what: str, move: tree.Move | None = None) -> None:
     """Check a frame to come to."""
 
-    def helps(actual: ExpressionType) -> str:
+    def advice(actual: ExpressionType) -> str:
         if move is None or actual is not ExpressionType.TRANS:
             return ""
         moved = "ARM_1" if isinstance(move.moved, tree.Poison) else written(move.moved)
         step = written(node)
         return f"to move by `{step}` from the present place write `MOVE {moved} TO {moved} * {step}`"
 
-    need(names, node, ExpressionType.FRAME, code, what, helps=helps)
+    need(names, node, ExpressionType.FRAME, code, what, advice=advice)
 
 
 def _speed(names: Names, node: tree.Expression) -> None:
@@ -84,13 +84,8 @@ def _speed(names: Names, node: tree.Expression) -> None:
         return
     # A number that was reported before is NaN and in no range, nor out of it.
     if node.value < LOWEST_SPEED or node.value > HIGHEST_SPEED:
-        names.report(
-            "E207",
-            f"speed {node.text} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
-            node.span,
-            "out of range",
-            notes=(SPEED_NOTE,),
-        )
+        text = f"speed {node.text} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
+        names.report("E207", text, node.span, "out of range", note=SPEED_NOTE)
 
 
 def _amount(names: Names, clause: tree.Blend | tree.Duration) -> None:
@@ -108,13 +103,8 @@ def _combination(names: Names, clauses: tuple[tree.Clause, ...]) -> None:
         if isinstance(clause, tree.On):
             continue
         if (earlier := first.setdefault(type(clause), clause)) is not clause:
-            names.report(
-                "E213",
-                f"{_WORDS[type(clause)]} is given twice in one MOVE",
-                clause.span,
-                "second",
-                secondary=(Label(earlier.span, "first"),),
-            )
+            text = f"{_WORDS[type(clause)]} is given twice in one MOVE"
+            names.report("E213", text, clause.span, "second", secondary=(Label(earlier.span, "first"),))
     if len(first) > 1 or tree.Blend in first:
         _ways(names, first)
         _times(names, first)
@@ -130,7 +120,7 @@ def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
                 clause.span,
                 _CLAUSE_NAMES[kind],
                 secondary=(Label(direct.span, _NOT_ASKED[kind]),),
-                helps=("remove one of the two",),
+                advice="remove one of the two",
             )
         elif straight and kind in (tree.Via, tree.Approach, tree.Departure):
             names.report(
@@ -139,16 +129,11 @@ def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
                 clause.span,
                 _CLAUSE_NAMES[kind],
                 secondary=(Label(straight.span, "asks for one straight line"),),
-                helps=("write one `MOVE ... STRAIGHTLY` for each leg",),
+                advice="write one `MOVE ... STRAIGHTLY` for each leg",
             )
     if blend and not direct and tree.Via not in first:
-        names.report(
-            "E226",
-            "BLEND rounds the corners at via points, but there is no VIA",
-            blend.span,
-            "no corners to round",
-            helps=("add `VIA ( ... )`, or leave BLEND out",),
-        )
+        text = "BLEND rounds the corners at via points, but there is no VIA"
+        names.report("E226", text, blend.span, "no corners to round", advice="add `VIA ( ... )`, or leave BLEND out")
 
 
 def _times(names: Names, first: dict[type, tree.Clause]) -> None:
@@ -162,8 +147,8 @@ def _times(names: Names, first: dict[type, tree.Clause]) -> None:
             later.span,
             f"{words[0]} given here",
             secondary=(Label(earlier.span, f"{words[1]} given here"),),
-            notes=("each of them settles how long the motion takes",),
-            helps=("remove one of the two",),
+            note="each of them settles how long the motion takes",
+            advice="remove one of the two",
         )
 
 

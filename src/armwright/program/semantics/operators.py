@@ -73,7 +73,7 @@ def _say(names: Names, node: tree.Unary | tree.Binary, message: str, label: str,
     if not names.first("E221", *variables):
         return
     secondary = tuple(label for key in dict.fromkeys(variables) for label in names.where_declared(key))
-    names.report("E221", message, node.span, label, secondary=secondary, helps=(help_,) if help_ else ())
+    names.report("E221", message, node.span, label, secondary=secondary, advice=help_)
 
 
 def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:

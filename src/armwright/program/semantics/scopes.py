@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import DiagnosticList, Label, Severity
+from armwright.program.language.diagnostic import DiagnosticList, Label, did_you_mean
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.units import UnitSystem
 from armwright.program.language.words import Standard
@@ -201,7 +201,7 @@ class Names:
                 self._lint(f"`{name.text}` is never used", name)
 
     def _lint(self, message: str, name: tree.Name) -> None:
-        self.report("L304", message, name.span, "declared here", severity=Severity.WARNING)
+        self.report("L304", message, name.span, "declared here")
 
     def _table(self, key: str) -> Table:
         inside = self._inside
@@ -215,22 +215,21 @@ class Names:
         return next((procedure for procedure in self.procedures.values() if key in procedure.own.types), None)
 
     def _undeclared(self, name: tree.Name) -> None:
-        helps: tuple[str, ...] = ("declare it in the VAR part",)
-        notes: tuple[str, ...] = ()
+        note, advice = "", "declare it in the VAR part"
         if name.key in self.procedures:
             text = f"`{name.text}` is a procedure and no variable"
             help_ = f"a procedure is called by a statement of its own: `{name.text}(...)`"
-            self.report("E227", text, name.span, "a procedure", helps=(help_,))
+            self.report("E227", text, name.span, "a procedure", advice=help_)
             return
         if not name.text.isascii():
             # Told of as a name that cannot be one.
             return
         if self.cell is not None and name.key in self.cell.frames:
-            helps = (f"the cell has a frame of this name: declare it with `VAR {name.text} : FRAME ;`",)
+            advice = f"the cell has a frame of this name: declare it with `VAR {name.text} : FRAME ;`"
         elif near := self.near(name.text, lambda: [*self.spelled(), *self.arms()]):
-            helps = (f"did you mean `{near}`?",)
+            advice = did_you_mean(near)
         elif near := self.near(name.text, self._of_the_cell):
-            helps = (f"did you mean `{near}`, a frame of the cell? Declare it with `VAR {near} : FRAME ;`",)
+            advice = f"did you mean `{near}`, a frame of the cell? Declare it with `VAR {near} : FRAME ;`"
         elif (owner := self._owner(name.key)) is not None:
-            notes = (f"procedure `{owner.node.name.text}` has a name like this, which is known only there",)
-        self.report("E202", f"`{name.text}` is not declared", name.span, "unknown name", notes=notes, helps=helps)
+            note = f"procedure `{owner.node.name.text}` has a name like this, which is known only there"
+        self.report("E202", f"`{name.text}` is not declared", name.span, "unknown name", note=note, advice=advice)

@@ -60,8 +60,8 @@ def need(
     code: str,
     what: str,
     *,
-    notes: tuple[str, ...] = (),
-    helps: Callable[[ExpressionType], str] | None = None,
+    note: str = "",
+    advice: Callable[[ExpressionType], str] | None = None,
 ) -> bool:
     """Say that an expression is not what its pose needs; of a plain name nothing more is asked then.
 
@@ -71,13 +71,13 @@ def need(
         expected: what it must be.
         code: of the diagnostic.
         what: the first half of the message, such as ``AT needs a TRANS``.
-        notes: of the diagnostic.
-        helps: advice by what the expression is instead; empty for none.
+        note: of the diagnostic.
+        advice: what to write instead, by what the expression is; empty for none.
 
     Returns:
         Whether it is what is wanted.
     """
-    return _fits(names, node, sort(names, node), expected, code, what, notes, helps)
+    return _fits(names, node, sort(names, node), expected, code, what, note, advice)
 
 
 def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
@@ -87,8 +87,8 @@ def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
     expected: ExpressionType,
     code: str,
     what: str,
-    notes: tuple[str, ...] = (),
-    helps: Callable[[ExpressionType], str] | None = None,
+    note: str = "",
+    advice: Callable[[ExpressionType], str] | None = None,
 ) -> bool:
     """Do what ``need`` does for an expression of which one knows what it is."""
     if actual is expected:
@@ -98,15 +98,14 @@ def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
     for key in plain_keys(node):
         names.poison(key)
     is_one = is_what(node, actual)
-    help_ = helps(actual) if helps else ""
     names.report(
         code,
         f"{what}, but {called(node)} is {is_one}",
         node.span,
         bare(is_one),
         secondary=tuple(label for key in plain_keys(node) for label in names.where_declared(key)),
-        notes=notes,
-        helps=(help_,) if help_ else (),
+        note=note,
+        advice=advice(actual) if advice else "",
     )
     return False
 
@@ -129,12 +128,12 @@ def condition(names: Names, node: tree.Expression, who: str) -> None:
 
 
 def _is_condition(names: Names, node: tree.Expression, actual: ExpressionType | None, who: str) -> None:
-    def helps(actual: ExpressionType) -> str:
+    def advice(actual: ExpressionType) -> str:
         if actual is ExpressionType.SCALAR and not isinstance(node, tree.Number):
             return f"write `{written(node)} <> 0`"
         return "a condition compares two numbers, such as `n > 0`"
 
-    _fits(names, node, actual, ExpressionType.CONDITION, "E219", f"{who} needs a condition", helps=helps)
+    _fits(names, node, actual, ExpressionType.CONDITION, "E219", f"{who} needs a condition", advice=advice)
 
 
 def _number(_names: Names, node: tree.Number) -> ExpressionType | None:
@@ -191,7 +190,7 @@ def _no_function(names: Names, node: tree.Function) -> None:
         near = names.near(name.text, lambda: list(FUNCTIONS))
         message, label = f"unknown function `{name.text}`", "unknown function"
         help_ = f"did you mean `{near}`?" if near else f"functions are {', '.join(FUNCTIONS)}"
-    names.report("E227", message, name.span, label, helps=(help_,) if help_ else ())
+    names.report("E227", message, name.span, label, advice=help_)
 
 
 def _unary(names: Names, node: tree.Unary) -> ExpressionType | None:

@@ -151,13 +151,9 @@ def _else(tokens: Tokens) -> bool:
     if token.kind is not TokenKind.NAME or after.key in ("=", ":=", "(", "["):
         return False
     if token.key in _ELSE_IF:
+        text = f"unknown statement `{token.text}`"
         tokens.report(
-            "E105",
-            f"unknown statement `{token.text}`",
-            token.span,
-            "not a statement",
-            helps=("write `ELSE IF`",),
-            fixes=(Fix(token.span, "ELSE IF"),),
+            "E105", text, token.span, "not a statement", advice="write `ELSE IF`", fixes=(Fix(token.span, "ELSE IF"),)
         )
         tokens.replace("IF")
         return True
@@ -201,8 +197,8 @@ def for_(tokens: Tokens) -> tree.For:
         equals(tokens, "the variable of FOR", tokens.before.text)
     first = part(tokens, "a number", "after `=`", "TO", "STEP", "DO")
     if tokens.sees_word(_DOWNWARDS) or tokens.sees(",", ":"):
-        helps = ("write `TO ... STEP -1`",) if tokens.sees_word(_DOWNWARDS) else ("write `TO`",)
-        tokens.say_once("E112", "FOR counts with TO and STEP", tokens.now.span, "expected `TO`", helps=helps)
+        advice = "write `TO ... STEP -1`" if tokens.sees_word(_DOWNWARDS) else "write `TO`"
+        tokens.say_once("E112", "FOR counts with TO and STEP", tokens.now.span, "expected `TO`", advice=advice)
         tokens.replace("TO")
     tokens.expect("TO", "after the first number")
     last = part(tokens, "a number", "after TO", "STEP", "DO")
@@ -299,8 +295,8 @@ def _bare(tokens: Tokens) -> tree.Block:
     token = tokens.now
     if token.key == ";":
         tokens.lost("a `;` stands only between two branches", "expected `BEGIN`", code="E126")
-    helps = ("write `BEGIN ... END` around the statements of each branch",)
-    tokens.say_once("E126", "a branch of COBEGIN is a block", token.span, "expected `BEGIN` before this", helps=helps)
+    advice = "write `BEGIN ... END` around the statements of each branch"
+    tokens.say_once("E126", "a branch of COBEGIN is a block", token.span, "expected `BEGIN` before this", advice=advice)
     body = statements(tokens, "END")
     if tokens.sees("END") and tokens.ahead().key != ".":
         tokens.take()
@@ -388,8 +384,8 @@ def wait(tokens: Tokens) -> tree.Wait:
     start = tokens.take()
     if tokens.now.kind is TokenKind.NUMBER:
         text = tokens.now.text
-        helps = (f"to let {text} seconds pass, write `PAUSE {text}`",)
-        tokens.lost(f"expected {_EVENT} after WAIT", f"found `{text}`", helps=helps)
+        advice = f"to let {text} seconds pass, write `PAUSE {text}`"
+        tokens.lost(f"expected {_EVENT} after WAIT", f"found `{text}`", advice=advice)
     event = variable(tokens, _EVENT, "after WAIT")
     return tree.Wait(tokens.since(start), event)
 

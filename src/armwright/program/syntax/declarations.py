@@ -3,7 +3,7 @@
 import math
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Fix
+from armwright.program.language.diagnostic import Fix, did_you_mean
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import listed, number
 from armwright.program.syntax.lexer import TokenKind
@@ -151,13 +151,7 @@ def type_name(tokens: Tokens) -> tree.TypeName:
     if token.kind is not TokenKind.NAME:
         tokens.lost("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
     near = closest(token.text, types)
-    tokens.report(
-        "E205",
-        f"unknown type `{token.text}`",
-        token.span,
-        expected,
-        helps=(f"did you mean `{near}`?",) if near else (),
-    )
+    tokens.report("E205", f"unknown type `{token.text}`", token.span, expected, advice=did_you_mean(near))
     tokens.take()
     return tree.TypeName(tokens.since(start), token.text, near, sizes)
 
@@ -194,14 +188,9 @@ def _close(tokens: Tokens) -> None:
     if tokens.accept(";"):
         return
     gap = tokens.gap()
-    tokens.report(
-        "E104",
-        "missing `;` after the declaration",
-        gap,
-        "expected `;` here",
-        helps=(f"insert `;` after `{tokens.before.text}`",),
-        fixes=(Fix(gap, ";"),),
-    )
+    text = "missing `;` after the declaration"
+    advice = f"insert `;` after `{tokens.before.text}`"
+    tokens.report("E104", text, gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
     words = tokens.words
     if not tokens.sees("BEGIN", *words.headers, *words.statements) and tokens.ahead().key not in (",", ":", "="):
         raise LostError

@@ -3,6 +3,7 @@
 # ruff: noqa: ERA001 - each rule of the grammar stands above its function
 
 from armwright.errors import closest
+from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.language.words import SENSORS
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression, listed, mobile
@@ -62,13 +63,8 @@ def read(tokens: Tokens) -> tree.ReadVisions | tree.ReadSystem:
     if sensor is None and word.kind is TokenKind.NAME:
         sensor = closest(word.text, SENSORS)
         if sensor:
-            tokens.report(
-                "E105",
-                f"unknown statement `READ {word.text}`",
-                word.span,
-                "expected VISIONS or SYSTEM",
-                helps=(f"did you mean `{sensor}`?",),
-            )
+            text = f"unknown statement `READ {word.text}`"
+            tokens.report("E105", text, word.span, "expected VISIONS or SYSTEM", advice=did_you_mean(sensor))
     if sensor is None:
         tokens.lost("READ does not say what to read", "expected VISIONS or SYSTEM")
     tokens.take()

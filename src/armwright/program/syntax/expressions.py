@@ -85,21 +85,16 @@ def _foreign(tokens: Tokens) -> bool:
     token = tokens.now
     meant = FOREIGN[token.key]
     blank = " " if meant.isalpha() else ""
-    tokens.say_once(
-        "E123",
-        f"`{token.text}` is not a sign of RLO",
-        token.span,
-        f"write `{meant}`",
-        fixes=(Fix(token.span, f"{blank}{meant}{blank}"),),
-    )
+    text = f"`{token.text}` is not a sign of RLO"
+    tokens.say_once("E123", text, token.span, f"write `{meant}`", fixes=(Fix(token.span, f"{blank}{meant}{blank}"),))
     tokens.replace(meant)
     return True
 
 
 def _chained(tokens: Tokens, start: Token) -> None:
     first = tokens.source.slice(tokens.since(start))
-    helps = ("join two comparisons with AND",) if "\n" in first or len(first) > 20 else (f"write `{first} AND ...`",)
-    tokens.say_once("E122", "a comparison cannot be compared", tokens.now.span, "second comparison", helps=helps)
+    advice = "join two comparisons with AND" if "\n" in first or len(first) > 20 else f"write `{first} AND ...`"
+    tokens.say_once("E122", "a comparison cannot be compared", tokens.now.span, "second comparison", advice=advice)
 
 
 # nega = "NOT" nega | rel ;   unary = "-" unary | prim ;

@@ -31,13 +31,8 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
         return
     token = tokens.now
     if tokens.accept(":=", "=="):
-        tokens.report(
-            "E109",
-            f"{what} gets its value with `=`, not `{token.text}`",
-            token.span,
-            "write `=`",
-            fixes=(Fix(token.span, "="),),
-        )
+        text = f"{what} gets its value with `=`, not `{token.text}`"
+        tokens.report("E109", text, token.span, "write `=`", fixes=(Fix(token.span, "="),))
     elif tokens.done or tokens.sees(";", ",", ")", "END") or token.kind is TokenKind.KEYWORD:
         tokens.lost(f"{what} needs `=` and a value", "expected `=` and a value here", code="E109")
     elif not token.damaged:
@@ -46,7 +41,7 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
             f"{what} needs `=` before its value",
             token.span,
             "expected `=` before this",
-            helps=(f"write `{written} = {token.text}`",) if token.text != "(" else (f"write `{written} = (...`",),
+            advice=f"write `{written} = {token.text}`" if token.text != "(" else f"write `{written} = (...`",
             fixes=(Fix(Span(token.start, token.start), "= "),),
         )
 

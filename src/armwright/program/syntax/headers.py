@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Fix, Label
+from armwright.program.language.diagnostic import Fix, Label, did_you_mean
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import block
@@ -80,9 +80,7 @@ def _misspelt_header(tokens: Tokens) -> str | None:
 
 def _misspelt(tokens: Tokens, near: str) -> None:
     token = tokens.now
-    tokens.report(
-        "E105", f"unknown word `{token.text}`", token.span, "not a word of RLO", helps=(f"did you mean `{near}`?",)
-    )
+    tokens.report("E105", f"unknown word `{token.text}`", token.span, "not a word of RLO", advice=did_you_mean(near))
     tokens.replace(near)
 
 
@@ -119,8 +117,8 @@ def _import(tokens: Tokens) -> list[tree.Header]:
     start = tokens.take()
     token = tokens.now
     if token.kind is not TokenKind.STRING:
-        helps = ('write `IMPORT "cell.json" ;`',)
-        tokens.lost("expected the name of a file after IMPORT", f"found {shown(token)}", helps=helps)
+        advice = 'write `IMPORT "cell.json" ;`'
+        tokens.lost("expected the name of a file after IMPORT", f"found {shown(token)}", advice=advice)
     tokens.take()
     path = tree.String(token.span, token.text[1:-1])
     span = tokens.since(start)
@@ -146,8 +144,8 @@ def _units(tokens: Tokens) -> list[tree.Header]:
 def _unit(tokens: Tokens) -> tree.Name:
     token = tokens.now
     if token.kind is not TokenKind.NAME:
-        helps = ("write `UNITS MM, DEG ;`",)
-        tokens.lost(f"expected a unit after `{tokens.before.text}`", f"found {shown(token)}", helps=helps)
+        advice = "write `UNITS MM, DEG ;`"
+        tokens.lost(f"expected a unit after `{tokens.before.text}`", f"found {shown(token)}", advice=advice)
     tokens.take()
     return tree.Name(token.span, token.text, token.key)
 
@@ -213,7 +211,7 @@ def _parameters(tokens: Tokens) -> list[tree.Declaration]:
         start = tokens.now
         if tokens.sees("VAR"):
             text = "a parameter has no VAR in front"
-            tokens.say_once("E117", text, start.span, "leave it out", notes=(_BY_REFERENCE,))
+            tokens.say_once("E117", text, start.span, "leave it out", note=_BY_REFERENCE)
             tokens.take()
         names: list[tree.Name | None] = []
         try:
@@ -239,9 +237,7 @@ def _no_result(tokens: Tokens) -> None:
     start = tokens.take()
     while not tokens.done and not tokens.sees(";", "VAR", "BEGIN"):
         tokens.take()
-    tokens.say_once(
-        "E117", "a procedure gives nothing back", tokens.since(start), "leave this out", notes=(_BY_REFERENCE,)
-    )
+    tokens.say_once("E117", "a procedure gives nothing back", tokens.since(start), "leave this out", note=_BY_REFERENCE)
 
 
 def _another(tokens: Tokens) -> bool:
@@ -297,8 +293,8 @@ def _semicolon(tokens: Tokens, where: str) -> None:
     if tokens.accept(";"):
         return
     gap = tokens.gap()
-    helps = (f"insert `;` after `{tokens.before.text}`",)
-    tokens.say_once("E104", f"missing `;` {where}", gap, "expected `;` here", helps=helps, fixes=(Fix(gap, ";"),))
+    advice = f"insert `;` after `{tokens.before.text}`"
+    tokens.say_once("E104", f"missing `;` {where}", gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
 
 
 def late(tokens: Tokens) -> tree.Statement:

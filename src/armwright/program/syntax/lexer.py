@@ -156,7 +156,8 @@ class _Scanner:
         self._known: dict[str, tuple[TokenKind, str]] = {}
         self._tokens: list[Token] = []
         self._comments: list[Span] = []
-        self._found = DiagnosticList()
+        self._diagnostics = DiagnosticList()
+        self._report = self._diagnostics.report
         # Of each character that does not belong to the language where the first stands, of those with a cure all.
         self._strays: dict[str, list[Span]] = {}
         self._counts: Counter[str] = Counter()
@@ -172,9 +173,9 @@ class _Scanner:
         end = len(self._text)
         self._tokens.append(Token(TokenKind.END, "", "", end, end, damaged=self._unclosed))
         for character, spans in self._strays.items():
-            self._found.append(_stray(character, spans, max(len(spans), self._counts[character])))
+            self._report_stray(character, spans, max(len(spans), self._counts[character]))
         self._hush()
-        return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), diagnostics=tuple(self._found))
+        return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), diagnostics=tuple(self._diagnostics))
 
     def _stretch(self, position: int, last: int) -> int:
         """Read tokens one behind the other; return where the text goes on behind one that needs a closer look."""
@@ -202,7 +203,7 @@ class _Scanner:
         """Say that the text has too many words; what follows is passed over."""
         # Nothing is said of the end that is not read.
         self._unclosed = True
-        self._say("E119", f"the program is too long: {beyond('words')}", Span(start, end), "read up to here")
+        self._report("E119", f"the program is too long: {beyond('words')}", Span(start, end), "read up to here")
         return last
 
     def _closer_look(self, what: int, word: str, start: int, end: int) -> int:
@@ -239,7 +240,7 @@ class _Scanner:
         if key not in self._refused:
             self._refused.add(key)
             odd = next(character for character in word if not character.isascii())
-            self._say(
+            self._report(
                 "E101",
                 f"a name cannot contain `{odd}`",
                 Span(start, end),
@@ -253,16 +254,11 @@ class _Scanner:
         if (match or not odd) and math.isfinite(float(digits)):
             return Token(TokenKind.NUMBER, word, digits, start, end)
         why = "too large" if _is_number(digits) else "not a number"
-        helps: tuple[str, ...] = ()
-        fixes: tuple[Fix, ...] = ()
+        advice, fixes, span = "", list[Fix](), Span(start, end)
         if _is_number(word) and "." in (word[0], word[-1]):
             cured = f"0{word}" if word[0] == "." else f"{word}0"
-            why, helps, fixes = (
-                "a digit is missing beside the point",
-                (f"write `{cured}`",),
-                (Fix(Span(start, end), cured),),
-            )
-        self._say("E113", f"`{word}` is not a number of RLO", Span(start, end), why, helps=helps, fixes=fixes)
+            why, advice, fixes = "a digit is missing beside the point", f"write `{cured}`", [Fix(span, cured)]
+        self._report("E113", f"`{word}` is not a number of RLO", span, why, advice=advice, fixes=tuple(fixes))
         return Token(TokenKind.NUMBER, word, "0", start, end, damaged=True)
 
     def _string(self, start: int, end: int) -> Token:
@@ -271,7 +267,7 @@ class _Scanner:
             return Token(TokenKind.STRING, written, written, start, end)
         match = _AFTER_TEXT.search(self._text, start + 1, end)
         end = match.start() if match else end
-        self._say("E120", "this text is not closed", Span(start, end), "opened here", helps=('close it with `"`',))
+        self._report("E120", "this text is not closed", Span(start, end), "opened here", advice='close it with `"`')
         return Token(TokenKind.STRING, f'{self._written[start:end]}"', '"', start, end, damaged=True)
 
     def _no_arm(self, word: str, start: int, end: int) -> Token:
@@ -283,7 +279,7 @@ class _Scanner:
             else ("`ARM` alone is not a name", "which arm?")
         )
         fixes = (Fix(Span(start, end), key),) if digits else ()
-        self._say("E106", message, Span(start, end), label, helps=(f"write `{key}`",), fixes=fixes)
+        self._report("E106", message, Span(start, end), label, advice=f"write `{key}`", fixes=fixes)
         return Token(TokenKind.ARM, word, key, start, end, damaged=True)
 
     def _comment(self, opening: str, start: int) -> int:
@@ -293,11 +289,11 @@ class _Scanner:
         here = Span(start, start + len(opening))
         if end < 0:
             self._unclosed = True
-            self._say("E102", "this comment is not closed", here, "opened here", helps=(f"close it with `{closing}`",))
+            self._report("E102", "this comment is not closed", here, "opened here", advice=f"close it with `{closing}`")
             return len(self._text)
         inside = self._text[start + 2 : end]
         fixes = () if "}" in inside else (Fix(here, "{"), Fix(Span(end, end + 2), "}"))
-        self._say("E101", f"`{opening}` does not open a comment in RLO", here, "write `{ ... }`", fixes=fixes)
+        self._report("E101", f"`{opening}` does not open a comment in RLO", here, "write `{ ... }`", fixes=fixes)
         self._comments.append(Span(start, end + 2))
         return end + 2
 
@@ -317,9 +313,24 @@ class _Scanner:
             return comment.end() if comment else end
         first, last = Span(start, start + 1), Span(text.end() - 1, text.end())
         fixes = (Fix(first, '"'), *([Fix(last, '"')] if text[0][-1] != '"' else []))
-        self._say("E101", f"`{text[0][0]}` does not open a text in RLO", first, 'write `"..."`', fixes=fixes)
+        self._report("E101", f"`{text[0][0]}` does not open a text in RLO", first, 'write `"..."`', fixes=fixes)
         self._tokens.append(Token(TokenKind.STRING, f'"{text[0][1:-1]}"', '"', start, text.end(), damaged=True))
         return text.end()
+
+    def _report_stray(self, character: str, spans: list[Span], count: int) -> None:
+        """Say once what a character is that does not belong to the language, and in how many places it stands."""
+        meant = LOOK_ALIKES.get(ord(character))
+        shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
+        name = "a blank" if meant == " " else f"`{meant}`"
+        self._report(
+            "E101",
+            f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs"),
+            spans[0],
+            f"looks like {name}" if meant else _HINTS.get(character, "has no meaning here"),
+            note=f"it stands in {count} places" if count > 1 else "",
+            advice=f"write {name}" if meant else "",
+            fixes=tuple(Fix(span, meant) for span in spans) if meant else (),
+        )
 
     def _count(self, characters: str, start: int) -> None:
         """Count characters that mean nothing."""
@@ -343,18 +354,6 @@ class _Scanner:
             if ord(self._written[index]) in LOOK_ALIKES:
                 self._strays.setdefault(self._written[index], []).append(Span(index, index + 1))
 
-    def _say(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        label: str,
-        *,
-        helps: tuple[str, ...] = (),
-        fixes: tuple[Fix, ...] = (),
-    ) -> None:
-        self._found.append(Diagnostic(code=code, message=message, span=span, label=label, helps=helps, fixes=fixes))
-
 
 def _is_number(word: str) -> bool:
     try:
@@ -362,21 +361,3 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return "_" not in word
-
-
-def _stray(character: str, spans: list[Span], count: int) -> Diagnostic:
-    """Say once what a character is that does not belong to the language, and in how many poses it stands."""
-    meant = LOOK_ALIKES.get(ord(character))
-    shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
-    more = f"it stands in {count} places" if count > 1 else ""
-    name = "a blank" if meant == " " else f"`{meant}`"
-    hint = _HINTS.get(character, "has no meaning here")
-    return Diagnostic(
-        code="E101",
-        message=f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs"),
-        span=spans[0],
-        label=f"looks like {name}" if meant else hint,
-        notes=(more,) if more else (),
-        helps=(f"write {name}",) if meant else (),
-        fixes=tuple(Fix(span, meant) for span in spans) if meant else (),
-    )

@@ -5,7 +5,7 @@
 from collections.abc import Callable
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Fix
+from armwright.program.language.diagnostic import Fix, did_you_mean
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import part
@@ -93,13 +93,10 @@ def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
     if key in tokens.words.with_clauses:
         gap = Span(token.start, token.start)
         if not token.damaged:
+            text = f"{key} needs WITH in front"
+            advice = f"write `WITH {key} = ...`"
             tokens.report(
-                "E116",
-                f"{key} needs WITH in front",
-                token.span,
-                "expected WITH before this",
-                helps=(f"write `WITH {key} = ...`",),
-                fixes=(Fix(gap, "WITH "),),
+                "E116", text, token.span, "expected WITH before this", advice=advice, fixes=(Fix(gap, "WITH "),)
             )
         return _assigned(tokens, token, key)
     return _plain(tokens, token, key)
@@ -108,17 +105,10 @@ def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
 def _meant(tokens: Tokens, token: Token) -> bool:
     """Put the clause word that a misspelt one was meant to be in its pose; whether there is one."""
     near = closest(token.text, tokens.words.clauses)
-    tokens.report(
-        "E108",
-        f"unknown clause `{token.text}`",
-        token.span,
-        "not a clause of MOVE",
-        helps=(
-            f"did you mean `{near}`?"
-            if near
-            else f"clauses are {', '.join((*tokens.offered.plain_clauses, 'WITH ...'))}",
-        ),
+    advice = (
+        f"did you mean `{near}`?" if near else f"clauses are {', '.join((*tokens.offered.plain_clauses, 'WITH ...'))}"
     )
+    tokens.report("E108", f"unknown clause `{token.text}`", token.span, "not a clause of MOVE", advice=advice)
     if near:
         tokens.replace(near)
     return near is not None
@@ -147,7 +137,7 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
             f"{token.key} stands without WITH",
             start.span,
             "WITH does not belong here",
-            helps=(f"write `{token.key}` alone",),
+            advice=f"write `{token.key}` alone",
             fixes=(Fix(Span(start.start, token.start), ""),),
         )
         tokens.take()
@@ -155,13 +145,7 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
     key: str | None = token.key if tokens.sees(*with_words) else None
     if key is None and token.kind is TokenKind.NAME:
         key = closest(token.text, with_words)
-        tokens.report(
-            "E108",
-            f"unknown clause `WITH {token.text}`",
-            token.span,
-            expected,
-            helps=(f"did you mean `{key}`?",) if key else (),
-        )
+        tokens.report("E108", f"unknown clause `WITH {token.text}`", token.span, expected, advice=did_you_mean(key))
         if key is None:
             _pass_over(tokens)
             return None
@@ -198,7 +182,7 @@ def _guard(tokens: Tokens) -> tree.On:
             f"{word.text} cannot be the action of ON",
             word.span,
             "expected a block, `=`, a call, HALT, SIGNAL or PRINT",
-            helps=(f"write `DO BEGIN {word.text} ... END`",),
+            advice=f"write `DO BEGIN {word.text} ... END`",
             fixes=(Fix(opening, "BEGIN "), Fix(closing, " END")) if certain else (),
         )
     return tree.On(tokens.since(start), head, condition, action)

@@ -141,12 +141,12 @@ def _ends(tokens: Tokens) -> bool:
                 "the program does not end with `.`",
                 gap,
                 "expected `.` here",
-                notes=("the last END of an RLO program is written `END.`",),
+                note="the last END of an RLO program is written `END.`",
                 fixes=(Fix(gap.to(semicolon.span) if semicolon else gap, "."),),
             )
     else:
-        text, helps = "END closes the program, but more follows", ("leave it out, or write BEGIN before what it ends",)
-        tokens.report("E114", text, end.span, "the program would end here", helps=helps)
+        text, advice = "END closes the program, but more follows", "leave it out, or write BEGIN before what it ends"
+        tokens.report("E114", text, end.span, "the program would end here", advice=advice)
         tokens.spare += 1
         return False
     return True

@@ -178,7 +178,7 @@ class _Visitor:
             f"`{name.text}` needs `=` before its value",
             bracket.span,
             "expected `=` before this",
-            helps=(f"write `{name.text} = (...`",),
+            advice=f"write `{name.text} = (...`",
             fixes=(Fix(Span(bracket.start, bracket.start), "= "),),
         )
         value = tree.Matrix(Span(bracket.start, node.span.end), node.arguments)

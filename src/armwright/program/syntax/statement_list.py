@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NoReturn, TypeVar
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Fix, Label
+from armwright.program.language.diagnostic import Fix, Label, did_you_mean
 from armwright.program.language.source import Span
 from armwright.program.language.words import ABSENT, CLOSING, ELSEWHERE, OPENING
 from armwright.program.syntax import tree
@@ -111,8 +111,8 @@ def _misspelt_end(tokens: Tokens) -> bool:
 def misspelt(tokens: Tokens, near: str) -> None:
     """Say that a word is misspelt, and put the one that was meant in its pose."""
     token = tokens.now
-    helps = (f"did you mean `{near}`?",)
-    tokens.report("E105", f"unknown statement `{token.text}`", token.span, "not a statement", helps=helps)
+    text = f"unknown statement `{token.text}`"
+    tokens.report("E105", text, token.span, "not a statement", advice=did_you_mean(near))
     tokens.replace(near)
 
 
@@ -190,13 +190,12 @@ def _no_statement(tokens: Tokens) -> tree.Statement:
     if _is_known(tokens, token):
         _value_missing(tokens)
     if token.key in ELSEWHERE:
-        helps = (f"did you mean `{ELSEWHERE[token.key]}`?",)
-    elif token.key in ABSENT:
-        helps = (ABSENT[token.key],)
+        advice = did_you_mean(ELSEWHERE[token.key])
     else:
-        helps = ("statements begin with a word such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`",)
-    notes = ("line numbers count only in a text whose first line has one",) if token.kind is _NUMBER else ()
-    tokens.report("E105", text, token.span, label, helps=helps, notes=notes)
+        general = "statements begin with a word such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
+        advice = ABSENT.get(token.key, general)
+    note = "line numbers count only in a text whose first line has one" if token.kind is _NUMBER else ""
+    tokens.report("E105", text, token.span, label, note=note, advice=advice)
     raise LostError
 
 
@@ -207,8 +206,8 @@ def _value_missing(tokens: Tokens) -> NoReturn:
         LostError: always.
     """
     name, sign = tokens.now.text, tokens.ahead().key
-    helps = (f"write `{name} = {name} {sign} ...`",) if sign in ("+", "-", "*", "/") else ()
-    tokens.lost(f"`{name}` needs `=` and a value", "a name alone is no statement", code="E109", helps=helps)
+    advice = f"write `{name} = {name} {sign} ...`" if sign in ("+", "-", "*", "/") else ""
+    tokens.lost(f"`{name}` needs `=` and a value", "a name alone is no statement", code="E109", advice=advice)
 
 
 def nested(tokens: Tokens, behind: str, *words: str) -> tree.Statement:
@@ -300,8 +299,8 @@ def _separator(tokens: Tokens) -> None:
             fixes=(Fix(gap, ";"),),
         )
         return
-    helps = (ABSENT[token.key],) if token.key in ABSENT else ()
-    tokens.lost(f"{shown(token)} does not belong here", "expected `;`", code="E117", helps=helps)
+    advice = ABSENT.get(token.key, "")
+    tokens.lost(f"{shown(token)} does not belong here", "expected `;`", code="E117", advice=advice)
 
 
 def _starts_statement(tokens: Tokens) -> bool:

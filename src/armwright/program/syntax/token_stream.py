@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate
-from typing import NoReturn, TypeAlias
+from typing import NoReturn, TypeAlias, Unpack
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import DiagnosticList, Fix, Label
+from armwright.program.language.diagnostic import Details, DiagnosticList, Fix, did_you_mean
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard, is_later
 from armwright.program.syntax import tree
@@ -244,13 +244,9 @@ class Tokens:
         statement = self.statement_depth > MAX_DEPTH // 2
         what = "statements" if statement else "parentheses and operations"
         if self.deep < 0:
-            self.say_once(
-                "E119",
-                f"{what} lie too deep in one another here",
-                self.now.span,
-                f"more than {MAX_DEPTH} deep",
-                helps=("give a part of it to a procedure",) if statement else ("split the expression",),
-            )
+            text = f"{what} lie too deep in one another here"
+            advice = "give a part of it to a procedure" if statement else "split the expression"
+            self.say_once("E119", text, self.now.span, f"more than {MAX_DEPTH} deep", advice=advice)
         self.deep = self.at
         raise TooDeepError if statement else LostError
 
@@ -266,24 +262,13 @@ class Tokens:
         """Take this pose for one about which something has been said."""
         self._silent = self.at
 
-    def say_once(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        label: str,
-        *,
-        secondary: tuple[Label, ...] = (),
-        notes: tuple[str, ...] = (),
-        helps: tuple[str, ...] = (),
-        fixes: tuple[Fix, ...] = (),
-    ) -> None:
-        """Report an error, unless one has been reported at this position; the arguments are those of ``Diagnostic``."""
+    def say_once(self, code: str, message: str, span: Span, label: str, **details: Unpack[Details]) -> None:
+        """Report an error, unless one has been reported at this position; the arguments are those of ``report``."""
         if not self.silent:
-            self.report(code, message, span, label, secondary=secondary, notes=notes, helps=helps, fixes=fixes)
+            self.report(code, message, span, label, **details)
         self._silent = self.at
 
-    def lost(self, message: str, label: str, *, code: str = "E111", helps: tuple[str, ...] = ()) -> NoReturn:
+    def lost(self, message: str, label: str, *, code: str = "E111", advice: str = "") -> NoReturn:
         """Say what is missing at the next token, unless that was reported before, and give up the statement.
 
         Raises:
@@ -291,25 +276,23 @@ class Tokens:
         """
         # At the end of the text there is nothing to mark; the gap before it is the pose.
         span = self.gap() if self.done else self.now.span
-        self.say_once(code, message, span, label, helps=helps)
+        self.say_once(code, message, span, label, advice=advice)
         raise LostError
 
-    def insert(
-        self, key: str, what: str, *, code: str = "E112", helps: tuple[str, ...] = (), alone: bool = True
-    ) -> None:
+    def insert(self, key: str, what: str, *, code: str = "E112", advice: str = "", alone: bool = True) -> None:
         """Say that ``key`` is missing behind the token read last, and go on as if it had been there.
 
         Args:
             key: what is missing.
             what: the pose in words.
             code: of the diagnostic.
-            helps: of the diagnostic.
+            advice: of the diagnostic.
             alone: whether nothing else is missing, so that putting it in is a cure.
         """
         gap = self.gap()
         # A word needs blanks around it; a sign goes where it is missing.
         fixes = (Fix(gap, f" {key}" if key[0].isalpha() else key),) if alone else ()
-        self.say_once(code, f"missing `{key}` {what}", gap, f"expected `{key}` here", helps=helps, fixes=fixes)
+        self.say_once(code, f"missing `{key}` {what}", gap, f"expected `{key}` here", advice=advice, fixes=fixes)
 
     def expect(self, key: str, where: str, *, statement: bool = False) -> None:
         """Read ``key``; or say that it is missing, and go on as if it had been there.
@@ -326,7 +309,7 @@ class Tokens:
             return
         if self._misspelt(key):
             self.report(
-                "E112", f"expected `{key}` {where}", self.now.span, f"expected `{key}`", helps=(f"write `{key}`",)
+                "E112", f"expected `{key}` {where}", self.now.span, f"expected `{key}`", advice=f"write `{key}`"
             )
             self.take()
             return
@@ -334,7 +317,7 @@ class Tokens:
         ends = not closing and not statement and (self.done or self.sees(";", "END", *self.words.statements))
         # What a word stands in front of begins with no sign but a parenthesis.
         alone = not key[0].isalpha() or not (ends or (self.now.kind is _SYMBOL and self.now.key != "("))
-        self.insert(key, where, helps=(f"insert `{key}` after `{self.before.text}`",), alone=alone)
+        self.insert(key, where, advice=f"insert `{key}` after `{self.before.text}`", alone=alone)
         if ends:
             raise LostError
 
@@ -351,13 +334,9 @@ class Tokens:
         """Refuse a name that is too long."""
         longest = self.offered.longest_name
         if len(name.text) > longest:
-            self.report(
-                "E103",
-                f"the name `{name.text}` is longer than {longest} characters",
-                name.span,
-                f"{len(name.text)} characters",
-                notes=(f"names of {self.offered.name} have 1 to {longest} characters",),
-            )
+            text = f"the name `{name.text}` is longer than {longest} characters"
+            note = f"names of {self.offered.name} have 1 to {longest} characters"
+            self.report("E103", text, name.span, f"{len(name.text)} characters", note=note)
 
     def refuse_reserved(self) -> None:
         """Say once of the word that stands here that it cannot be a name."""
@@ -365,18 +344,16 @@ class Tokens:
         if token.key in self._refused:
             return
         self._refused.add(token.key)
-        helps: tuple[str, ...] = ()
         # Only what looks alike: T0 for TO.
-        if near := closest(token.text, self.declared, limit=0):
-            helps = (f"did you mean `{near}`?",)
-        elif is_later(token.key):
+        advice = did_you_mean(closest(token.text, self.declared, limit=0))
+        if not advice and is_later(token.key):
             if self.standard is Standard.RLO_83:
                 text = f"`{token.text}` as a word belongs to RLO-2"
                 self.report("E214", text, token.span, "in RLO-83 it may be a name, and is declared nowhere")
                 return
-            helps = (f"take another name; a program of RLO-83 that uses `{token.text}` is translated with `--std=83`",)
+            advice = f"take another name; a program of RLO-83 that uses `{token.text}` is translated with `--std=83`"
         text = f"`{token.text}` is a reserved word and cannot be a name"
-        self.report("E107", text, token.span, "a word of the language", helps=helps)
+        self.report("E107", text, token.span, "a word of the language", advice=advice)
 
 
 Rule: TypeAlias = Callable[[Tokens], tree.Statement]
