@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from armwright.errors import ArmwrightError, InvalidValueError, ShapeError, UnknownNameError
 from armwright.report.markup import json_text
-from armwright.report.page import Animation, ArmFigure, ArmRecord, FrameTrack, RunPage, run_page
+from armwright.report.page import Animation, ArmFigure, FrameTrack, run_page
 
 # Five significant digits: half a unit in the last of them.
 LAST_DIGIT = 0.5e-4
@@ -91,59 +90,3 @@ def test_size_of_half_a_minute(rng, bench) -> None:
     )
 
     assert len(run_page(run)) < 3 * MEGABYTE
-
-
-def record_with(arm: ArmRecord, **changes: object) -> ArmRecord:
-    return attrs.evolve(arm, **changes)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"q": np.zeros((901, 5))}, "record of 'ARM_1': 6 joints but 5 columns of positions"),
-        ({"tau": np.zeros((900, 6))}, "record of 'ARM_1': 901 instants but 900 rows of efforts"),
-        ({"hand": np.zeros((901, 2))}, "path: expected shape (N, 3), one row per instant, got (901, 2)"),
-        ({"qd": np.zeros(901)}, "joint quantities: expected shape (N, any), one row per instant, got (901,)"),
-        ({"t": -np.arange(901.0)}, "instants: expected each at or after the previous one"),
-    ],
-)
-def test_records_that_do_not_fit(bench, changes, message: str) -> None:
-    """A record needs one row per instant and one column per joint, and says which is wrong."""
-    with pytest.raises(ArmwrightError) as caught:
-        record_with(bench.arms[0], **changes)
-
-    assert str(caught.value) == message
-
-
-def test_stage_of_a_stranger(bench: RunPage) -> None:
-    """A stage belongs to an arm of the run."""
-    with pytest.raises(UnknownNameError, match=r"no arm 'ARM_3'. Did you mean 'ARM_[12]'\? Known: ARM_1, ARM_2\."):
-        attrs.evolve(bench, stages=(attrs.evolve(bench.stages[0], arm="ARM_3"),))
-
-
-def test_peaks_of_another_arm(bench: RunPage) -> None:
-    """A stage has one peak per joint."""
-    with pytest.raises(ShapeError, match="stage on line 8: 6 joints but 2 peak efforts"):
-        attrs.evolve(bench, stages=(attrs.evolve(bench.stages[0], peak_effort=(1.0, 2.0)),))
-
-
-@pytest.mark.parametrize("duration", [-1.0, math.nan, math.inf])
-def test_durations_that_are_none(bench: RunPage, duration: float) -> None:
-    """Time does not run backwards, nor for ever."""
-    with pytest.raises(InvalidValueError, match="run: duration must be 0 s or more"):
-        attrs.evolve(bench, duration=duration)
-
-
-def test_film_that_does_not_fit(bench: RunPage) -> None:
-    """Every figure and every frame has one row per picture, every piece of a skeleton its radius."""
-    animation = bench.animation
-    with pytest.raises(ShapeError, match="frame 'part': 226 instants but 10 rows of poses"):
-        attrs.evolve(animation, frames=[attrs.evolve(animation.frames[0], poses=np.zeros((10, 12)))])
-    with pytest.raises(ShapeError, match="figure of 'ARM_1': 226 instants but 3 rows of grip"):
-        attrs.evolve(animation, arms={"ARM_1": attrs.evolve(animation.arms["ARM_1"], grip=np.zeros(3))})
-    with pytest.raises(ShapeError, match="arm figure: 4 segments between the points but 2 radii"):
-        attrs.evolve(animation.arms["ARM_1"], radii=[0.1, 0.1])
-    with pytest.raises(ShapeError, match="animation: expected at least one instant"):
-        Animation(fps=25, t=[])
-    with pytest.raises(InvalidValueError, match="animation: fps must be above 0, got 0"):
-        Animation(fps=0, t=[0.0])

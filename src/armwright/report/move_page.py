@@ -55,8 +55,8 @@ def move_page(
         command=command,
         duration=move.trajectory.duration,
         messages=[Message(severity="note", text=note) for note in notes],
-        effects=_effects(move, file),
-        stages=_stages(move, file, samples, tau),
+        effects=list(_effects(move, file)),
+        stages=list(_stages(move, file, samples, tau)),
         arms=[
             ArmRecord(
                 name=_ARM,

@@ -5,17 +5,14 @@ its scripts and its data, and uses no network.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Literal, TypeAlias
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal, TypeAlias
 
 import attrs
-import numpy as np
 
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 from armwright.report.elements import badge, facts
 from armwright.report.markup import asset, page_html
-from armwright.report.tracks import axes, check_rows, instants, numbers, path, per_joint, poses, rotations, skeleton
 
 Severity: TypeAlias = Literal["error", "warning", "note"]
 StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "JOINT", "HAND"]
@@ -26,15 +23,6 @@ JointKind: TypeAlias = Literal["revolute", "prismatic"]
 COLLISIONS = "not checked"
 
 _SCRIPTS = ("scene.js", "camera.js", "solids.js", "view.js", "charts.js", "joint_charts.js", "lists.js", "run.js")
-_SAME = attrs.cmp_using(eq=np.array_equal)
-
-
-def _tuple(items: Iterable[Any]) -> tuple[Any, ...]:
-    return tuple(items)
-
-
-def _dict(items: Mapping[str, Any]) -> dict[str, Any]:
-    return dict(items)
 
 
 @attrs.frozen(kw_only=True)
@@ -97,10 +85,10 @@ class StageRow:
     line: int
     arm: str
     kind: StageKind
-    to: tuple[str, ...] = attrs.field(converter=_tuple)
+    to: Sequence[str]
     speed: float
-    peak_speed: tuple[float, ...] = attrs.field(converter=_tuple)
-    peak_effort: tuple[float, ...] | None = attrs.field(default=None, converter=attrs.converters.optional(_tuple))
+    peak_speed: Sequence[float]
+    peak_effort: Sequence[float] | None = None
     hand_length: float
     deviation: float | None = None
     note: str = ""
@@ -129,7 +117,7 @@ class JointInfo:
     effort: float = math.inf
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, eq=False)
 class ArmRecord:
     """The motion of an arm at N instants (some 2000 suffice for a screen).
 
@@ -147,25 +135,16 @@ class ArmRecord:
 
     name: str
     model: str
-    joints: tuple[JointInfo, ...] = attrs.field(converter=_tuple)
-    t: Array = attrs.field(converter=instants, eq=_SAME)
-    q: Array = attrs.field(converter=per_joint, eq=_SAME)
-    qd: Array = attrs.field(converter=per_joint, eq=_SAME)
-    qdd: Array = attrs.field(converter=per_joint, eq=_SAME)
-    tau: Array | None = attrs.field(default=None, converter=attrs.converters.optional(per_joint), eq=_SAME)
-    hand: Array = attrs.field(converter=path, eq=_SAME)
-
-    def __attrs_post_init__(self) -> None:
-        """Refuse records without one row per instant and one column per joint."""
-        owner = f"record of '{self.name}'"
-        columns = {"positions": self.q, "speeds": self.qd, "accelerations": self.qdd, "efforts": self.tau}
-        check_rows(owner, len(self.t), {**columns, "hand path": self.hand})
-        for quantity, track in columns.items():
-            if track is not None and track.shape[1] != len(self.joints):
-                raise ShapeError(f"{owner}: {len(self.joints)} joints but {track.shape[1]} columns of {quantity}")
+    joints: Sequence[JointInfo]
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array | None = None
+    hand: Array
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, eq=False)
 class ArmFigure:
     """The stick figure of an arm at the M instants of the animation.
 
@@ -179,20 +158,14 @@ class ArmFigure:
         radii: (K-1,) radius of each segment of the skeleton [m]; None lets the page choose.
     """
 
-    points: Array = attrs.field(converter=skeleton, eq=_SAME)
-    hand_axes: Array = attrs.field(converter=rotations, eq=_SAME)
-    grip: Array = attrs.field(converter=numbers, eq=_SAME)
-    joint_axes: Array | None = attrs.field(default=None, converter=attrs.converters.optional(axes), eq=_SAME)
-    radii: Array | None = attrs.field(default=None, converter=attrs.converters.optional(numbers), eq=_SAME)
-
-    def __attrs_post_init__(self) -> None:
-        """Refuse radii that do not fit the segments of the skeleton."""
-        segments = self.points.shape[1] - 1
-        if self.radii is not None and len(self.radii) != segments:
-            raise ShapeError(f"arm figure: {segments} segments between the points but {len(self.radii)} radii")
+    points: Array
+    hand_axes: Array
+    grip: Array
+    joint_axes: Array | None = None
+    radii: Array | None = None
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, eq=False)
 class FrameTrack:
     """The poses of a frame at the M instants of the animation.
 
@@ -203,7 +176,7 @@ class FrameTrack:
     """
 
     name: str
-    poses: Array = attrs.field(converter=poses, eq=_SAME)
+    poses: Array
     visible_from: int = 0
 
 
@@ -222,7 +195,7 @@ class TreeChange:
     parent: str
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, eq=False)
 class Animation:
     """The data of the three-dimensional view.
 
@@ -235,26 +208,13 @@ class Animation:
     """
 
     fps: float
-    t: Array = attrs.field(converter=instants, eq=_SAME)
-    arms: Mapping[str, ArmFigure] = attrs.field(factory=dict, converter=_dict)
-    frames: tuple[FrameTrack, ...] = attrs.field(default=(), converter=_tuple)
-    tree: tuple[TreeChange, ...] = attrs.field(default=(), converter=_tuple)
-
-    def __attrs_post_init__(self) -> None:
-        """Refuse figures and frames without one row per instant."""
-        rows = len(self.t)
-        if not rows:
-            raise ShapeError("animation: expected at least one instant")
-        if not self.fps > 0:
-            raise InvalidValueError(f"animation: fps must be above 0, got {self.fps}")
-        for name, arm in self.arms.items():
-            tracks = {"points": arm.points, "hand axes": arm.hand_axes, "grip": arm.grip, "joint axes": arm.joint_axes}
-            check_rows(f"figure of '{name}'", rows, tracks)
-        for frame in self.frames:
-            check_rows(f"frame '{frame.name}'", rows, {"poses": frame.poses})
+    t: Array
+    arms: Mapping[str, ArmFigure] = attrs.field(factory=dict)
+    frames: Sequence[FrameTrack] = ()
+    tree: Sequence[TreeChange] = ()
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, eq=False)
 class RunPage:
     """The data of the page of a run.
 
@@ -283,24 +243,12 @@ class RunPage:
     command: str
     duration: float
     status: str = "finished"
-    messages: tuple[Message, ...] = attrs.field(default=(), converter=_tuple)
-    effects: tuple[Effect, ...] = attrs.field(default=(), converter=_tuple)
-    stages: tuple[StageRow, ...] = attrs.field(default=(), converter=_tuple)
-    arms: tuple[ArmRecord, ...] = attrs.field(default=(), converter=_tuple)
+    messages: Sequence[Message] = ()
+    effects: Sequence[Effect] = ()
+    stages: Sequence[StageRow] = ()
+    arms: Sequence[ArmRecord] = ()
     animation: Animation | None = None
     text_kind: TextKind = "Program"
-
-    def __attrs_post_init__(self) -> None:
-        """Refuse an invalid duration, and stages of unknown arms or with a wrong number of joints."""
-        if not 0 <= self.duration < math.inf:
-            raise InvalidValueError(f"run: duration must be 0 s or more, got {self.duration}")
-        joints = {arm.name: len(arm.joints) for arm in self.arms}
-        for stage in self.stages:
-            if stage.arm not in joints:
-                raise UnknownNameError("arm", stage.arm, joints)
-            for quantity, peaks in (("speeds", stage.peak_speed), ("efforts", stage.peak_effort)):
-                if peaks is not None and len(peaks) != (count := joints[stage.arm]):
-                    raise ShapeError(f"stage on line {stage.line}: {count} joints but {len(peaks)} peak {quantity}")
 
 
 def run_page(data: RunPage) -> str:

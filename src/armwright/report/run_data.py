@@ -135,7 +135,7 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
         fps=fps,
         t=t,
         arms={name: sticks(arms[name].arm, poses, _grip(recording.effects, name, t)) for name, poses in links.items()},
-        frames=_tracks(recording, t, hands, names),
+        frames=list(_tracks(recording, t, hands, names)),
         tree=changes,
     )
     return animation, [*fewer_frames, *fewer_changes]
