@@ -163,14 +163,14 @@ class _Reader:
                 self._fail(f"unknown word {word!r}", closest(word, [*words, "code"]))
         self._number = len(body) + 1
         if not self._steps:
-            self._fail("there is no instruction")
+            self._fail("expected at least one instruction")
         return self._whole(source)
 
     def _split(self) -> tuple[list[str], str]:
         """Return the lines in front of the source, and the source."""
         if "source" not in self._rows:
             self._number = len(self._rows)
-            self._fail("the program text is missing; it follows a line `source`")
+            self._fail("the program text is missing; expected it after a line `source`")
         at = self._rows.index("source")
         lines = []
         for number, row in enumerate(self._rows[at + 1 :], at + 2):
@@ -178,11 +178,11 @@ class _Reader:
             if not row and self._number == len(self._rows):
                 break
             if not row.startswith("| ") and row != "|":
-                self._fail("a line of the program text begins with `| `")
+                self._fail("expected a line of the program text, which begins with `| `")
             try:
                 lines.append(json.loads(f'"{row[2:]}"'))
             except ValueError:
-                self._fail("not a line of text as JSON writes it")
+                self._fail("expected the characters of a JSON string")
         return self._rows[:at], "\n".join(lines)
 
     def _read_program(self, rest: str) -> None:
@@ -210,12 +210,12 @@ class _Reader:
     def _read_procedure(self, rest: str) -> None:
         name, _, start = rest.partition(" ")
         if not re.fullmatch(r"@[0-9]{1,9}", start):
-            self._fail("a procedure begins at an instruction such as @0012")
+            self._fail("expected the first instruction of the procedure, such as @0012")
         self._procedures[self._name(name)] = _Procedure(int(start[1:]))
 
     def _read_own(self, rest: str) -> None:
         if not self._procedures:
-            self._fail(f"a {self._word} belongs to a procedure")
+            self._fail(f"expected a procedure before the {self._word}")
         procedure = self._procedures[next(reversed(self._procedures))]
         name, _, kind = rest.partition(" ")
         procedure.types[self._name(name)] = self._type(kind)
@@ -232,7 +232,7 @@ class _Reader:
     def _read_step(self, line: str) -> None:
         match = _ROW.fullmatch(line)
         if match is None:
-            self._fail("expected the number, the place, the operation and its operands")
+            self._fail("expected an instruction: its number, its location, the operation and the operands")
         if int(match["at"][:9]) != len(self._steps):
             self._fail(f"expected instruction {len(self._steps):04d}")
         span = _SPAN.fullmatch(match["span"])
@@ -270,10 +270,10 @@ class _Reader:
         for number, op, operands, (line, column, length), begins in self._steps:
             self._number = number
             if not 1 <= line <= len(source.line_starts):
-                self._fail(f"the program has no line {line}")
+                self._fail(f"the program text has no line {line}")
             start = source.line_starts[line - 1] + column - 1
             if column < 1 or start + length > len(text):
-                self._fail(f"the program has no {length} characters from {line}:{column} on")
+                self._fail(f"the program text has fewer than {length} characters from {line}:{column} on")
             instructions.append(Instruction(op=op, operands=operands, span=Span(start, start + length), begins=begins))
         procedures = {
             name: ProcedureCode(start=procedure.start, parameters=tuple(procedure.parameters), types=procedure.types)
@@ -303,12 +303,12 @@ class _Reader:
             self._fail(f"unknown type {text!r}")
         sizes = tuple(int(size[:9]) for size in (match["sizes"] or "").split(",") if size)
         if sizes and not 1 <= math.prod(sizes) <= _MAX_ELEMENTS:
-            self._fail(f"an array has 1 to {_MAX_ELEMENTS} elements")
+            self._fail(f"expected an array of 1 to {_MAX_ELEMENTS} elements")
         return VariableType(VariableKind[match["kind"]], sizes)
 
     def _name(self, text: str) -> str:
         if not _NAME.fullmatch(text):
-            self._fail(f"{text!r} is not a name")
+            self._fail(f"expected a name, got {text!r}")
         return text.upper()
 
     def _string(self, text: str) -> str:
@@ -326,7 +326,7 @@ class _Reader:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            self._fail(f"{word!r} is no operand")
+            self._fail(f"expected an operand, got {word!r}")
         return value
 
     def _fail(self, message: str, near: str | None = None) -> NoReturn:

@@ -180,7 +180,7 @@ class Verifier:
             self.at = number
             owner = self._owners.setdefault(number, self.entry)
             if (owner.at, owner.routine, owner.begun) != (self.entry.at, self.entry.routine, self.entry.begun):
-                raise self.wrong(f"{self.entry.routine.value} comes to an instruction that is a part of another")
+                raise self.wrong(f"{self.entry.routine.value} leads to an instruction of another routine")
             if number in self._merges or number == self.entry.at:
                 merged = self._merged(self._known.get(number), state)
                 if merged == self._known.get(number):
@@ -192,13 +192,13 @@ class Verifier:
                 return targets
             state, number = flow.state, number + 1
             if number == len(self.code.instructions):
-                raise self.wrong("the code runs on behind its last instruction")
+                raise self.wrong("execution would continue after the last instruction")
 
     def _merged(self, old: State | None, new: State) -> State:
         if old is None:
             return new
         if (old.attempts, old.locks) != (new.attempts, new.locks):
-            raise self.wrong("one way here is inside of a TRY or a LOCK in which another is not")
+            raise self.wrong("two paths lead here that differ in their open TRYs or LOCKs")
         return attrs.evolve(new, written=old.written & new.written)
 
     def begin(self, target: Operand, routine: Routine, state: State, truth: str = "") -> None:
@@ -217,18 +217,18 @@ class Verifier:
     def type_of(self, state: State, operand: Operand) -> VariableType:
         """Return what a name or an element holds; a name that is not declared is that of a frame of the cell."""
         if not isinstance(operand, str):
-            raise self.wrong(f"{operand} is no name")
+            raise self.wrong(f"expected a name, got {operand}")
         if operand.startswith("%"):
             kept = self._passing(state, operand)
             if not isinstance(kept, Element):
-                raise self.wrong(f"{operand} is {kept.value}, and names nothing")
+                raise self.wrong(f"expected a name, but {operand} is {kept.value}")
             return VariableType(kept.kind)
         return VariableType(VariableKind.FRAME) if is_arm(operand) else self.declared(operand) or _FRAME
 
     def need_name(self, state: State, operand: Operand, kind: VariableKind) -> None:
         """See to it that an operand names a variable of a kind."""
         if self.type_of(state, operand) != VariableType(kind):
-            raise self.wrong(f"{self.op} takes the name of a variable of kind {kind}, not {operand}")
+            raise self.wrong(f"{self.op} expects the name of a variable of type {kind}, got {operand}")
 
     def value(self, state: State, operand: Operand) -> Value:
         """Return what the value of an operand is."""
@@ -245,7 +245,7 @@ class Verifier:
         """See to it that an operand has a value of a sort."""
         value = self.value(state, operand)
         if value not in wanted:
-            raise self.wrong(f"{self.op} takes {wanted[0].value}, and {operand} is {value.value}")
+            raise self.wrong(f"{self.op} expects {wanted[0].value}, but {operand} is {value.value}")
 
     def _passing(self, state: State, name: str) -> ValueType:
         bit = self._bits.get(name)
@@ -260,13 +260,13 @@ class Verifier:
             return self.define(state, name, value)
         kind = self.type_of(state, name)
         if kind.sizes or OF_KIND.get(kind.kind) is not value:
-            raise self.wrong(f"{name} is {kind}, and is given {value.value}")
+            raise self.wrong(f"{name} is {kind}, but the value is {value.value}")
         return state
 
     def define(self, state: State, name: str, kind: ValueType) -> State:
         """Write a value in passing."""
         if self._types.setdefault(name, kind) != kind:
-            raise self.wrong(f"{name} is two different things")
+            raise self.wrong(f"{name} would have two different types")
         return attrs.evolve(state, written=state.written | 1 << self._bits.setdefault(name, len(self._bits)))
 
 

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import attrs
 import numpy as np
 
+from armwright.errors import counted
 from armwright.program.bytecode.instructions import Code, Constant, JumpTarget, Op, Operand, Text
 from armwright.program.bytecode.verifier import (
     OF_KIND,
@@ -97,7 +98,7 @@ def _rule(verifier: Verifier, state: State) -> Flow:
     """Check one instruction."""
     op = verifier.op
     if verifier.entry.routine is Routine.CONDITION and op not in _OF_CONDITIONS:
-        raise verifier.wrong(f"a condition cannot do {op}")
+        raise verifier.wrong(f"the code of a condition must not contain {op}")
     return _RULES[op](verifier, state)
 
 
@@ -108,7 +109,7 @@ def _wrong_operands(code: Code) -> Iterator[CodeError]:
     last = len(code.instructions)
     for number, step in enumerate(code.instructions):
         if not _PATTERNS[step.op].fullmatch("".join(map(_letter, step.operands))):
-            yield CodeError(number, f"{step.op} does not take these operands")
+            yield CodeError(number, f"the operands of {step.op} have wrong kinds or a wrong number")
         for operand in step.operands:
             if fault := _fault(operand, last, len(code.constants)):
                 yield CodeError(number, fault)
@@ -123,11 +124,11 @@ def _wrong_neighbours(code: Code) -> Iterator[CodeError]:
     for number, step in enumerate(code.instructions):
         op = step.op
         if (before is Op.FORK) != (op is Op.JOIN or (op is Op.FORK and before is Op.FORK)):
-            yield CodeError(number, "FORKs and their JOIN follow one another")
+            yield CodeError(number, "expected FORKs and their JOIN without other instructions in between")
         if (before in _PARTS | {Op.MVBEG}) != (op in _PARTS | {Op.MVEND}):
-            yield CodeError(number, "the parts of a MOVE follow one another, from MVBEG to MVEND")
+            yield CodeError(number, "expected the parts of a MOVE in sequence, from MVBEG to MVEND")
         if number in targets and before in _PARTS | {Op.MVBEG, Op.FORK}:
-            yield CodeError(number, "nothing jumps into the middle of a MOVE or of FORKs")
+            yield CodeError(number, "a jump must not lead into the middle of a MOVE or of FORKs")
         before = op
 
 
@@ -135,15 +136,15 @@ def _wrong_ends(code: Code) -> Iterator[CodeError]:
     last = len(code.instructions) - 1
     for name, procedure in code.procedures.items():
         if procedure.start > last:
-            yield CodeError(last, f"procedure {name} begins behind the last instruction")
+            yield CodeError(last, f"procedure {name} begins after the last instruction")
     if code.instructions[last].op not in _ENDS:
-        yield CodeError(last, "the code runs on behind its last instruction")
+        yield CodeError(last, "execution would continue after the last instruction")
     for index, value in enumerate(code.constants):
         numbers = np.array(value)
         if not np.isfinite(numbers).all():
-            yield CodeError(0, f"constant c{index} is no number")
+            yield CodeError(0, f"constant c{index}: expected finite numbers")
         elif numbers.size > 1 and not orthonormality_error(numbers[:9].reshape(3, 3).T) <= EXACT:
-            yield CodeError(0, f"constant c{index} is no place: its first nine numbers are no rotation")
+            yield CodeError(0, f"constant c{index}: expected a pose, but its first nine numbers are not a rotation")
 
 
 def _letter(operand: Operand) -> str:
@@ -167,7 +168,7 @@ def _fault(operand: Operand, instructions: int, constants: int) -> str:
         case Constant(index=index) if not 0 <= index < constants:
             return f"there is no constant c{index}"
         case float() | int() if not math.isfinite(operand):
-            return f"{operand:g} is no number"
+            return f"expected a finite number, got {operand:g}"
         case _:
             return ""
 
@@ -205,7 +206,7 @@ def _multiply(verifier: Verifier, state: State) -> Flow:
     to, *factors = verifier.operands
     left, right = (verifier.value(state, factor) for factor in factors)
     if left is not right or left is Value.TRUTH:
-        raise verifier.wrong("MUL takes two numbers, or two poses or transformations")
+        raise verifier.wrong("MUL expects two numbers, or two poses or transformations")
     return Flow(verifier.write(state, to, left))
 
 
@@ -218,7 +219,7 @@ def _not(verifier: Verifier, state: State) -> Flow:
 def _force(verifier: Verifier, state: State) -> Flow:
     to, axis = verifier.operands
     if axis not in ("X", "Y", "Z"):
-        raise verifier.wrong(f"FORCE has the axes X, Y, Z, not {axis}")
+        raise verifier.wrong(f"FORCE expects the axis X, Y or Z, got {axis}")
     return Flow(verifier.write(state, to, Value.NUMBER))
 
 
@@ -226,11 +227,11 @@ def _element(verifier: Verifier, state: State) -> Flow:
     to, array, *indices = verifier.operands
     kind = verifier.declared(str(array))
     if kind is None or len(kind.sizes) != len(indices):
-        raise verifier.wrong(f"{array} is no array with {len(indices)} {'index' if len(indices) == 1 else 'indices'}")
+        raise verifier.wrong(f"{array} is not an array of {counted(len(indices), 'dimension')}")
     for index in indices:
         verifier.need(state, index, Value.NUMBER)
     if not str(to).startswith("%"):
-        raise verifier.wrong("an element is kept in passing")
+        raise verifier.wrong("ELEM expects a temporary such as %1 for its result, got {to}")
     return Flow(verifier.define(state, str(to), Element(kind.kind)))
 
 
@@ -242,7 +243,7 @@ def _frames(verifier: Verifier, state: State) -> Flow:
     op, operands = verifier.op, list(verifier.operands)
     most = {Op.AFFIX: 2, Op.AFFAT: 3}.get(op, len(operands))
     if len(operands) > most and operands.pop() != "RIGIDLY":
-        raise verifier.wrong(f"{op} ends with RIGIDLY or with nothing")
+        raise verifier.wrong(f"the last operand of {op} may only be RIGIDLY")
     if op is Op.AFFAT:
         verifier.need(state, operands.pop(), Value.POSE)
     for operand in operands:
@@ -258,7 +259,7 @@ def _open(verifier: Verifier, state: State) -> Flow:
 
 def _operate(verifier: Verifier, state: State) -> Flow:
     if verifier.operands[1] not in ("ON", "OFF"):
-        raise verifier.wrong(f"OPER switches ON or OFF, not {verifier.operands[1]}")
+        raise verifier.wrong(f"OPER expects ON or OFF, got {verifier.operands[1]}")
     return Flow(state)
 
 
@@ -291,7 +292,7 @@ def _all(wanted: Value) -> Rule:
 def _guard(verifier: Verifier, state: State) -> Flow:
     condition, truth, action = verifier.operands
     if not str(truth).startswith("%"):
-        raise verifier.wrong("a condition leaves its value in passing")
+        raise verifier.wrong("MVON expects a temporary such as %1 for the value of its condition, got {truth}")
     verifier.begin(condition, Routine.CONDITION, state, str(truth))
     verifier.begin(action, Routine.ACTION, state)
     return Flow(state)
@@ -313,7 +314,7 @@ def _lock(verifier: Verifier, state: State) -> Flow:
 
 def _unlock(verifier: Verifier, state: State) -> Flow:
     if not state.locks or state.locks[-1] != verifier.operands:
-        raise verifier.wrong("UNLK gives back what the last LOCK has taken")
+        raise verifier.wrong("UNLK must release the variables of the last LOCK")
     return Flow(attrs.evolve(state, locks=state.locks[:-1]))
 
 
@@ -323,13 +324,14 @@ def _call(verifier: Verifier, state: State) -> Flow:
     if procedure is None:
         raise verifier.wrong(f"there is no procedure {name}")
     if len(arguments) != len(procedure.parameters):
-        raise verifier.wrong(f"{name} has {len(procedure.parameters)} parameters, and is given {len(arguments)}")
+        takes = counted(len(procedure.parameters), "parameter")
+        raise verifier.wrong(f"{name} has {takes}, got {counted(len(arguments), 'argument')}")
     for argument, parameter in zip(arguments, procedure.parameters, strict=True):
         kind = procedure.types[parameter]
         if not kind.sizes and kind.kind in OF_KIND:
             verifier.need(state, argument, OF_KIND[kind.kind])
-        elif verifier.type_of(state, argument) != kind:
-            raise verifier.wrong(f"{parameter} of {name} is {kind}, and is given something else")
+        elif (got := verifier.type_of(state, argument)) != kind:
+            raise verifier.wrong(f"parameter {parameter} of {name} expects {kind}, got {got}")
     return Flow(state)
 
 
@@ -349,7 +351,7 @@ def _jump_if_not(verifier: Verifier, state: State) -> Flow:
     verifier.need(state, truth, Value.TRUTH, Value.NUMBER)
     target = index_of(operand)
     if verifier.entry.routine is Routine.CONDITION and target <= verifier.at:
-        raise verifier.wrong("a condition does not jump back")
+        raise verifier.wrong("the code of a condition must not jump backward")
     return Flow(state, (target, state))
 
 
@@ -388,7 +390,7 @@ def _end_of_recovery(verifier: Verifier, state: State) -> Flow:
 
 def _without_attempt(verifier: Verifier, state: State, *, recovering: bool) -> State:
     if not state.attempts or state.attempts[-1].recovering is not recovering:
-        raise verifier.wrong(f"{verifier.op} ends no {'RECOVER' if recovering else 'TRY'}")
+        raise verifier.wrong(f"{verifier.op} has no {'RECOVER' if recovering else 'TRY'} to end")
     return attrs.evolve(state, attempts=state.attempts[:-1])
 
 
@@ -396,7 +398,7 @@ def _retry(verifier: Verifier, state: State) -> Flow:
     """Go back to the TRY in whose RECOVER part this stands; what was locked since is given back by then."""
     recovering = [number for number, attempt in enumerate(state.attempts) if attempt.recovering]
     if not recovering:
-        raise verifier.wrong("RETRY stands outside of RECOVER")
+        raise verifier.wrong("RETRY is outside of RECOVER")
     attempt = state.attempts[recovering[-1]]
     before = attrs.evolve(state, locks=attempt.locks, attempts=state.attempts[: recovering[-1]])
     return Flow(state, (attempt.start, before), falls=False)
@@ -408,7 +410,7 @@ def _end_of(*routines: Routine) -> Rule:
     def rule(verifier: Verifier, state: State) -> Flow:
         entry = verifier.entry
         if entry.routine not in routines:
-            raise verifier.wrong(f"{verifier.op} does not end {entry.routine.value}")
+            raise verifier.wrong(f"{verifier.op} cannot end {entry.routine.value}")
         if entry.routine is Routine.CONDITION:
             verifier.need(state, entry.truth, Value.TRUTH, Value.NUMBER)
         return Flow(state, falls=False)
