@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
+from armwright.files.message_stream import MessageStream
 from armwright.program.debugger.dap_messages import Noise, messages
-from armwright.program.language_server.message_limits import Incoming
 
 TOO_LARGE = "a message is too large: more, and at most 16 MB are read; `armwright --raise message_mb=NUMBER ...`"
 TOO_LONG = "the header of a message is too large: more, and at most 8,192 bytes are read"
@@ -26,7 +26,7 @@ TOO_LONG = "the header of a message is too large: more, and at most 8,192 bytes 
 )
 def test_too_large(header: bytes, said: str) -> None:
     """A message or a header that claims to be larger than the limit is refused before it is read."""
-    incoming = Incoming(io.BytesIO(header))
+    incoming = MessageStream(io.BytesIO(header))
     while incoming.readline():
         pass
     assert incoming.refused.startswith(said)

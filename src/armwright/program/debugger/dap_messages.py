@@ -5,17 +5,13 @@ Source:
 """
 
 import json
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO, NamedTuple, TypeVar
 
 from armwright.errors import ArmwrightError
-from armwright.files.limits import MEGABYTE, beyond, limit
+from armwright.files.message_stream import CONTENT_LENGTH, MessageStream
 
 T = TypeVar("T")
-
-_LENGTH = re.compile(rb"(?i)^content-length[ \t]*:[ \t]*([0-9]+)[ \t]*$", re.MULTILINE)
-_CHUNK = 65536
 
 
 class RequestError(ArmwrightError, ValueError):
@@ -30,38 +26,23 @@ class Noise(NamedTuple):
 
 def messages(stream: BinaryIO) -> Iterator[dict[str, Any] | Noise]:
     """Give what comes in, one after the other, until the stream ends or a message is larger than its limit."""
-    waiting = b""
+    incoming = MessageStream(stream)
     while True:
-        # An empty line ends a header; blank lines in front of one are nobody's.
-        waiting = waiting.lstrip(b"\r\n")
-        end = re.search(rb"\r?\n\r?\n", waiting)
-        if end is None:
-            if len(waiting) > limit("header_bytes"):
-                yield Noise(f"the header of a message is too large: {beyond('header_bytes')}; the connection ends")
-                return
-            more = stream.read(_CHUNK)
-            if not more:
-                return
-            waiting += more
-            continue
-        header, waiting = waiting[: end.start()], waiting[end.end() :]
-        length = _LENGTH.search(header.replace(b"\r\n", b"\n"))
-        if length is None:
-            yield Noise("a header without a Content-Length that makes sense")
-            continue
-        most = limit("message_mb") * MEGABYTE
-        # Of a length with more digits than the largest has, the number is of no interest.
-        if len(length[1].lstrip(b"0")) > len(str(most)) or int(length[1]) > most:
-            yield Noise(f"a message is too large: {beyond('message_mb')}; the connection ends")
+        header = b""
+        while (line := incoming.readline()).strip():
+            header += line
+        length = CONTENT_LENGTH.search(header)
+        if incoming.refused:
+            yield Noise(f"{incoming.refused}; the connection ends")
+        if not line:
             return
-        size = int(length[1])
-        while len(waiting) < size:
-            more = stream.read(_CHUNK)
-            if not more:
+        if length is not None:
+            body = incoming.read(int(length[1]))
+            if len(body) < int(length[1]):
                 return
-            waiting += more
-        body, waiting = waiting[:size], waiting[size:]
-        yield _message(body)
+            yield _message(body)
+        elif header:
+            yield Noise("a header without a Content-Length that makes sense")
 
 
 def _message(body: bytes) -> dict[str, Any] | Noise:

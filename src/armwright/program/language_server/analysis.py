@@ -2,19 +2,19 @@
 
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
 
 import attrs
 
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
 from armwright.program.api import Compilation
+from armwright.program.flow_analysis.side_effects import every
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
-from armwright.program.language_server.symbol_index import Extents, Occurrence, extents_of, occurrences
+from armwright.program.language_server.symbol_index import Occurrence, ScopeExtents, occurrences, scope_extents
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
 from armwright.program.syntax.line_numbers import without_numbers
@@ -46,14 +46,14 @@ class Analysis:
         return self.compiled.source.text
 
     @cached_property
-    def extents(self) -> Extents:
-        """Where the procedures stand."""
-        return extents_of(self.compiled.symbols)
+    def scopes(self) -> ScopeExtents:
+        """The names that are visible in each stretch of the text."""
+        return scope_extents(self.compiled.symbols)
 
     @cached_property
     def occurrences(self) -> tuple[Occurrence, ...]:
         """All names, in order."""
-        return occurrences(self.compiled.tokens, self.extents)
+        return occurrences(self.compiled.tokens, self.scopes)
 
     @cached_property
     def by_key(self) -> Mapping[str, Sequence[Occurrence]]:
@@ -75,7 +75,10 @@ class Analysis:
     @cached_property
     def statements(self) -> tuple[tree.Move | tree.Call | tree.Grasp, ...]:
         """The statements that hints are given for, in the order of the text."""
-        return tuple(_hinted(self.compiled.tree))
+        program = self.compiled.tree
+        bodies = (*(procedure.body for procedure in program.procedures), *program.statements)
+        hinted = (node for node in every(bodies) if isinstance(node, tree.Move | tree.Call | tree.Grasp))
+        return tuple(sorted(hinted, key=lambda node: node.span.start))
 
     @cached_property
     def lower(self) -> bool:
@@ -153,33 +156,3 @@ def _word_start(text: str, start: int, end: int) -> int:
         return start
     first, _, _ = text[start:end].upper().rpartition("-")
     return start if first == "ARM" else start + len(first) + 1
-
-
-def _hinted(program: tree.Program) -> list[tree.Move | tree.Call | tree.Grasp]:
-    statements: list[tree.Move | tree.Call | tree.Grasp] = []
-    waiting: list[object] = [*reversed(program.statements)]
-    waiting += [procedure.body for procedure in reversed(program.procedures)]
-    while waiting:
-        node = waiting.pop()
-        match node:
-            case tree.Move(clauses=clauses):
-                statements.append(node)
-                waiting += [clause.action for clause in clauses if isinstance(clause, tree.On)]
-            case tree.Call() | tree.Grasp():
-                statements.append(node)
-            case _:
-                waiting += reversed(_INNER[type(node)](node) if type(node) in _INNER else ())
-    return sorted(statements, key=lambda statement: statement.span.start)
-
-
-# The statements directly inside of a statement.
-_INNER: Mapping[type, Callable[[Any], tuple[tree.Statement, ...]]] = {
-    tree.Block: lambda node: node.statements,
-    tree.If: lambda node: node.statements,
-    tree.While: lambda node: (node.body,),
-    tree.For: lambda node: (node.body,),
-    tree.Lock: lambda node: (node.body,),
-    tree.Repeat: lambda node: node.body,
-    tree.Cobegin: lambda node: tuple(branch.body for branch in node.branches),
-    tree.Try: lambda node: (*node.body, *node.recovery),
-}

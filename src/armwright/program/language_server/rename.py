@@ -123,7 +123,7 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
     if any(other.key == key and other.owner is None for other in _meant(analysis)):
         raise InvalidValueError(f"the program uses '{new}' already, though it is not declared")
     for other in analysis.same(occurrence):
-        procedure = analysis.extents.scope(other.start).procedure
+        procedure = analysis.scopes.at(other.start).procedure
         if procedure is not None and key in procedure.types:
             name = procedure.node.name.text
             raise InvalidValueError(f"procedure `{name}` has a '{new}' of its own, which would hide this one there")

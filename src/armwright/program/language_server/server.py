@@ -15,6 +15,7 @@ from pygls.protocol import LanguageServerProtocol, lsp_method
 from pygls.uris import to_fs_path
 
 from armwright.errors import InvalidValueError
+from armwright.files.message_stream import MessageStream
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.words import Standard
 from armwright.program.language_server.analyse import Settings, analyse
@@ -22,7 +23,6 @@ from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.cell_lookup import Cells
 from armwright.program.language_server.diagnostics import diagnostics
 from armwright.program.language_server.documents import Document
-from armwright.program.language_server.message_limits import Incoming
 from armwright.program.language_server.positions import offset_of
 from armwright.version import __version__
 
@@ -208,7 +208,7 @@ def serve() -> int:
     Raises:
         InvalidValueError: it sent a message that is larger than the limit; the connection is over.
     """
-    incoming = Incoming(sys.stdin.buffer)
+    incoming = MessageStream(sys.stdin.buffer)
     # Of its own: the protocol closes it at its end, and whatever else is printed must not get into it.
     outgoing = os.fdopen(os.dup(1), "wb")
     sys.stdout = sys.stderr

@@ -70,60 +70,50 @@ class Occurrence:
 
 
 @attrs.frozen
-class Extents:
-    """Which procedure each place of a text belongs to.
+class ScopeExtents:
+    """The names that are visible in each stretch of a text.
 
     Attributes:
-        symbols: the names of the program.
-        starts: where procedures start, in order.
-        ends: where each ends.
-        keys: their names.
+        starts: where each stretch starts, in order; it ends where the next one starts.
+        scopes: the names that are visible in each.
     """
 
-    symbols: Symbols
-    starts: tuple[int, ...]
-    ends: tuple[int, ...]
-    keys: tuple[str, ...]
+    starts: Sequence[int]
+    scopes: Sequence[Scope]
 
-    def procedure(self, offset: int) -> str | None:
-        """Return the procedure that a place lies in; None outside of all."""
-        at = bisect_right(self.starts, offset) - 1
-        return self.keys[at] if at >= 0 and offset <= self.ends[at] else None
-
-    def scope(self, offset: int) -> Scope:
-        """Return the names that can be seen at a place."""
-        return self.symbols.scope(self.procedure(offset))
+    def at(self, offset: int) -> Scope:
+        """Return the names that are visible at a position."""
+        return self.scopes[bisect_right(self.starts, offset) - 1]
 
 
-def extents_of(symbols: Symbols) -> Extents:
-    """Return where the procedures of a program stand."""
-    spans = {key: procedure.node.span for key, procedure in symbols.procedures.items()}
-    keys = sorted(spans, key=lambda key: spans[key].start)
-    return Extents(symbols, tuple(spans[key].start for key in keys), tuple(spans[key].end for key in keys), tuple(keys))
+def scope_extents(symbols: Symbols) -> ScopeExtents:
+    """Return the stretches of a program that see the same names: procedures, and what lies around them."""
+    main = symbols.scope(None)
+    starts, scopes = [0], [main]
+    for key, procedure in sorted(symbols.procedures.items(), key=lambda item: item[1].node.span.start):
+        starts += procedure.node.span
+        scopes += [symbols.scope(key), main]
+    return ScopeExtents(starts, scopes)
 
 
-def occurrences(tokens: Sequence[Token], extents: Extents) -> tuple[Occurrence, ...]:
+def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurrence, ...]:
     """Return the names among some tokens.
 
     Args:
         tokens: in order.
-        extents: where the procedures stand.
+        scopes: the names that are visible in each stretch of the text.
     """
     found: list[Occurrence] = []
     in_units = in_read = False
-    start, end = -1, -1
-    scope = Scope(symbols=extents.symbols)
     before = ""
     for at, token in enumerate(tokens):
         kind, key = token.kind, token.key
         if kind is _NAME or kind is _ARM:
-            if not start <= token.start < end:
-                scope, start, end = _seen_from(extents, token.start)
             follows = tokens[at + 1].key if at + 1 < len(tokens) else ""
             if kind is _ARM:
                 found.append(Occurrence(token.start, token.end, key, What.ARM))
             else:
-                found.append(_name(token, scope, before, follows, in_units=in_units))
+                found.append(_name(token, scopes.at(token.start), before, follows, in_units=in_units))
             name = found[-1]
             if (in_read and before in ("(", ",")) or before == "FOR":
                 name.writes = True
@@ -136,15 +126,6 @@ def occurrences(tokens: Sequence[Token], extents: Extents) -> tuple[Occurrence, 
             in_read = key == "READ" or (in_read and key not in (";", ")") and kind is not _KEYWORD)
         before = key
     return tuple(found)
-
-
-def _seen_from(extents: Extents, here: int) -> tuple[Scope, int, int]:
-    """Return the names seen from a place, and the stretch of text that sees the same."""
-    at = bisect_right(extents.starts, here) - 1
-    if at >= 0 and here < extents.ends[at]:
-        return extents.symbols.scope(extents.keys[at]), extents.starts[at], extents.ends[at]
-    following = extents.starts[at + 1] if at + 1 < len(extents.starts) else here + (1 << 40)
-    return Scope(symbols=extents.symbols), here, following
 
 
 def _name(token: Token, scope: Scope, before: str, follows: str, *, in_units: bool) -> Occurrence:

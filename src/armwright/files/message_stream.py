@@ -1,14 +1,19 @@
-"""What an editor sends to the language server, read up to the limits of a message: beyond them the connection ends."""
+"""What an editor sends to the language server or the debug adapter, read up to the limits of a message.
+
+Source:
+    Language Server Protocol and Debug Adapter Protocol, base protocol: a header with Content-Length, an empty line, a
+    body of so many bytes.
+"""
 
 import re
 from typing import BinaryIO
 
 from armwright.files.limits import MEGABYTE, beyond, limit
 
-_LENGTH = re.compile(rb"(?i)content-length:[ \t]*([0-9]+)[ \t]*\r?\n")
+CONTENT_LENGTH = re.compile(rb"(?im)^content-length[ \t]*:[ \t]*([0-9]+)[ \t]*\r?\n")
 
 
-class Incoming:
+class MessageStream:
     """A stream of messages that ends where a header or a message is larger than its limit.
 
     Attributes:
@@ -31,7 +36,7 @@ class Incoming:
         if self._header > most:
             self.refused = f"the header of a message is too large: {beyond('header_bytes')}"
             return b""
-        length = _LENGTH.fullmatch(line)
+        length = CONTENT_LENGTH.fullmatch(line)
         most = limit("message_mb") * MEGABYTE
         # Of a length with more digits than the largest has, the number is of no interest.
         if length and (len(length[1].lstrip(b"0")) > len(str(most)) or int(length[1]) > most):
@@ -41,4 +46,7 @@ class Incoming:
 
     def read(self, size: int) -> bytes:
         """Return a message of that many bytes, or what is there before the end."""
-        return self._stream.read(size)
+        body = bytearray()
+        while len(body) < size and (more := self._stream.read(size - len(body))):
+            body += more
+        return bytes(body)
