@@ -45,6 +45,7 @@ from armwright.program.syntax.tree.values import (
     Matrix,
     Mobile,
     Name,
+    Node,
     Number,
     Poison,
     String,
@@ -53,64 +54,25 @@ from armwright.program.syntax.tree.values import (
     chain,
 )
 
-__all__ = [
-    "Affix",
+__all__ = ["Statement", "chain", "dump", "walk"]
+__all__ += ["Declaration", "Header", "Import", "Procedure", "Program", "TypeName", "Units"]
+__all__ += ["Affix", "Assign", "Unfix"]
+__all__ += ["Grasp", "Open", "Operate", "ReadSystem", "ReadVisions"]
+__all__ += [
     "Approach",
-    "ArmName",
-    "Assign",
-    "Binary",
     "Blend",
-    "Block",
-    "Branch",
-    "Call",
     "Clause",
-    "Cobegin",
-    "Declaration",
     "Departure",
     "Directly",
     "Duration",
-    "Expression",
-    "For",
-    "Function",
-    "Grasp",
-    "Halt",
-    "Header",
-    "If",
-    "Import",
-    "Index",
-    "Lock",
-    "Matrix",
-    "Mobile",
     "Move",
-    "Name",
-    "Number",
     "On",
-    "Open",
-    "Operate",
-    "Pause",
-    "Poison",
-    "Print",
-    "Procedure",
-    "Program",
-    "ReadSystem",
-    "ReadVisions",
-    "Repeat",
-    "Retry",
-    "Signal",
     "Speed",
-    "Statement",
     "Straightly",
-    "String",
-    "Try",
-    "TypeName",
-    "Unary",
-    "Unfix",
-    "Units",
-    "Variable",
     "Via",
-    "Wait",
-    "While",
-    "chain",
-    "dump",
-    "walk",
 ]
+__all__ += ["Block", "Branch", "Call", "Cobegin", "For", "Halt", "If", "Lock", "Pause", "Repeat", "Retry", "Signal"]
+__all__ += ["Try", "Wait", "While"]
+__all__ += ["Print"]
+__all__ += ["ArmName", "Expression", "Index", "Mobile", "Name", "Node", "Number", "Poison", "String", "Variable"]
+__all__ += ["Binary", "Function", "Matrix", "Unary"]

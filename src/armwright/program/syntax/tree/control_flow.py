@@ -1,30 +1,28 @@
 """Statements that hold others or decide what is done next."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import attrs
 
 from armwright.program.language.source import Span
-from armwright.program.syntax.tree.values import Expression, Name, Number, Poison, Variable
+from armwright.program.syntax.tree.values import Expression, Name, Node, Number, Poison, Variable
 
 if TYPE_CHECKING:
     from armwright.program.syntax.tree.statements import Statement
 
 
 @attrs.frozen
-class Block:
+class Block(Node):
     """``BEGIN statements END``; ``end`` is its END."""
 
-    span: Span
     statements: tuple["Statement", ...]
     end: Span
 
 
 @attrs.frozen
-class If:
+class If(Node):
     """``IF condition THEN statement [ELSE statement]``; ``head`` reaches up to THEN."""
 
-    span: Span
     head: Span
     condition: Expression
     then: "Statement"
@@ -47,30 +45,27 @@ class If:
 
 
 @attrs.frozen
-class While:
+class While(Node):
     """``WHILE condition DO statement``; ``head`` reaches up to DO."""
 
-    span: Span
     head: Span
     condition: Expression
     body: "Statement"
 
 
 @attrs.frozen
-class Repeat:
+class Repeat(Node):
     """``REPEAT statements UNTIL condition``; ``tail`` reaches from UNTIL to the end."""
 
-    span: Span
     body: tuple["Statement", ...]
     tail: Span
     condition: Expression
 
 
 @attrs.frozen
-class For:
+class For(Node):
     """``FOR variable = first TO last [STEP step] DO statement``; ``head`` reaches up to DO."""
 
-    span: Span
     head: Span
     variable: Name | Poison
     first: Expression
@@ -80,63 +75,56 @@ class For:
 
 
 @attrs.frozen
-class Branch:
+class Branch(Node):
     """``[PRIORITY number :] BEGIN ... END``; ``head`` is its first line's words up to BEGIN."""
 
-    span: Span
     head: Span
     priority: Number | None
     body: Block
 
 
 @attrs.frozen
-class Cobegin:
+class Cobegin(Node):
     """``COBEGIN branches COEND``; ``end`` is its COEND."""
 
-    span: Span
     branches: tuple[Branch, ...]
     end: Span
 
 
 @attrs.frozen
-class Signal:
+class Signal(Node):
     """``SIGNAL event``."""
 
-    span: Span
     event: Variable
 
 
 @attrs.frozen
-class Wait:
+class Wait(Node):
     """``WAIT event``."""
 
-    span: Span
     event: Variable
 
 
 @attrs.frozen
-class Pause:
+class Pause(Node):
     """``PAUSE seconds``."""
 
-    span: Span
     duration: Expression
 
 
 @attrs.frozen
-class Lock:
+class Lock(Node):
     """``LOCK (variables) DO statement``; ``head`` reaches up to DO."""
 
-    span: Span
     head: Span
     targets: tuple[Variable, ...]
     body: "Statement"
 
 
 @attrs.frozen
-class Try:
+class Try(Node):
     """``TRY statements RECOVER statements END``; ``recover`` and ``end`` are its words, or where they are missing."""
 
-    span: Span
     body: tuple["Statement", ...]
     recover: Span
     recovery: tuple["Statement", ...]
@@ -144,23 +132,23 @@ class Try:
 
 
 @attrs.frozen
-class Retry:
+class Retry(Node):
     """``RETRY``."""
 
-    span: Span
-
 
 @attrs.frozen
-class Halt:
+class Halt(Node):
     """``HALT``."""
 
-    span: Span
-
 
 @attrs.frozen
-class Call:
+class Call(Node):
     """``name (arguments)``."""
 
-    span: Span
     name: Name
     arguments: tuple[Expression, ...]
+
+
+ControlStatement: TypeAlias = (
+    Block | If | While | Repeat | For | Cobegin | Signal | Wait | Pause | Lock | Try | Retry | Halt | Call
+)

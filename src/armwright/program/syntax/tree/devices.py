@@ -1,48 +1,47 @@
 """Statements about hands, devices and sensors."""
 
+from typing import TypeAlias
+
 import attrs
 
-from armwright.program.language.source import Span
-from armwright.program.syntax.tree.values import Expression, Mobile
+from armwright.program.syntax.tree.values import Expression, Mobile, Node
 
 
 @attrs.frozen
-class Open:
+class Open(Node):
     """``OPEN arm [TO width]``."""
 
-    span: Span
     arm: Mobile
     width: Expression | None = None
 
 
 @attrs.frozen
-class Grasp:
+class Grasp(Node):
     """``GRASP [arm]``."""
 
-    span: Span
     arm: Mobile | None
 
 
 @attrs.frozen
-class Operate:
+class Operate(Node):
     """``OPERATE device [ON | OFF]``."""
 
-    span: Span
     device: Mobile
     on: bool = True
 
 
 @attrs.frozen
-class ReadVisions:
+class ReadVisions(Node):
     """``READ VISIONS (frame, frame)``."""
 
-    span: Span
     targets: tuple[Mobile, ...]
 
 
 @attrs.frozen
-class ReadSystem:
+class ReadSystem(Node):
     """``READ SYSTEM (arm)``."""
 
-    span: Span
     arm: Mobile
+
+
+DeviceStatement: TypeAlias = Open | Grasp | Operate | ReadVisions | ReadSystem

@@ -1,25 +1,25 @@
 """Statements about frames: what a name stands for, and which frame moves with which."""
 
+from typing import TypeAlias
+
 import attrs
 
 from armwright.program.language.source import Span
-from armwright.program.syntax.tree.values import ArmName, Expression, Mobile, Variable
+from armwright.program.syntax.tree.values import ArmName, Expression, Mobile, Node, Variable
 
 
 @attrs.frozen
-class Assign:
+class Assign(Node):
     """``variable = value``."""
 
-    span: Span
     target: Variable | ArmName
     value: Expression
 
 
 @attrs.frozen
-class Affix:
+class Affix(Node):
     """``AFFIX child TO parent [AT step] [RIGIDLY]``; ``link`` reaches from AFFIX to the parent."""
 
-    span: Span
     link: Span
     child: Mobile
     parent: Mobile
@@ -28,9 +28,11 @@ class Affix:
 
 
 @attrs.frozen
-class Unfix:
+class Unfix(Node):
     """``UNFIX child FROM parent``; the parent is missing where it was left out."""
 
-    span: Span
     child: Mobile
     parent: Mobile | None
+
+
+FrameStatement: TypeAlias = Assign | Affix | Unfix

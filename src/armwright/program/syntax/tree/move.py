@@ -5,79 +5,68 @@ from typing import TYPE_CHECKING, TypeAlias
 import attrs
 
 from armwright.program.language.source import Span
-from armwright.program.syntax.tree.values import Expression, Mobile
+from armwright.program.syntax.tree.values import Expression, Mobile, Node
 
 if TYPE_CHECKING:
     from armwright.program.syntax.tree.statements import Statement
 
 
 @attrs.frozen
-class Directly:
+class Directly(Node):
     """The shortest path for the joints."""
 
-    span: Span
-
 
 @attrs.frozen
-class Straightly:
+class Straightly(Node):
     """One straight line."""
 
-    span: Span
-
 
 @attrs.frozen
-class Via:
+class Via(Node):
     """``VIA (points)``."""
 
-    span: Span
     points: tuple[Expression, ...]
 
 
 @attrs.frozen
-class Approach:
+class Approach(Node):
     """``WITH APPROACH = point``."""
 
-    span: Span
     point: Expression
 
 
 @attrs.frozen
-class Departure:
+class Departure(Node):
     """``WITH DEPARTURE = point``."""
 
-    span: Span
     point: Expression
 
 
 @attrs.frozen
-class Speed:
+class Speed(Node):
     """``WITH SPEED = value``."""
 
-    span: Span
     value: Expression
 
 
 @attrs.frozen
-class Blend:
+class Blend(Node):
     """``WITH BLEND = distance``: how far from a via point its corner may be rounded."""
 
-    span: Span
     value: Expression
 
 
 @attrs.frozen
-class Duration:
+class Duration(Node):
     """``WITH DURATION = seconds``."""
 
-    span: Span
     value: Expression
 
 
 @attrs.frozen
-class On:
+class On(Node):
     """``ON condition DO action``; ``head`` reaches from ON to the end of the condition."""
 
-    span: Span
     head: Span
     condition: Expression
     action: "Statement"
@@ -87,10 +76,9 @@ Clause: TypeAlias = Directly | Straightly | Via | Approach | Departure | Speed |
 
 
 @attrs.frozen
-class Move:
+class Move(Node):
     """``MOVE moved TO goal clauses``."""
 
-    span: Span
     moved: Mobile
     goal: Expression
     clauses: tuple[Clause, ...]

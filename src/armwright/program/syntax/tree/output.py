@@ -2,13 +2,11 @@
 
 import attrs
 
-from armwright.program.language.source import Span
-from armwright.program.syntax.tree.values import Expression, String
+from armwright.program.syntax.tree.values import Expression, Node, String
 
 
 @attrs.frozen
-class Print:
+class Print(Node):
     """``PRINT (values and strings)``."""
 
-    span: Span
     items: tuple[Expression | String, ...]

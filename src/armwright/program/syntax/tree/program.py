@@ -7,11 +7,11 @@ import attrs
 from armwright.program.language.source import Span
 from armwright.program.syntax.tree.control_flow import Block
 from armwright.program.syntax.tree.statements import Statement
-from armwright.program.syntax.tree.values import Name, Number, String
+from armwright.program.syntax.tree.values import Name, Node, Number, String
 
 
 @attrs.frozen
-class TypeName:
+class TypeName(Node):
     """The type of a declaration.
 
     Attributes:
@@ -21,42 +21,37 @@ class TypeName:
         sizes: of an array, one for each index; empty for a single thing.
     """
 
-    span: Span
     text: str
     key: str | None
     sizes: tuple[Number, ...] = ()
 
 
 @attrs.frozen
-class Declaration:
+class Declaration(Node):
     """``a, b : TYPE``, in a VAR part or as a parameter."""
 
-    span: Span
     names: tuple[Name, ...]
     type: TypeName
 
 
 @attrs.frozen
-class Import:
+class Import(Node):
     """``IMPORT "file"``."""
 
-    span: Span
     path: String
 
 
 @attrs.frozen
-class Units:
+class Units(Node):
     """``UNITS unit, unit``."""
 
-    span: Span
     units: tuple[Name, ...]
 
 
 @attrs.frozen
-class Procedure:
+class Procedure(Node):
     """``PROCEDURE name (parameters) ; VAR ... BEGIN ... END``; ``head`` reaches up to the closing parenthesis."""
 
-    span: Span
     head: Span
     name: Name
     parameters: tuple[Declaration, ...]
@@ -68,7 +63,7 @@ Header: TypeAlias = Declaration | Import | Units | Procedure
 
 
 @attrs.frozen
-class Program:
+class Program(Node):
     """A whole program.
 
     Attributes:
@@ -78,7 +73,6 @@ class Program:
         end: the closing END.
     """
 
-    span: Span
     headers: tuple[Header, ...]
     statements: tuple[Statement, ...]
     end: Span

@@ -2,10 +2,8 @@
 
 from collections.abc import Iterator
 
-import attrs
-
 from armwright.program.language.source import Span
-from armwright.program.syntax.tree.values import Number
+from armwright.program.syntax.tree.values import Node, Number
 
 # Deeper levels are not shown further to the right.
 _MAX_SHOWN_DEPTH = 100
@@ -18,7 +16,7 @@ def walk(node: object) -> Iterator[object]:
         now = waiting.pop()
         if isinstance(now, tuple):
             waiting += reversed(now)
-        elif attrs.has(type(now)):
+        elif isinstance(now, Node):
             yield now
             waiting += [value for _, value in reversed([*_fields(now)])]
 
@@ -40,7 +38,7 @@ def dump(node: object) -> Iterator[str]:
             else:
                 waiting += [(item, depth, field) for item in reversed(now)]
             continue
-        if not attrs.has(type(now)):
+        if not isinstance(now, Node):
             yield f"{head}{now}"
             continue
         parts = {name: value for name, value in _fields(now) if name != "key" and value is not None and value != ()}
@@ -50,8 +48,8 @@ def dump(node: object) -> Iterator[str]:
         waiting += [(value, depth + 1, name) for name, value in reversed(inner)]
 
 
-def _fields(node: object) -> Iterator[tuple[str, object]]:
-    for attribute in type(node).__attrs_attrs__:  # type: ignore[attr-defined]
+def _fields(node: Node) -> Iterator[tuple[str, object]]:
+    for attribute in type(node).__attrs_attrs__:
         value = getattr(node, attribute.name)
         if not isinstance(value, Span):
             yield attribute.name, value

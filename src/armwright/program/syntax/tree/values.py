@@ -8,25 +8,30 @@ from armwright.program.language.source import Span
 
 
 @attrs.frozen
-class Name:
+class Node:
+    """A part of the tree, and where it stands in the text."""
+
+    span: Span
+
+
+@attrs.frozen
+class Name(Node):
     """A name as used: of a variable, a station, a device."""
 
-    span: Span
     text: str
     key: str
 
 
 @attrs.frozen
-class ArmName:
+class ArmName(Node):
     """An arm; ``key`` is the canonical ``ARM_1``."""
 
-    span: Span
     text: str
     key: str
 
 
 @attrs.frozen
-class Poison:
+class Poison(Node):
     """Something that was reported and is passed over from here on: what it contains is unknown.
 
     Attributes:
@@ -34,12 +39,11 @@ class Poison:
         names: the keys of the names that occur in it.
     """
 
-    span: Span
     names: frozenset[str] = frozenset()
 
 
 @attrs.frozen
-class Number:
+class Number(Node):
     """A number with its sign.
 
     Attributes:
@@ -49,52 +53,46 @@ class Number:
         unit: in upper case, such as ``MM``; None without one.
     """
 
-    span: Span
     text: str
     value: float
     unit: str | None = None
 
 
 @attrs.frozen
-class String:
+class String(Node):
     """``"characters"``; the value is what stands between the marks."""
 
-    span: Span
     value: str
 
 
 @attrs.frozen
-class Index:
+class Index(Node):
     """``name[i, j]``: an element of an array."""
 
-    span: Span
     name: Name
     indices: tuple["Expression", ...]
 
 
 @attrs.frozen
-class Function:
+class Function(Node):
     """``NAME(arguments)`` as a value."""
 
-    span: Span
     name: Name
     arguments: tuple["Expression", ...]
 
 
 @attrs.frozen
-class Unary:
+class Unary(Node):
     """``-x`` or ``NOT x``; a minus right before a number is the number's sign and no operation."""
 
-    span: Span
     operation: str
     operand: "Expression"
 
 
 @attrs.frozen
-class Binary:
+class Binary(Node):
     """``a * b``; the operation is one of ``+ - * / < <= = <> >= > AND OR``."""
 
-    span: Span
     operation: str
     left: "Expression"
     right: "Expression"
@@ -114,10 +112,9 @@ def chain(node: Binary) -> tuple["Expression", list[Binary]]:
 
 
 @attrs.frozen
-class Matrix:
+class Matrix(Node):
     """Values in parentheses; twelve if all is well, n, o, a, p column by column."""
 
-    span: Span
     items: tuple["Expression", ...]
 
 
