@@ -7,6 +7,7 @@ from armwright.cell.simulator import Simulator
 from armwright.program.debugger.breakpoints import CountError
 from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
 from armwright.program.debugger.expressions import ExpressionError
+from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Variable
 from armwright.program.language.words import Standard
 from armwright.program.vm.interpreter import Limits, interpret
@@ -34,6 +35,14 @@ def load(text: str, cell: str = "cell1", limits: Limits | None = None) -> Debugg
     return debugger
 
 
+def run(debugger: Debugger, command: Command, path: tuple[int, ...] = ()) -> Stop:
+    """Let the run go on to its next stop."""
+    debugger.resume(command, path)
+    stop = debugger.work()
+    assert stop is not None
+    return stop
+
+
 def line(debugger: Debugger, path: tuple[int, ...] = ()) -> int:
     return debugger.code.source.line(debugger.stack(path)[0].span.start)
 
@@ -42,7 +51,7 @@ def lines(debugger: Debugger, command: Command, count: int) -> list[int]:
     """Make so many steps; return the lines they end in."""
     found = []
     for _ in range(count):
-        stop = debugger.run(command)
+        stop = run(debugger, command)
         found.append(line(debugger, stop.path))
     return found
 
@@ -113,7 +122,7 @@ def test_whole_program_by_steps_is_the_same_run() -> None:
     expected = interpret(code_of(text, cell), cell, Simulator(cell))
     debugger = load(text, "cell2")
     while not debugger.over:
-        debugger.run("in")
+        run(debugger, "in")
     recording = debugger.machine.recording()
 
     assert recording.trace() == expected.trace()
@@ -125,7 +134,7 @@ def test_stages() -> None:
     """A step by stage stops where each part of a MOVE begins, and in front of the statement behind it."""
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 6)
-    texts = [debugger.run("stage").text for _ in range(3)]
+    texts = [run(debugger, "stage").text for _ in range(3)]
 
     assert texts == ["ARM_1 begins PTP apf1", "ARM_1 begins LINE obj1", ""]
     assert line(debugger) == 13
@@ -135,12 +144,12 @@ def test_ticks_show_the_arm_on_its_way() -> None:
     """A step by tick is one period of the servo; the arm is shown where it is, the program's own table stays."""
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 6)
-    debugger.run("stage")
+    run(debugger, "stage")
     before = debugger.machine.state.tree.world("ARM_1")
-    debugger.run("stage")
+    run(debugger, "stage")
     begun = debugger.time
     for count in range(1, 4):
-        debugger.run("tick")
+        run(debugger, "tick")
         assert debugger.time == pytest.approx(begun + count * debugger.machine.cell.period)
     configuration = debugger.machine.hardware.configuration("ARM_1", debugger.time)
     cell = debugger.machine.cell.arms["ARM_1"]
@@ -158,9 +167,9 @@ def test_what_hangs_on_an_arm_is_shown_moving() -> None:
     """In the middle of a motion a frame that hangs on the hand is shown as far from it as ever."""
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 8)
-    debugger.run("stage")
+    run(debugger, "stage")
     for _ in range(200):
-        debugger.run("tick")
+        run(debugger, "tick")
     tree = debugger.view.state.tree
 
     assert np.linalg.norm(tree.world("APF1")[:3, 3] - down(0.40, 0.15, 0.15)[:3, 3]) > 1e-3
@@ -176,11 +185,11 @@ def test_every_step_back_is_where_a_step_forward_was() -> None:
     way = []
     while True:
         way.append((line(debugger), debugger.time, debugger.evaluate("frames").value))
-        if debugger.run("next").over:
+        if run(debugger, "next").over:
             break
     back = []
     for _ in way:
-        debugger.run("back")
+        run(debugger, "back")
         back.append((line(debugger), debugger.time, debugger.evaluate("frames").value))
 
     assert back == way[::-1]
@@ -200,7 +209,7 @@ def test_back_to_the_start() -> None:
     """In front of the first statement there is nothing to go back to."""
     debugger = load(LOOP)
 
-    assert debugger.run("back").reason == "start"
+    assert run(debugger, "back").reason == "start"
     assert lines(debugger, "next", 1) == [4]
 
 
@@ -210,10 +219,10 @@ def test_tick_back() -> None:
     lines(debugger, "next", 6)
     places = []
     for _ in range(4):
-        debugger.run("tick")
+        run(debugger, "tick")
         places.append(debugger.view.state.tree.world("ARM_1"))
     for expected in places[-2::-1]:
-        debugger.run("tick back")
+        run(debugger, "tick back")
         np.testing.assert_array_equal(debugger.view.state.tree.world("ARM_1"), expected)
 
 
@@ -222,9 +231,9 @@ def test_reverse_finds_the_last_breakpoint() -> None:
     debugger = load(LOOP)
     debugger.break_at(5)
     for _ in range(4):
-        debugger.run("continue")
+        run(debugger, "continue")
     values = []
-    while (stop := debugger.run("reverse")).reason == "breakpoint":
+    while (stop := run(debugger, "reverse")).reason == "breakpoint":
         values.append(debugger.evaluate("i").value)
 
     assert values == ["3", "2", "1"]
@@ -234,12 +243,12 @@ def test_reverse_finds_the_last_breakpoint() -> None:
 def test_back_after_the_end() -> None:
     """A program that is over can be taken back, and goes on from there to the same end."""
     debugger = load(LOOP)
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "end"
     with pytest.raises(DebuggerError, match="over"):
-        debugger.run("next")
+        run(debugger, "next")
 
     assert lines(debugger, "back", 2) == [7, 6]
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "end"
     assert printed(debugger) == ["15"]
 
 
@@ -250,10 +259,10 @@ def test_long_runs_are_taken_back_soon() -> None:
     text = "VAR i, n : SCALAR ; BEGIN n = 0 ; FOR i = 1 TO 60000 DO n = n + i ; PRINT(n) END."
     debugger = load(text)
     begun = time.perf_counter()
-    debugger.run("continue")
+    run(debugger, "continue")
     whole = time.perf_counter() - begun
     begun = time.perf_counter()
-    debugger.run("back")
+    run(debugger, "back")
 
     assert time.perf_counter() - begun < whole / 2
 
@@ -280,7 +289,7 @@ def test_breakpoint_in_a_procedure() -> None:
     debugger.break_at(5)
 
     values = []
-    while debugger.run("continue").reason == "breakpoint":
+    while run(debugger, "continue").reason == "breakpoint":
         values.append(debugger.evaluate("double").value)
     assert values == ["2", "4"]
 
@@ -296,7 +305,7 @@ def test_conditions_and_counts() -> None:
         debugger = load(LOOP)
         debugger.break_at(5, **more)
         seen = []
-        while debugger.run("continue").reason == "breakpoint":
+        while run(debugger, "continue").reason == "breakpoint":
             seen.append(debugger.evaluate("i").value)
         assert seen == expected
 
@@ -311,7 +320,7 @@ def test_conditions_that_make_no_sense() -> None:
     assert debugger.break_at(5, hits="often").message == "expected a count such as `3`, `>= 3` or `% 3`, got `often`"
     with pytest.raises(CountError, match="expected a count"):
         debugger.watch("N", hits="-1")
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "end"
 
 
 def test_a_condition_without_a_value_stops() -> None:
@@ -319,7 +328,7 @@ def test_a_condition_without_a_value_stops() -> None:
     debugger = load("VAR i, n : SCALAR ;\nBEGIN\n  i = 1 ;\n  n = 2 ;\n  PRINT(n, i)\nEND.")
     debugger.break_at(4, condition="n = 2")
 
-    stop = debugger.run("continue")
+    stop = run(debugger, "continue")
     assert stop.reason == "breakpoint"
     assert "`n` is used before it has a value" in stop.text
 
@@ -329,7 +338,7 @@ def test_log_points() -> None:
     debugger = load(LOOP)
     debugger.break_at(5, log="{i} of 5, n = {n * 10}")
 
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "end"
     assert [text for text, _ in debugger.log_messages()] == [
         f"{i} of 5, n = {10 * n}" for i, n in zip("12345", (0, 1, 3, 6, 10), strict=True)
     ]
@@ -341,7 +350,7 @@ def test_watched_variable() -> None:
     debugger.watch("N")
 
     texts = []
-    while (stop := debugger.run("continue")).reason == "data breakpoint":
+    while (stop := run(debugger, "continue")).reason == "data breakpoint":
         texts.append(stop.text)
     assert texts == ["n = 0", "n = 1, was 0", "n = 3, was 1", "n = 6, was 3", "n = 10, was 6", "n = 15, was 10"]
 
@@ -351,14 +360,14 @@ def test_watched_frame_on_an_arm() -> None:
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 7)
     debugger.watch("APF1")
-    stop = debugger.run("continue")
+    stop = run(debugger, "continue")
 
     assert stop.text == "apf1 begins to move with ARM_1"
     assert line(debugger) == 14
     motion = debugger.machine.state.program.motion
     assert motion is not None
     assert 1 <= debugger.view.state.ticks - motion.begun.tick < 20
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "end"
 
 
 def test_watched_frame_that_is_placed() -> None:
@@ -369,7 +378,7 @@ def test_watched_frame_that_is_placed() -> None:
     )
     debugger.watch("G")
 
-    stops = [debugger.run("continue") for _ in range(3)]
+    stops = [run(debugger, "continue") for _ in range(3)]
     assert [stop.text for stop in stops] == ["g has a value", "g has moved", ""]
     assert [stop.reason for stop in stops] == ["data breakpoint", "data breakpoint", "end"]
 
@@ -380,10 +389,10 @@ def test_reverse_to_a_movement() -> None:
     lines(debugger, "next", 9)
     debugger.watch("OBJ1")
 
-    stop = debugger.run("reverse")
+    stop = run(debugger, "reverse")
     assert stop.text == "obj1 begins to move with ARM_1"
     assert line(debugger) == 14
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "end"
 
 
 # ---- processes -----------------------------------------------------------------------------------------------------
@@ -393,7 +402,7 @@ def test_branches_have_stacks_of_their_own() -> None:
     """In a COBEGIN each branch is where it is, and the program waits at the COBEGIN."""
     debugger = load(corpus_text("p08"), "cell2")
     debugger.break_at(26)
-    stop = debugger.run("continue")
+    stop = run(debugger, "continue")
 
     assert stop.path == (1,)
     assert [one.title for one in debugger.processes] == ["program", "branch 1", "branch 2"]
@@ -404,10 +413,10 @@ def test_steps_of_one_branch() -> None:
     """Steps of one branch stop in its statements only, while the other goes on beside it."""
     debugger = load(corpus_text("p08"), "cell2")
     debugger.break_at(25)
-    debugger.run("continue")
+    run(debugger, "continue")
     seen = []
     for _ in range(4):
-        stop = debugger.run("next", (1,))
+        stop = run(debugger, "next", (1,))
         seen.append((stop.path, line(debugger, (1,))))
 
     assert seen == [((1,), 27), ((1,), 28), ((1,), 29), ((1,), 30)]
@@ -419,11 +428,11 @@ def test_a_step_in_front_of_a_cobegin() -> None:
     text = "VAR n : SCALAR ;\nBEGIN\n  COBEGIN\n    BEGIN\n      n = 1\n    END ;\n    BEGIN\n      PAUSE 1\n    END\n"
     text += "  COEND ;\n  PRINT(n)\nEND.\n"
     debugger = load(text)
-    stop = debugger.run("in")
+    stop = run(debugger, "in")
     assert (stop.path, line(debugger, stop.path)) == ((0,), 5)
-    debugger.run("back", (0,))
+    run(debugger, "back", (0,))
     assert line(debugger) == 3
-    stop = debugger.run("next")
+    stop = run(debugger, "next")
 
     assert (stop.path, line(debugger), debugger.time) == ((), 11, 1.0)
 
@@ -432,8 +441,8 @@ def test_a_branch_that_ends() -> None:
     """A step behind the last statement of a branch ends where the program that began it goes on."""
     debugger = load(corpus_text("p08"), "cell2")
     debugger.break_at(36)
-    debugger.run("continue")
-    stops = [debugger.run("next", (1,)) for _ in range(2)]
+    run(debugger, "continue")
+    stops = [run(debugger, "next", (1,)) for _ in range(2)]
 
     assert [stop.path for stop in stops] == [(1,), ()]
     assert line(debugger) == 39
@@ -444,8 +453,8 @@ def test_waiting_is_one_statement() -> None:
     debugger = load(corpus_text("p08"), "cell2")
     debugger.break_at(27)
 
-    assert debugger.run("continue").reason == "breakpoint"
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "breakpoint"
+    assert run(debugger, "continue").reason == "end"
 
 
 # ---- errors --------------------------------------------------------------------------------------------------------
@@ -459,7 +468,7 @@ FAR = (
 def test_an_error_stops_at_its_place() -> None:
     """An error stops the run in front of what went wrong, with all as it was; then the program is over."""
     debugger = load(FAR)
-    stop = debugger.run("continue")
+    stop = run(debugger, "continue")
 
     assert stop.reason == "exception"
     assert stop.diagnostic is not None
@@ -467,7 +476,7 @@ def test_an_error_stops_at_its_place() -> None:
     assert line(debugger) == 5
     assert debugger.machine.hardware.running() == {"LAMP"}
     assert inside(debugger.evaluate("f"))["p"].value == "(9, 0, 0.2)"
-    assert debugger.run("continue").reason == "failed"
+    assert run(debugger, "continue").reason == "failed"
     assert debugger.machine.hardware.running() == frozenset()
     assert lines(debugger, "back", 1) == [5]
 
@@ -478,7 +487,7 @@ def test_an_error_in_a_procedure_shows_the_stack() -> None:
         "PROCEDURE part(k : SCALAR) ;\nVAR r : SCALAR ;\nBEGIN\n  r = 1 / k\nEND ;\n"
         "BEGIN\n  part(1) ;\n  part(0)\nEND.\n"
     )
-    stop = debugger.run("continue")
+    stop = run(debugger, "continue")
 
     assert stop.diagnostic is not None
     assert stop.diagnostic.code == "E240"
@@ -490,20 +499,20 @@ def test_errors_with_a_recovery() -> None:
     """An error with a RECOVER stops the run only when that is asked for."""
     text = "VAR n : SCALAR ;\nBEGIN\n  n = 0 ;\n  TRY\n    n = 1 / n\n  RECOVER\n    n = 7\n  END ;\n  PRINT(n)\nEND.\n"
     quiet = load(text)
-    assert quiet.run("continue").reason == "end"
+    assert run(quiet, "continue").reason == "end"
     debugger = load(text)
     debugger.execution.catches = frozenset({"uncaught", "caught"})
-    stop = debugger.run("continue")
+    stop = run(debugger, "continue")
 
     assert (stop.reason, stop.caught, line(debugger)) == ("exception", True, 5)
     assert lines(debugger, "next", 1) == [7]
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "end"
 
 
 def test_processes_that_wait_for_ever() -> None:
     """A deadlock stops the run at the processes that wait."""
     debugger = load("VAR e : EVENT ; n : SCALAR ;\nBEGIN\n  n = 0 ;\n  IF n = 1 THEN SIGNAL e ;\n  WAIT e\nEND.\n")
-    stop = debugger.run("continue")
+    stop = run(debugger, "continue")
 
     assert stop.diagnostic is not None
     assert stop.diagnostic.code == "E501"
@@ -518,7 +527,7 @@ def test_an_error_on_the_way() -> None:
     )
     text = text.replace("BEGIN\n  g", "BEGIN\n  m = 0 ;\n  g", 1)
     debugger = load(text, "cell2")
-    stop = debugger.run("continue")
+    stop = run(debugger, "continue")
 
     assert stop.reason == "exception"
     assert stop.path == (0,)
@@ -550,7 +559,7 @@ def test_what_an_arm_shows() -> None:
     """An arm shows its joints in degrees and millimetres, its hand, and the stage that it is in."""
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 6)
-    debugger.run("stage")
+    run(debugger, "stage")
     shown = inside(scope(debugger, "Arms")["ARM_1"])
 
     q = debugger.machine.cell.arms["ARM_1"].start
@@ -563,7 +572,7 @@ def test_what_an_arm_shows() -> None:
 def test_units() -> None:
     """Lengths are shown in the unit of the program."""
     debugger = load("UNITS MM ;\nVAR f : FRAME ;\nBEGIN\n  f = (1,0,0, 0,1,0, 0,0,1, 400,0,20) ;\n  PRINT(f)\nEND.\n")
-    debugger.run("next")
+    run(debugger, "next")
 
     assert inside(debugger.evaluate("f"))["p"].value == "(400, 0, 20)"
     assert debugger.evaluate("DIST(f, f * XYZ(0, 3cm, 0))").value == "30"
@@ -573,7 +582,7 @@ def test_arrays() -> None:
     """An array opens to its elements, by their indices."""
     debugger = load(corpus_text("p05"))
     debugger.break_at(18)
-    debugger.run("continue")
+    run(debugger, "continue")
     slots = scope(debugger, "Variables")["slot"]
 
     assert (slots.type, slots.elements) == ("ARRAY [2,3] OF FRAME", 6)
@@ -627,7 +636,7 @@ def test_looking_changes_nothing() -> None:
     cell = cell_of("cell1")
     expected = interpret(code_of(corpus_text("p02"), cell), cell, Simulator(cell))
     debugger = load(corpus_text("p02"))
-    while not debugger.run("stage").over:
+    while not run(debugger, "stage").over:
         for one in debugger.scopes():
             for shown in inside(one).values():
                 if shown.inside is not None:
@@ -643,14 +652,14 @@ def test_another_value() -> None:
     """The run goes on with a value that it was given, and a step back forgets it."""
     debugger = load(LOOP)
     debugger.break_at(6)
-    debugger.run("continue")
+    run(debugger, "continue")
     assert debugger.assign("N", "n * 2 + 1").value == "31"
-    debugger.run("next")
+    run(debugger, "next")
     assert printed(debugger) == ["31"]
     lines(debugger, "back", 1)
     assert debugger.evaluate("n").value == "31"
     lines(debugger, "back", 2)
-    debugger.run("continue")
+    run(debugger, "continue")
 
     assert debugger.evaluate("n").value == "15"
 
@@ -660,7 +669,7 @@ def test_another_place() -> None:
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 8)
     debugger.assign("OBJ2", "(1,0,0, 0,-1,0, 0,0,-1, 0.5,0.1,0.1)")
-    debugger.run("continue")
+    run(debugger, "continue")
 
     np.testing.assert_allclose(debugger.machine.state.tree.world("ARM_1"), down(0.5, 0.1, 0.1), atol=1e-6)
 
@@ -676,9 +685,9 @@ def test_values_that_cannot_be_given() -> None:
     ):
         with pytest.raises(ExpressionError, match=message):
             debugger.assign(kept, text)
-    debugger.run("next")
-    debugger.run("next")
-    debugger.run("stage")
+    run(debugger, "next")
+    run(debugger, "next")
+    run(debugger, "stage")
     with pytest.raises(ExpressionError, match="being moved"):
         debugger.assign("APF1", "obj2")
 
@@ -689,11 +698,11 @@ def test_pause_of_an_endless_loop() -> None:
     debugger.resume("continue")
     assert debugger.work(0.05) is None
     with pytest.raises(DebuggerError, match="running"):
-        debugger.run("next")
+        run(debugger, "next")
     stop = debugger.pause()
     assert stop.reason == "pause"
     assert line(debugger) in {4, 5}
     debugger.assign("N", "5")
 
-    assert debugger.run("continue").reason == "end"
+    assert run(debugger, "continue").reason == "end"
     assert printed(debugger) == ["5"]

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from armwright.errors import ArmwrightError
-from armwright.program.debugger.dap_messages import Arguments, RequestError
+from armwright.program.debugger.dap_messages import Arguments
 from armwright.program.debugger.dap_session import LISTED, EditorSession
 
 
@@ -14,7 +14,7 @@ def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, A
     source = arguments.part("source")
     requests = arguments.parts("breakpoints")
     for request in requests:
-        request.whole("line")
+        request.get(int, "line")
     if session.launch is not None and not _is_debugged(session, source):
         message = "this is not the program that is debugged"
         return {"breakpoints": [{"id": next(session.ids), "verified": False, "message": message} for _ in requests]}
@@ -27,8 +27,8 @@ def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, A
 def _is_debugged(session: EditorSession, source: Arguments) -> bool:
     """Whether a text is that of the program, which lies in a file of its own or in a file of code."""
     if session.loaded is not None and session.loaded.is_listed:
-        return source.whole("sourceReference", 0) == LISTED
-    path = source.text("path", "")
+        return source.get(int, "sourceReference", 0) == LISTED
+    path = source.get(str, "path", "")
     return bool(path) and session.launch is not None and _same(path, session.launch.program)
 
 
@@ -41,25 +41,23 @@ def _same(path: str, program: Path) -> bool:
 
 def breakpoint_locations(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``breakpointLocations``: where statements begin."""
-    first = arguments.whole("line")
+    first = arguments.get(int, "line")
     offset = 1 - session.first_line
     statements = session.live.execution.statements
-    starts = statements.between(first + offset, arguments.whole("endLine", first) + offset)
+    starts = statements.between(first + offset, arguments.get(int, "endLine", first) + offset)
     return {"breakpoints": [session.location(start.span) for start in starts]}
 
 
 def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``dataBreakpointInfo``: what of all that is shown can be watched."""
-    name = arguments.text("name")
+    name = arguments.get(str, "name")
     debugger = session.standing
     try:
-        if arguments.whole("variablesReference", 0):
+        if arguments.get(int, "variablesReference", 0):
             variables, _, _ = session.variables(arguments)
             slot = next((variable.slot for variable in variables if variable.name == name), None)
         else:
-            number = arguments.whole("frameId", 0)
-            path, level = session.frames[number - 1] if 0 < number <= len(session.frames) else ((), 0)
-            slot = debugger.evaluate(name, path, level).slot
+            slot = debugger.evaluate(name, *session.frame(arguments)).slot
     except ArmwrightError as error:
         return {"dataId": None, "description": str(error)}
     if slot is None or debugger.machine.type_of(slot).sizes:
@@ -72,7 +70,7 @@ def set_data_breakpoints(session: EditorSession, arguments: Arguments) -> dict[s
     """Answer ``setDataBreakpoints``: all frames and variables that are watched, instead of those before."""
     debugger = session.live
     session.data_breakpoints = [
-        (next(session.ids), part.text("dataId"), part.text("condition", ""), part.text("hitCondition", ""))
+        (next(session.ids), part.get(str, "dataId"), part.get(str, "condition", ""), part.get(str, "hitCondition", ""))
         for part in arguments.parts("breakpoints")
     ]
     debugger.execution.watches.clear()
@@ -81,10 +79,7 @@ def set_data_breakpoints(session: EditorSession, arguments: Arguments) -> dict[s
 
 def set_exception_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setExceptionBreakpoints``: which errors to stop at."""
-    filters = arguments.given.get("filters", [])
-    if not isinstance(filters, list):
-        raise RequestError("filters: expected a list")
-    session.catches = frozenset(map(str, filters))
+    session.catches = frozenset(map(str, arguments.get(list, "filters", [])))
     if session.debugger is not None:
         session.debugger.execution.catches = session.catches
     return {}

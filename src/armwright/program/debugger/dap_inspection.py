@@ -34,9 +34,9 @@ def threads(session: EditorSession, _: Arguments) -> dict[str, Any]:
 def stack_trace(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``stackTrace``: where a process is, the innermost first."""
     debugger = session.standing
-    path = session.process(arguments.whole("threadId"))
+    path = session.process(arguments.get(int, "threadId"))
     frames = debugger.stack(path)
-    first, count = arguments.whole("startFrame", 0), arguments.whole("levels", 0) or len(frames)
+    first, count = arguments.get(int, "startFrame", 0), arguments.get(int, "levels", 0) or len(frames)
     answers = []
     for level, frame in enumerate(frames):
         if first <= level < first + count:
@@ -49,8 +49,8 @@ def stack_trace(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
 def scopes(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``scopes``: locals, variables, frames, arms, the run."""
     debugger = session.standing
-    arguments.whole("frameId")
-    path, level = _frame(session, arguments)
+    arguments.get(int, "frameId")  # must be there
+    path, level = session.frame(arguments)
     answers = []
     for scope in debugger.scopes(path, level):
         reference = _open(session, scope, path, level)
@@ -62,9 +62,9 @@ def variables(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``variables``: what is inside of something."""
     session.live  # noqa: B018 - there must be a program
     group, path, level = session.variables(arguments)
-    if arguments.text("filter", "") == ("named" if isinstance(group, Elements) else "indexed"):
+    if arguments.get(str, "filter", "") == ("named" if isinstance(group, Elements) else "indexed"):
         group = ()
-    first, count = arguments.whole("start", 0), arguments.whole("count", 0) or _MAX_ELEMENTS
+    first, count = arguments.get(int, "start", 0), arguments.get(int, "count", 0) or _MAX_ELEMENTS
     listed = group[first : first + count]
     return {"variables": [{"name": variable.name, **_variable(session, variable, path, level)} for variable in listed]}
 
@@ -75,9 +75,9 @@ def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     In the console ``hit = 7`` gives a value, as it does in a program; for a comparison one writes ``(hit = 7)``.
     """
     debugger = session.standing
-    path, level = _frame(session, arguments)
-    text = arguments.text("expression").strip().rstrip(";")
-    assignment = _ASSIGNMENT.fullmatch(text) if arguments.text("context", "") == "repl" else None
+    path, level = session.frame(arguments)
+    text = arguments.get(str, "expression").strip().rstrip(";")
+    assignment = _ASSIGNMENT.fullmatch(text) if arguments.get(str, "context", "") == "repl" else None
     if assignment is None:
         variable = debugger.evaluate(text, path, level)
     else:
@@ -91,33 +91,33 @@ def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
 
 def set_variable(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setVariable``: give what is shown another value."""
-    name, debugger = arguments.text("name"), session.standing
+    name, debugger = arguments.get(str, "name"), session.standing
     group, path, level = session.variables(arguments)
     slot = next((variable.slot for variable in group if variable.name == name), None)
     if slot is None:
         raise RequestError(f"{name} cannot be given a value")
-    return _variable(session, debugger.assign(slot, arguments.text("value"), path, level), path, level)
+    return _variable(session, debugger.assign(slot, arguments.get(str, "value"), path, level), path, level)
 
 
 def set_expression(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setExpression``: the same for what an expression names."""
     debugger = session.standing
-    path, level = _frame(session, arguments)
-    slot = debugger.evaluate(arguments.text("expression"), path, level).slot
+    path, level = session.frame(arguments)
+    slot = debugger.evaluate(arguments.get(str, "expression"), path, level).slot
     if slot is None:
         raise RequestError("only variables, frames and elements can be given a value")
-    return _variable(session, debugger.assign(slot, arguments.text("value"), path, level), path, level)
+    return _variable(session, debugger.assign(slot, arguments.get(str, "value"), path, level), path, level)
 
 
 def completions(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``completions``: names that begin with what has been typed."""
     debugger = session.standing
-    column = arguments.whole("column") - session.first_column
-    ruler = PositionCodec(arguments.text("text"), UTF_16)
-    end = ruler.offset(arguments.whole("line", session.first_line) - session.first_line, column)
+    column = arguments.get(int, "column") - session.first_column
+    ruler = PositionCodec(arguments.get(str, "text"), UTF_16)
+    end = ruler.offset(arguments.get(int, "line", session.first_line) - session.first_line, column)
     match = _WORD.search(ruler.text[:end])
     typed = match[0] if match else ""
-    path, level = _frame(session, arguments)
+    path, level = session.frame(arguments)
     procedure = debugger.stack(path)[level].procedure
     names = [debugger.code.spelled(name) for name in names_at(debugger.machine, procedure)]
     words = sorted({*names, *FUNCTIONS, *debugger.machine.cell.arms, "frames"}, key=str.upper)
@@ -148,16 +148,6 @@ def exception_info(session: EditorSession, _: Arguments) -> dict[str, Any]:
 def source(session: EditorSession, _: Arguments) -> dict[str, Any]:
     """Answer ``source``: the text as it was when it was loaded."""
     return {"content": session.live.code.source.text}
-
-
-def _frame(session: EditorSession, arguments: Arguments) -> tuple[Path, int]:
-    """Return the process and the level of the stack frame of a request; without one those of the program."""
-    if "frameId" not in arguments:
-        return (), 0
-    number = arguments.whole("frameId")
-    if not 0 < number <= len(session.frames):
-        raise RequestError(f"there is no stack frame {number}")
-    return session.frames[number - 1]
 
 
 def _open(session: EditorSession, variable: Variable, path: Path, level: int) -> int:

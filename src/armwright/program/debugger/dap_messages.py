@@ -13,6 +13,15 @@ from armwright.files.message_stream import CONTENT_LENGTH, MessageStream
 
 T = TypeVar("T")
 
+# What people call the types of JSON.
+_TYPES: Mapping[type, str] = {
+    str: "a text",
+    int: "a whole number",
+    bool: "true or false",
+    list: "a list",
+    dict: "an object",
+}
+
 
 class RequestError(ArmwrightError, ValueError):
     """A request cannot be answered; the text goes back to who sent it."""
@@ -68,38 +77,23 @@ class Arguments:
         Raises:
             RequestError: they are no object.
         """
-        self.given: dict[str, Any] = {} if body is None else _as(body, dict, "arguments", "an object")
+        self._values: dict[str, Any] = {} if body is None else _checked(body, dict, "arguments")
 
     def __contains__(self, key: str) -> bool:
         """Whether something is given, and not null."""
-        return self.given.get(key) is not None
+        return self._values.get(key) is not None
 
-    def text(self, key: str, default: str | None = None) -> str:
-        """Return a text.
-
-        Raises:
-            RequestError: it is missing, and there is no default, or is no text.
-        """
-        return self._one(key, str, "a text", default)
-
-    def whole(self, key: str, default: int | None = None) -> int:
-        """Return a whole number.
+    def get(self, kind: type[T], key: str, default: T | None = None) -> T:
+        """Return an argument of some type.
 
         Raises:
-            RequestError: it is missing, and there is no default, or is no whole number.
+            RequestError: it is missing, and there is no default, or it is of another type.
         """
-        value: object = self._one(key, int, "a whole number", default)
-        if isinstance(value, bool):
-            raise RequestError(f"{key}: expected a whole number, got {value}")
-        return _as(value, int, key, "a whole number")
-
-    def flag(self, key: str, *, default: bool = False) -> bool:
-        """Return a truth value.
-
-        Raises:
-            RequestError: it is none.
-        """
-        return self._one(key, bool, "true or false", default)
+        value = self._values.get(key, default)
+        value = default if value is None else value
+        if value is None:
+            raise RequestError(f"{key}: missing, expected {_TYPES[kind]}")
+        return _checked(value, kind, key)
 
     def parts(self, key: str) -> "list[Arguments]":
         """Return a list of objects; an empty one where it is missing.
@@ -107,7 +101,7 @@ class Arguments:
         Raises:
             RequestError: it is no list of objects.
         """
-        return [Arguments(item) for item in self._one(key, list, "a list", [])]
+        return [Arguments(item) for item in self.get(list, key, [])]
 
     def part(self, key: str) -> "Arguments":
         """Return an object.
@@ -115,18 +109,11 @@ class Arguments:
         Raises:
             RequestError: it is missing or none.
         """
-        return Arguments(self._one(key, dict, "an object", None))
-
-    def _one(self, key: str, kind: type[T], what: str, default: T | None) -> T:
-        value = self.given.get(key)
-        if value is None:
-            if default is None:
-                raise RequestError(f"{key}: missing, expected {what}")
-            return default
-        return _as(value, kind, key, what)
+        return Arguments(self.get(dict, key))
 
 
-def _as(value: object, kind: type[T], key: str, what: str) -> T:
-    if not isinstance(value, kind):
-        raise RequestError(f"{key}: expected {what}, got {str(value)[:40]!r}")
+def _checked(value: object, kind: type[T], key: str) -> T:
+    # Of numbers only, true and false are none.
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is int):
+        raise RequestError(f"{key}: expected {_TYPES[kind]}, got {str(value)[:40]!r}")
     return value

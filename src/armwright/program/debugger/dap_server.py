@@ -146,8 +146,8 @@ class Adapter:
         return own[command](Arguments(arguments))
 
     def _initialize(self, arguments: Arguments) -> Mapping[str, Any]:
-        self._session.first_line = int(arguments.flag("linesStartAt1", default=True))
-        self._session.first_column = int(arguments.flag("columnsStartAt1", default=True))
+        self._session.first_line = int(arguments.get(bool, "linesStartAt1", default=True))
+        self._session.first_column = int(arguments.get(bool, "columnsStartAt1", default=True))
         return _CAPABILITIES
 
     def _launch(self, arguments: Arguments) -> None:
@@ -176,12 +176,12 @@ class Adapter:
             session.go(_STEPS[command], ())
             return {"allThreadsContinued": True}
         step: Command = _STEPS[command]
-        granularity = arguments.text("granularity", "statement")
+        granularity = arguments.get(str, "granularity", "statement")
         if granularity not in {"statement", "line", "instruction"}:
             raise RequestError(f"granularity: expected statement, line or instruction, got {granularity!r}")
         if granularity == "instruction":
             step = "tick back" if command == "stepBack" else "tick"
-        session.go(step, session.process(arguments.whole("threadId", 1)))
+        session.go(step, session.process(arguments.get(int, "threadId", 1)))
         return {}
 
     def _pause(self, _: Arguments) -> None:
@@ -223,17 +223,17 @@ def _unformatted(text: str) -> str:
 
 
 def _launched(arguments: Arguments) -> Launch:
-    standard = str(arguments.given.get("std", Standard.RLO_2.value))
+    standard = str(arguments.get(object, "std", Standard.RLO_2.value))
     if standard not in set(Standard):
         raise RequestError(f"std: expected 2 or 83, got {standard!r}")
     return Launch(
-        program=regular(Path(arguments.text("program"))),
-        cell=regular(Path(arguments.text("cell"))) if arguments.text("cell", "") else None,
+        program=regular(Path(arguments.get(str, "program"))),
+        cell=regular(Path(arguments.get(str, "cell"))) if arguments.get(str, "cell", "") else None,
         std=Standard(standard),
-        output=Path(arguments.text("output")) if arguments.text("output", "") else None,
-        stop_on_entry=arguments.flag("stopOnEntry"),
-        no_debug=arguments.flag("noDebug"),
-        strict=arguments.flag("strict"),
+        output=Path(arguments.get(str, "output")) if arguments.get(str, "output", "") else None,
+        stop_on_entry=arguments.get(bool, "stopOnEntry", default=False),
+        no_debug=arguments.get(bool, "noDebug", default=False),
+        strict=arguments.get(bool, "strict", default=False),
     )
 
 

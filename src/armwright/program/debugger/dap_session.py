@@ -323,13 +323,26 @@ class EditorSession:
         start = dict(zip(("line", "column"), position(span.start), strict=True))
         return start | dict(zip(("endLine", "endColumn"), position(span.end), strict=True)) if full else start
 
+    def frame(self, arguments: Arguments) -> tuple[ProcessPath, int]:
+        """Return the process and the level of the stack frame of a request; without one those of the program.
+
+        Raises:
+            RequestError: there is no such stack frame.
+        """
+        if "frameId" not in arguments:
+            return (), 0
+        number = arguments.get(int, "frameId")
+        if not 0 < number <= len(self.frames):
+            raise RequestError(f"there is no stack frame {number}")
+        return self.frames[number - 1]
+
     def variables(self, arguments: Arguments) -> tuple[Sequence[Variable], ProcessPath, int]:
         """Return the variables inside of the one that a request names, with its process and level.
 
         Raises:
             RequestError: there is no such variable.
         """
-        reference = arguments.whole("variablesReference")
+        reference = arguments.get(int, "variablesReference")
         if not 0 < reference <= len(self.opened):
             raise RequestError(f"there is nothing to open under {reference}")
         group, path, level = self.opened[reference - 1]
@@ -358,17 +371,17 @@ class EditorSession:
         """Set a breakpoint; return what the editor has to know of it."""
         if self.debugger is None:
             return {"id": number, "verified": False, "message": "no program has been launched"}
-        line, column = request.whole("line") - self.first_line + 1, None
+        line, column = request.get(int, "line") - self.first_line + 1, None
         if "column" in request:
             source = self.debugger.code.source
             text = source.line_text(line) if 0 < line <= len(source.line_starts) else ""
-            column = PositionCodec(text, UTF_16).offset(0, request.whole("column") - self.first_column) + 1
+            column = PositionCodec(text, UTF_16).offset(0, request.get(int, "column") - self.first_column) + 1
         breakpoint_: Breakpoint = self.debugger.break_at(
             line,
             column,
-            condition=request.text("condition", "").strip(),
-            hits=request.text("hitCondition", "").strip(),
-            log=request.text("logMessage", ""),
+            condition=request.get(str, "condition", "").strip(),
+            hits=request.get(str, "hitCondition", "").strip(),
+            log=request.get(str, "logMessage", ""),
         )
         self.numbers[breakpoint_.number] = number
         if breakpoint_.start is None:

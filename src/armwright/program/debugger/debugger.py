@@ -127,17 +127,6 @@ class Debugger:
                     return None
         return self.stop
 
-    def run(self, command: Command, path: Path = ()) -> Stop:
-        """Let the run go on to its next stop.
-
-        Raises:
-            DebuggerError: as ``resume`` does.
-        """
-        self.resume(command, path)
-        stop = self.work()
-        assert stop is not None  # noqa: S101 - it had all the time it needs
-        return stop
-
     def pause(self) -> Stop:
         """Stop the run where it is; a run backwards is given up."""
         if self._active is not None:
@@ -234,7 +223,7 @@ class Debugger:
         if hits:
             counts(hits, 1)
         if text:
-            expressions.condition(text, names_at(self.machine, procedure), self.code)
+            expressions.condition(text, self.machine, procedure)
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 
@@ -264,7 +253,10 @@ class Debugger:
         Raises:
             DebuggerError: there is no such process.
         """
-        return stack(self.machine, self._process(path), self.execution.statements)
+        process = process_of(self.machine, path)
+        if process is None:
+            raise DebuggerError("this process has ended")
+        return stack(self.machine, process, self.execution.statements)
 
     def scopes(self, path: Path = (), level: int = 0) -> list[Variable]:
         """Return what there is to see from one level of a stack.
@@ -272,7 +264,7 @@ class Debugger:
         Raises:
             DebuggerError: there is no such process or level.
         """
-        return variables.scopes(self.view, self._process(path), self._frame(path, level))
+        return variables.scopes(self.view, self._frame(path, level))
 
     def evaluate(self, text: str, path: Path = (), level: int = 0) -> Variable:
         """Return the value of an expression, as a level of a stack sees it.
@@ -287,16 +279,14 @@ class Debugger:
             DebuggerError: there is no such process or level.
         """
         frame, view = self._frame(path, level), self.view
-        types = names_at(view, frame.procedure)
-        if text.strip().upper() == "FRAMES" and "FRAMES" not in types:
+        if text.strip().upper() == "FRAMES" and "FRAMES" not in names_at(view, frame.procedure):
             return Variable(name="frames", value="\n".join(variables.frames_text(view)))
-        parsed = expressions.parse(text, types, self.code)
-        process = self._process(path)
-        slot = expressions.slot_of(view, process, frame, parsed)
+        parsed = expressions.parse(text, view, frame.procedure)
+        slot = expressions.slot_of(view, frame, parsed)
         if slot is not None:
             return attrs.evolve(variables.variable(view, slot, name=text), expression=text)
         kind = "" if parsed.sort is None else parsed.sort.word
-        return variables.result(view, text, expressions.compute(view, process, frame, parsed), kind)
+        return variables.result(view, text, expressions.compute(view, frame, parsed), kind)
 
     def assign(self, slot: str, text: str, path: Path = (), level: int = 0) -> Variable:
         """Give a variable or a frame another value; the run goes on with it.
@@ -319,7 +309,7 @@ class Debugger:
         moving = mover(view, slot) if kind.kind is VariableKind.FRAME else None
         if moving is not None and not is_arm(slot):
             raise ExpressionError(f"`{view.spelled(slot)}` is being moved; it can be placed when the MOVE is over")
-        value = expressions.value_for(view, self._process(path), frame, text, kind.kind)
+        value = expressions.value_for(view, frame, text, kind.kind)
 
         def change(machine: Machine) -> None:
             assert not isinstance(value, Element)  # noqa: S101 - elements have been read
@@ -333,12 +323,6 @@ class Debugger:
         except RunError as error:
             raise ExpressionError(str(error)) from None
         return variables.variable(self.view, slot)
-
-    def _process(self, path: Path) -> Process:
-        process = process_of(self.machine, path)
-        if process is None:
-            raise DebuggerError("this process has ended")
-        return process
 
     def _frame(self, path: Path, level: int) -> Frame:
         frames = self.stack(path)

@@ -9,7 +9,7 @@ import attrs
 from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.breakpoints import Breakpoint, Watch, counts
-from armwright.program.debugger.expressions import ExpressionError, Parsed, compute, names_at, parse
+from armwright.program.debugger.expressions import ExpressionError, Parsed, compute, parse
 from armwright.program.debugger.history import Path, Timeline
 from armwright.program.debugger.snapshot import mover, process_of, sampled, stack
 from armwright.program.debugger.statements import Statements
@@ -174,8 +174,8 @@ class Execution:
         frame = stack(view, process, self.statements)[0]
         key = condition, frame.procedure
         if key not in self._conditions:
-            self._conditions[key] = parse(condition, names_at(view, frame.procedure), view.code)
-        return bool(compute(view, process, frame, self._conditions[key]))
+            self._conditions[key] = parse(condition, view, frame.procedure)
+        return bool(compute(view, frame, self._conditions[key]))
 
     def _log(self, breakpoint_: Breakpoint, process: Process) -> None:
         if self._silent:
@@ -185,10 +185,8 @@ class Execution:
 
         def value(match: re.Match[str]) -> str:
             try:
-                parsed = parse(match[1], names_at(view, frame.procedure), view.code)
-                if parsed.sort is None:
-                    return match[1]
-                return result(view, "", compute(view, process, frame, parsed), "").value
+                parsed = parse(match[1], view, frame.procedure)
+                return match[1] if parsed.sort is None else result(view, "", compute(view, frame, parsed), "").value
             except ExpressionError as error:
                 return f"({error})"
 

@@ -1,13 +1,13 @@
 """Expressions of the language, worked out in a run that stands still: by its own parser, checker and operations."""
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import attrs
 
 from armwright.errors import ArmwrightError
 from armwright.program.bytecode.emitter import Emitter
-from armwright.program.bytecode.instructions import Code, Instruction, Op, Operand
+from armwright.program.bytecode.instructions import Instruction, Op, Operand
 from armwright.program.debugger.snapshot import Frame
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
@@ -52,18 +52,18 @@ def names_at(machine: Machine, procedure: str | None) -> dict[str, VariableType]
     return {**cell, **PREDECLARED, **machine.code.types, **own}
 
 
-def parse(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
+def parse(text: str, machine: Machine, procedure: str | None) -> Parsed:
     """Read an expression and check what it is made of.
 
     Args:
         text: in RLO-2, whatever the program is written in; a word that names something is a name all the same.
-        types: of the names that it may use.
-        code: the program.
+        machine: whose names it may use.
+        procedure: whose own names it may use; None for those of the program alone.
 
     Raises:
         ExpressionError: it makes no sense.
     """
-    source = Source("expression", text)
+    source, types = Source("expression", text), names_at(machine, procedure)
     scanned = scan(source, text)
     _refuse(scanned.diagnostics)
     named = [attrs.evolve(token, kind=TokenKind.NAME) if token.key in types else token for token in scanned.tokens]
@@ -79,7 +79,7 @@ def parse(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
         return Parsed(source=source, node=node, sort=None)
     names = Names(None)
     names.main.types = dict(types)
-    names.units = code.units
+    names.units = machine.code.units
     sort = type_check.sort(names, node)
     _refuse(names.diagnostics)
     if sort is None:
@@ -87,19 +87,18 @@ def parse(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
     return Parsed(source=source, node=node, sort=sort)
 
 
-def compute(machine: Machine, process: Process, frame: Frame, parsed: Parsed) -> Value:
+def compute(machine: Machine, frame: Frame, parsed: Parsed) -> Value:
     """Return the value of an expression; of an event, how often it was signalled and not yet taken.
 
     Args:
         machine: as it is seen now; nothing in it is changed.
-        process: whose view is asked for.
-        frame: the level of its stack.
+        frame: the level of a stack whose names it uses.
         parsed: no whole array.
 
     Raises:
         ExpressionError: something in it has no value.
     """
-    here, asking, operand = _worked_out(machine, process, frame, parsed)
+    here, asking, operand = _worked_out(machine, frame, parsed)
     if parsed.sort is ExpressionType.EVENT:
         return float(here.state.events.get(here.name(asking, operand), 0))
     try:
@@ -108,7 +107,7 @@ def compute(machine: Machine, process: Process, frame: Frame, parsed: Parsed) ->
         raise ExpressionError(str(error)) from None
 
 
-def slot_of(machine: Machine, process: Process, frame: Frame, parsed: Parsed) -> str | None:
+def slot_of(machine: Machine, frame: Frame, parsed: Parsed) -> str | None:
     """Return where an expression is kept, if it is a variable, an element or an arm; None for anything else.
 
     Raises:
@@ -121,37 +120,37 @@ def slot_of(machine: Machine, process: Process, frame: Frame, parsed: Parsed) ->
         return frame.activation.bindings.get(node.key, node.key)
     if not isinstance(node, tree.Index):
         return None
-    here, asking, operand = _worked_out(machine, process, frame, parsed)
+    here, asking, operand = _worked_out(machine, frame, parsed)
     return here.name(asking, operand)
 
 
-def value_for(machine: Machine, process: Process, frame: Frame, text: str, kind: VariableKind) -> Value:
+def value_for(machine: Machine, frame: Frame, text: str, kind: VariableKind) -> Value:
     """Return the value of an expression that a variable of some kind shall get.
 
     Raises:
         ExpressionError: it makes no sense, has no value, or is of another kind.
     """
-    parsed = parse(text, names_at(machine, frame.procedure), machine.code)
+    parsed = parse(text, machine, frame.procedure)
     expected = OF_KIND[kind]
     if parsed.sort not in FITTING[expected]:
         actual = "an array" if parsed.sort is None else is_what(parsed.node, parsed.sort)
         raise ExpressionError(f"expected {expected.value}, but `{text}` is {actual}")
-    return compute(machine, process, frame, parsed)
+    return compute(machine, frame, parsed)
 
 
-def condition(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
+def condition(text: str, machine: Machine, procedure: str | None) -> Parsed:
     """Read a condition, or a number that may be 0.
 
     Raises:
         ExpressionError: it is neither.
     """
-    parsed = parse(text, types, code)
+    parsed = parse(text, machine, procedure)
     if parsed.sort not in (ExpressionType.CONDITION, ExpressionType.SCALAR):
         raise ExpressionError(f"expected a condition, such as `n > 0`, but `{text}` is none")
     return parsed
 
 
-def _worked_out(machine: Machine, process: Process, frame: Frame, parsed: Parsed) -> tuple[Machine, Process, Operand]:
+def _worked_out(machine: Machine, frame: Frame, parsed: Parsed) -> tuple[Machine, Process, Operand]:
     """Do the steps of an expression: they give values in passing, and nothing else.
 
     Returns:
@@ -163,7 +162,7 @@ def _worked_out(machine: Machine, process: Process, frame: Frame, parsed: Parsed
     emitter = Emitter(parsed.source, machine.code.units)
     operand = emitter.value(parsed.node)
     steps = tuple(emitter.instructions)
-    here, asking = copy.copy(machine), copy.copy(process)
+    here, asking = copy.copy(machine), copy.copy(frame.process)
     here.code = attrs.evolve(machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source)
     here.constants = arrays_of(emitter.constants)
     asking.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]

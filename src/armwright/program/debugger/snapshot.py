@@ -50,12 +50,14 @@ class Frame:
     """One level of the stack of a process: the program itself, a procedure, the action of a MOVE.
 
     Attributes:
+        process: whose stack it is of.
         title: for people.
         span: the statement that it is in.
         activation: its names.
         procedure: whose names these are; None for those of the program.
     """
 
+    process: Process
     title: str
     span: Span
     activation: Activation
@@ -68,7 +70,7 @@ def stack(machine: Machine, process: Process, statements: Statements) -> list[Fr
     index, span = process.at, _where(process, statements)
     for activation in reversed(process.stack):
         title, procedure = _title(machine, process, activation), statements.procedure(index)
-        frames.append(Frame(title=title, span=span, activation=activation, procedure=procedure))
+        frames.append(Frame(process=process, title=title, span=span, activation=activation, procedure=procedure))
         index = activation.back
         if activation.called is not None:
             span = activation.called

@@ -42,12 +42,11 @@ class Variable:
     slot: str | None = None
 
 
-def scopes(machine: Machine, process: Process, frame: Frame) -> list[Variable]:
+def scopes(machine: Machine, frame: Frame) -> list[Variable]:
     """Return what there is to see from one level of a stack.
 
     Args:
         machine: as it is seen now.
-        process: whose level it is.
         frame: the level.
     """
     own = {} if frame.procedure is None else machine.code.procedures[frame.procedure].types
@@ -59,7 +58,7 @@ def scopes(machine: Machine, process: Process, frame: Frame) -> list[Variable]:
         ("Variables", lambda: [variable(machine, value) for value in values]),
         ("Frames", lambda: [variable(machine, name) for name in frames(machine)]),
         ("Arms", lambda: [_arm(machine, name) for name in machine.cell.arms]),
-        ("Run", lambda: list(_run(machine, process))),
+        ("Run", lambda: list(_run(machine, frame.process))),
     ]
     there = {"Locals": local, "Variables": values}
     return [Variable(name=name, value="", inside=inside) for name, inside in parts if there.get(name, True)]
