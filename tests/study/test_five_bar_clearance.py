@@ -53,7 +53,7 @@ def test_missing_library(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sklearn.gaussian_process", None)
     monkeypatch.setattr(FeatureSweep, "__call__", lambda *_: pytest.fail("simulated"))
 
-    with pytest.raises(MissingExtraError, match=r'install it by: pip install "armwright\[clearance\]"'):
+    with pytest.raises(MissingExtraError, match=r"install it by: pip install 'armwright\[clearance\]'"):
         study.run_sweep()
 
 

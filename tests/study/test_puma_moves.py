@@ -7,7 +7,7 @@ from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.blends import via_distances
+from armwright.motion.blends import via_deviations, via_distances
 from armwright.study import puma_moves
 from armwright.study.puma_moves import (
     BLEND,
@@ -22,9 +22,8 @@ from armwright.study.puma_moves import (
     MoveRow,
     angle_table,
     configuration_table,
-    courses,
     detour_table,
-    deviation_at_b,
+    figure_panels,
     joints_along,
     move_table,
     path_of,
@@ -74,7 +73,7 @@ def test_the_projects_formulas() -> None:
     q, places = np.array(PRINTED_Q), np.array(PRINTED_POSITIONS_CM, dtype=np.float64)
     turns = np.array([row.matlab for row in angle_table()])
     for number, (way, order) in CURVES.items():
-        shown = [curve for course in courses(number) for curve in course.curves.values()]
+        shown = [curve for panel in figure_panels(number) for curve in panel.lines.values()]
         points = q if way == "joint" else np.concatenate([places, turns], axis=1)
         expected = np.array([of_the_project(*points, t)[order] for t in sample_times()]).T
         np.testing.assert_allclose(shown, expected, rtol=ROUNDING, atol=1e-8)
@@ -83,7 +82,7 @@ def test_the_projects_formulas() -> None:
 def test_no_other_figures_have_curves() -> None:
     """A figure of the project without curves is refused."""
     with pytest.raises(UnknownNameError, match="no figure '10'"):
-        courses(10)
+        figure_panels(10)
     with pytest.raises(UnknownNameError, match="no Cartesian move 'joint'"):
         path_of("joint")
 
@@ -128,7 +127,8 @@ def test_missed_by_the_formula() -> None:
     """At B the joint move is off by 3/16 · blend · (change of the rate), which is where its curve is."""
     B = puma_moves.joint_trajectory()(0.5) - np.radians(PRINTED_Q[1])
 
-    np.testing.assert_allclose(deviation_at_b(), B, atol=ROUNDING)
+    deviations = via_deviations(TIMES, np.radians(PRINTED_Q), BLEND, ends="running")
+    np.testing.assert_allclose(deviations[1], B, atol=ROUNDING)
 
 
 def test_the_two_kinds_of_move(moves: dict[str, MoveRow]) -> None:

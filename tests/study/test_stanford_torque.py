@@ -43,15 +43,15 @@ def test_motion(study: Torques) -> None:
 
 def test_figures(study: Torques) -> None:
     """Figures 3 to 5 show joint 1 in motion, 6 to 11 the three cases of each joint."""
-    assert figure(study, 3).curves["joint 1"][-1] == pytest.approx(1.57)
+    assert figure(study, 3).lines["joint 1"][-1] == pytest.approx(1.57)
     assert figure(study, 5).unit == "rad/s²"
     units = [figure(study, number).unit for number in range(6, 12)]
     assert units == ["N m", "N m", "N", "N m", "N m", "N m"]
     for number in range(6, 12):
         shown = figure(study, number)
-        assert list(shown.curves) == ["Newton-Euler, no load", "Bejczy", "Newton-Euler, largest load"]
-        assert all(curve.shape == shown.t.shape for curve in shown.curves.values())
-    np.testing.assert_array_equal(figure(study, 8).curves["Bejczy"], study.bejczy[:, 2])
+        assert list(shown.lines) == ["Newton-Euler, no load", "Bejczy", "Newton-Euler, largest load"]
+        assert all(curve.shape == study.t.shape for curve in shown.lines.values())
+    np.testing.assert_array_equal(figure(study, 8).lines["Bejczy"], study.bejczy[:, 2])
     with pytest.raises(UnknownNameError, match="no figure '12'"):
         figure(study, 12)
 

@@ -107,7 +107,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
         )
         if film:
             with counting("drawing the film", quiet=quiet) as progress:
-                files |= films(planned, progress)
+                files |= films(planned.arm, planned.trajectory, planned.poses, progress)
         write_results(output, files)
     print_result(assessment, as_json=as_json, quiet=quiet, output=output)
 

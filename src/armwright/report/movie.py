@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.motion.moves import Move
+from armwright.motion.trajectory import Trajectory
 from armwright.report.figures import equal_scales
 from armwright.report.sticks import skeleton_of
 
@@ -25,22 +26,26 @@ _SIZE, _DPI = (4.8, 4.4), 100
 _APPROACH = 0.25
 
 
-def films(move: Move, watch: Callable[[int, int], None] | None = None) -> dict[str, bytes]:
+def films(
+    arm: Arm, trajectory: Trajectory, poses: Array, watch: Callable[[int, int], None] | None = None
+) -> dict[str, bytes]:
     """Return films of a move by the name of their file: a GIF, and an MP4 where ffmpeg is installed.
 
     Args:
-        move: the move.
+        arm: the arm.
+        trajectory: of its joints.
+        poses: (k, 4, 4) poses to mark.
         watch: called with the number of finished images and the number of all.
     """
     from matplotlib.animation import FFMpegWriter, PillowWriter  # noqa: PLC0415
 
-    count = int(np.clip(np.ceil(move.trajectory.duration * _FPS), 24, _MAX_FRAMES))
-    X = link_poses(move.arm, move.trajectory(np.linspace(0, move.trajectory.duration, count)))
-    points = skeleton_of(move.arm, X)
+    count = int(np.clip(np.ceil(trajectory.duration * _FPS), 24, _MAX_FRAMES))
+    t = np.linspace(0, trajectory.duration, count)
+    X = link_poses(arm, trajectory(t))
     writers: dict[str, AbstractMovieWriter] = {"move.gif": PillowWriter(fps=_FPS)}
     if shutil.which("ffmpeg"):
         writers["move.mp4"] = FFMpegWriter(fps=_FPS)
-    figure, show = _stage(points, X[:, -1], move)
+    figure, show = _stage(t, skeleton_of(arm, X), X[:, -1], poses)
     with tempfile.TemporaryDirectory() as folder:
         for name, writer in writers.items():
             writer.setup(figure, str(Path(folder) / name), dpi=_DPI)
@@ -55,13 +60,14 @@ def films(move: Move, watch: Callable[[int, int], None] | None = None) -> dict[s
         return {name: (Path(folder) / name).read_bytes() for name in writers}
 
 
-def _stage(points: Array, hand: Array, move: Move) -> "tuple[Figure, Callable[[int], None]]":
+def _stage(t: Array, points: Array, hand: Array, poses: Array) -> "tuple[Figure, Callable[[int], None]]":
     """Return a figure with the arm, and a function that sets it to any of m instants.
 
     Args:
+        t: (m,) instants [s].
         points: (m, k, 3) the corners of the arm [m].
         hand: (m, 4, 4) poses of the tool.
-        move: the move.
+        poses: (k, 4, 4) poses to mark.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
@@ -73,7 +79,7 @@ def _stage(points: Array, hand: Array, move: Move) -> "tuple[Figure, Callable[[i
     low, high = cm.min(axis=(0, 1)), cm.max(axis=(0, 1))
     half = equal_scales(axis, low, high)
     axis.tick_params(labelsize=7)
-    axis.plot(*(move.poses[:, :3, 3] * 100).T, "o", color="C3", markersize=5)
+    axis.plot(*(poses[:, :3, 3] * 100).T, "o", color="C3", markersize=5)
     (trail,) = axis.plot([], [], [], color="C1", linewidth=1.6)
     (arm,) = axis.plot([], [], [], "-o", color="C0", linewidth=4.5, markersize=4, solid_capstyle="round")
     (approach,) = axis.plot([], [], [], color="C2", linewidth=2.5)
@@ -84,6 +90,6 @@ def _stage(points: Array, hand: Array, move: Move) -> "tuple[Figure, Callable[[i
         arm.set_data_3d(*cm[i].T)
         trail.set_data_3d(*cm[: i + 1, -1].T)
         approach.set_data_3d(*np.stack([cm[i, -1], tips[i]], axis=1))
-        clock.set_text(f"{move.trajectory.duration * i / (len(cm) - 1):.2f} s")
+        clock.set_text(f"{t[i]:.2f} s")
 
     return figure, show

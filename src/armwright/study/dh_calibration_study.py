@@ -1,12 +1,13 @@
 """The study of the calibrated three-joint arm: the thesis, section 2.3, table 2.4."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import attrs
 
 from armwright.files.result_table import ResultTable
+from armwright.report.figures import bars
 from armwright.study.dh_calibration import NOISE, PRINTED_POINTS, ParameterRow, Row, parameter_table, verification_table
 
 
@@ -22,11 +23,6 @@ class DhCalibration:
     verification: list[Row]
     parameters: list[ParameterRow]
 
-    inputs: ClassVar[Mapping[str, str]] = {
-        "source": "thesis, section 2.3",
-        "arm": "ntu-3r with the errors of table 2.3",
-        "noise": f"{NOISE * 1e3:g} mm per coordinate",
-    }
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -57,8 +53,6 @@ class DhCalibration:
 
     def figures(self) -> dict[str, str | bytes]:
         """Return a picture of the errors at the verification points."""
-        from armwright.report.figures import bars  # noqa: PLC0415 - matplotlib is slow to import
-
         names = [f"{x}, {y}, {z}" for x, y, z in PRINTED_POINTS]
         values = {
             f"{row.model}, {row.points} boards" if row.model == "complete" else row.model: row.ours

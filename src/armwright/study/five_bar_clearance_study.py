@@ -1,6 +1,6 @@
 """The study of the five-bar with joint clearance: the thesis, tables 5.3 to 5.12, figures 4.6 to 5.13."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, ClassVar
 
 import attrs
@@ -8,6 +8,7 @@ import attrs
 from armwright.clearance.correction import Correction
 from armwright.files.result_table import ResultTable
 from armwright.study import five_bar_clearance as study
+from armwright.study.five_bar_figures import figures
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -32,11 +33,6 @@ class FiveBarClearance:
     corrected: Correction
     corrections: list[study.TargetRow]
 
-    inputs: ClassVar[Mapping[str, str]] = {
-        "source": "thesis, chapters 4 and 5",
-        "linkage": "five-bar",
-        "paths": ", ".join(study.PATHS),
-    }
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -114,8 +110,6 @@ class FiveBarClearance:
 
     def figures(self) -> dict[str, str | bytes]:
         """Return the thesis' figures by the name of their file."""
-        from armwright.study.five_bar_figures import figures  # noqa: PLC0415 - matplotlib is slow to import
-
         return figures(self.swept, self.corrected)
 
 

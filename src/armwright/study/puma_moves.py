@@ -13,11 +13,11 @@ import numpy as np
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.errors import UnknownNameError
+from armwright.errors import UnknownNameError, one_of
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.revolutions import mid_range
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.motion.blends import blended, via_deviations
+from armwright.motion.blends import blended
 from armwright.motion.chain import chain
 from armwright.motion.detour import DetourMethod
 from armwright.motion.limit_utilization import limit_use, slowing_for_limits
@@ -27,6 +27,7 @@ from armwright.motion.solver import solver_of
 from armwright.motion.tool_path import ToolPath, tool_path, zyz_angles
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
+from armwright.report.move_figures import Panel
 from armwright.spatial.euler import matlab_zyz
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, nearest_rotation
@@ -293,26 +294,6 @@ def detour_table() -> list[DetourRow]:
     return rows
 
 
-def deviation_at_b() -> Array:
-    """Return the deviation of the joint move from configuration B when it is passed (6,) [rad], by the formula."""
-    return np.asarray(via_deviations(TIMES, np.radians(PRINTED_Q), BLEND, ends="running")[1])
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Course:
-    """Curves of one of the project's figures.
-
-    Attributes:
-        title: the quantity.
-        unit: unit of the curves.
-        curves: (501,) numbers by the name of the curve.
-    """
-
-    title: str
-    unit: str
-    curves: dict[str, Array]
-
-
 # Figures of the project: curves over time, the path in space, overviews, and the film.
 CURVES: dict[int, tuple[MoveKind, int]] = {
     5: ("joint", 0),
@@ -327,7 +308,7 @@ OVERVIEWS: dict[int, MoveKind] = {22: "joint", 23: "seed"}
 FILM = 25
 
 
-def courses(number: int) -> list[Course]:
+def figure_panels(number: int) -> list[Panel]:
     """Return the curves of a figure over ``sample_times``: joints, or position and ZYZ angles of the tool.
 
     Args:
@@ -336,24 +317,19 @@ def courses(number: int) -> list[Course]:
     Raises:
         UnknownNameError: the figure does not exist, or has no curves.
     """
-    if number not in CURVES:
-        raise UnknownNameError("figure", str(number), [str(known) for known in CURVES])
+    one_of("figure", str(number), map(str, CURVES))
     kind, order = CURVES[number]
     per = ("", "/s", "/s²")[order]
     t = sample_times()
     if kind == "joint":
         q = np.degrees(joint_trajectory()(t, order))
         title = ("joint angles", "joint speeds", "joint accelerations")[order]
-        return [Course(title=title, unit=f"deg{per}", curves={f"joint {i + 1}": q[:, i] for i in range(6)})]
+        return [Panel(title, f"deg{per}", {f"joint {i + 1}": q[:, i] for i in range(6)})]
     hand = path_of(kind)
     assert hand.angles is not None  # noqa: S101 - this path has them
     position, angles = hand.position(t, order) * 100, np.degrees(hand.angles(t, order))
     derivative = ("", "speed of the ", "acceleration of the ")[order]
     return [
-        Course(title=f"{derivative}position", unit=f"cm{per}", curves=dict(zip("xyz", position.T, strict=True))),
-        Course(
-            title=f"{derivative}ZYZ angles",
-            unit=f"deg{per}",
-            curves=dict(zip(("phi", "theta", "psi"), angles.T, strict=True)),
-        ),
+        Panel(f"{derivative}position", f"cm{per}", dict(zip("xyz", position.T, strict=True))),
+        Panel(f"{derivative}ZYZ angles", f"deg{per}", dict(zip(("phi", "theta", "psi"), angles.T, strict=True))),
     ]

@@ -1,15 +1,15 @@
 """The study of the PUMA's two moves through three poses: the project's figures 5 to 7, 10, 16 to 19, 22, 23 and 25."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import attrs
-import numpy as np
 
 from armwright.arm.load import load_arm
 from armwright.files.result_table import ResultTable
-from armwright.motion.moves import Move
+from armwright.report.move_figures import overview, panels, path_in_space
+from armwright.report.movie import films
 from armwright.study import puma_moves
 
 
@@ -29,11 +29,6 @@ class PumaMoves:
     moves: list[puma_moves.MoveRow]
     detours: list[puma_moves.DetourRow]
 
-    inputs: ClassVar[Mapping[str, str]] = {
-        "source": "project on the trajectories of a PUMA",
-        "arm": "puma560-seed",
-        "poses": ", ".join(puma_moves.NAMES),
-    }
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -48,15 +43,7 @@ class PumaMoves:
 
     def as_data(self) -> dict[str, Any]:
         """Return the tables as plain data."""
-        return {
-            "configurations": [attrs.asdict(row) for row in self.configurations],
-            "angles": [attrs.asdict(row) for row in self.angles],
-            "moves": [
-                {key: list(value) if isinstance(value, puma_moves.Largest) else value for key, value in row.items()}
-                for row in (attrs.asdict(row, recurse=False) for row in self.moves)
-            ],
-            "detours": [attrs.asdict(row) for row in self.detours],
-        }
+        return attrs.asdict(self)
 
     def tables(self) -> Iterator[ResultTable]:
         """Yield the tables, printed beside computed."""
@@ -107,42 +94,25 @@ class PumaMoves:
 
     def figures(self) -> dict[str, str | bytes]:
         """Return the project's figures by the name of their file, the last one as a film."""
-        from armwright.report.move_figures import Panel, overview, panels, path_in_space  # noqa: PLC0415 - matplotlib
-
         t = puma_moves.sample_times()
         positions = {name: X[:3, 3] for name, X in zip(puma_moves.NAMES, puma_moves.study_poses(), strict=True)}
         pose_times = dict(zip(puma_moves.NAMES, puma_moves.TIMES, strict=True))
-
-        def shown(number: int) -> list[Panel]:
-            return [Panel(course.title, course.unit, course.curves) for course in puma_moves.courses(number)]
-
         files: dict[str, str | bytes] = {}
         for number, (kind, _) in puma_moves.CURVES.items():
-            files[_name(number)] = panels(f"Figure {number}: {_title(kind)}", t, shown(number), marks=pose_times)
+            curves = puma_moves.figure_panels(number)
+            files[_name(number)] = panels(f"Figure {number}: {_title(kind)}", t, curves, marks=pose_times)
         for number, kind in puma_moves.PATHS.items():
             X = puma_moves.poses_along(kind, t)
             title = f"Figure {number}: {_title(kind)}, path and approach vectors"
             files[_name(number)] = path_in_space(title, X, positions)
         for number, kind in puma_moves.OVERVIEWS.items():
             X = puma_moves.poses_along(kind, t)
-            three = [shown(curve)[0] for curve, (shown_kind, _) in puma_moves.CURVES.items() if shown_kind == kind]
+            three = [
+                puma_moves.figure_panels(curves)[0] for curves, (moved, _) in puma_moves.CURVES.items() if moved == kind
+            ]
             files[_name(number)] = overview(f"Figure {number}: {_title(kind)}", t, three, X, positions)
-        return {**files, **_films()}
-
-
-def _films() -> dict[str, bytes]:
-    from armwright.report.movie import films  # noqa: PLC0415 - matplotlib is slow to import
-
-    move = Move(
-        arm=load_arm("puma560-seed"),
-        poses=puma_moves.study_poses(),
-        times=np.array(puma_moves.TIMES),
-        configurations=np.radians(puma_moves.PRINTED_Q),
-        label="",
-        trajectory=puma_moves.joint_trajectory(),
-        passing_distances=np.zeros(len(puma_moves.NAMES)),
-    )
-    return {name.replace("move", f"figure{puma_moves.FILM}"): film for name, film in films(move).items()}
+        move = films(load_arm("puma560-seed"), puma_moves.joint_trajectory(), puma_moves.study_poses())
+        return {**files, **{name.replace("move", f"figure{puma_moves.FILM}"): film for name, film in move.items()}}
 
 
 def _move(row: puma_moves.MoveRow) -> tuple[str, ...]:

@@ -14,13 +14,14 @@ import numpy as np
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.bejczy import PRINTED, Coefficients, bejczy_efforts, fitted
+from armwright.dynamics.bejczy import Coefficients, bejczy_efforts, fitted
 from armwright.dynamics.bodies import body_of
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.payloads import payload
-from armwright.errors import UnknownNameError
+from armwright.errors import one_of
 from armwright.motion.quintic_polynomials import quintic
+from armwright.report.move_figures import Panel
 
 Verdict: TypeAlias = Literal["agrees", "near", "wrong"]
 
@@ -29,6 +30,7 @@ GRAVITY = 9.80621
 START = (0.0, 0.0, 0.2, 0.0, 0.0, 0.0)
 GOAL = (1.57, 2.36, 1.0, 1.57, 1.57, 1.57)
 DURATION = 1.0  # s
+SAMPLES = 201  # the ends included
 # The largest payload: a cube with its centre in the origin of the tool frame.
 LOAD_MASS = 1.8  # kg
 LOAD_VOLUME = 422e-6  # m³
@@ -64,7 +66,6 @@ class Torques:
         empty: (m, 6) case 1: Newton-Euler without a payload [N m], the third [N].
         bejczy: (m, 6) case 2: Bejczy's model with the constants of the arm.
         loaded: (m, 6) case 3: Newton-Euler with the largest payload.
-        bejczy_printed: (m, 6) Bejczy's model with the constants as the report prints them.
     """
 
     t: Array
@@ -74,20 +75,16 @@ class Torques:
     empty: Array
     bejczy: Array
     loaded: Array
-    bejczy_printed: Array
 
 
-def torques(samples: int = 201) -> Torques:
+def torques() -> Torques:
     """Compute the motion and the efforts of all cases.
-
-    Args:
-        samples: number of times, the ends included.
 
     Source:
         TR-83-008, section 4, figures 3 to 11.
     """
     motion = quintic(START, GOAL, DURATION)
-    t = np.linspace(0.0, DURATION, samples)
+    t = np.linspace(0.0, DURATION, SAMPLES)
     q, qd, qdd = (motion(t, order) for order in range(3))
     return Torques(
         t=t,
@@ -97,31 +94,11 @@ def torques(samples: int = 201) -> Torques:
         empty=inverse_dynamics(study_arm(), q, qd, qdd),
         bejczy=bejczy_efforts(q, qdd, fitted_coefficients(), gravity=GRAVITY),
         loaded=inverse_dynamics(loaded_arm(), q, qd, qdd),
-        bejczy_printed=bejczy_efforts(q, qdd, PRINTED, gravity=GRAVITY),
     )
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Figure:
-    """The curves of a figure of the report.
-
-    Attributes:
-        number: number of the figure in the report.
-        title: the quantity.
-        unit: unit of the curves.
-        t: (m,) times [s].
-        curves: (m,) numbers by the name of the curve.
-    """
-
-    number: int
-    title: str
-    unit: str
-    t: Array
-    curves: dict[str, Array]
-
-
-def figure(study: Torques, number: int) -> Figure:
-    """Return the data of a figure of the report, 3 to 11.
+def figure(study: Torques, number: int) -> Panel:
+    """Return the curves of a figure of the report, 3 to 11, over the times of the torques.
 
     Args:
         study: the torques.
@@ -130,28 +107,21 @@ def figure(study: Torques, number: int) -> Figure:
     Raises:
         UnknownNameError: the report has no such figure of this motion.
     """
-    courses = {
-        3: ("position of joint 1", "rad", study.q),
-        4: ("speed of joint 1", "rad/s", study.qd),
-        5: ("acceleration of joint 1", "rad/s²", study.qdd),
-    }
-    if number in courses:
-        title, unit, course = courses[number]
-        return Figure(number=number, title=title, unit=unit, t=study.t, curves={"joint 1": course[:, 0]})
-    if not 6 <= number <= 11:
-        raise UnknownNameError("figure", str(number), [str(known) for known in range(3, 12)])
+    one_of("figure", str(number), map(str, range(3, 12)))
+    if number < 6:
+        title, unit, course = (
+            ("position", "rad", study.q),
+            ("speed", "rad/s", study.qd),
+            ("acceleration", "rad/s²", study.qdd),
+        )[number - 3]
+        return Panel(f"{title} of joint 1", unit, {"joint 1": course[:, 0]})
     joint = number - 6
-    return Figure(
-        number=number,
-        title=f"effort of joint {joint + 1}",
-        unit="N" if joint == 2 else "N m",
-        t=study.t,
-        curves={
-            "Newton-Euler, no load": study.empty[:, joint],
-            "Bejczy": study.bejczy[:, joint],
-            "Newton-Euler, largest load": study.loaded[:, joint],
-        },
-    )
+    curves = {
+        "Newton-Euler, no load": study.empty[:, joint],
+        "Bejczy": study.bejczy[:, joint],
+        "Newton-Euler, largest load": study.loaded[:, joint],
+    }
+    return Panel(f"effort of joint {joint + 1}", "N" if joint == 2 else "N m", curves)
 
 
 @attrs.frozen(kw_only=True)

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import attrs
 
 from armwright.files.result_table import ResultTable
+from armwright.report.figures import curves
 from armwright.study.stanford_torque import (
     FormRow,
     JointRow,
@@ -38,11 +39,6 @@ class StanfordTorque:
     efforts: Torques
     joints: list[JointRow]
 
-    inputs: ClassVar[Mapping[str, str]] = {
-        "source": "TR-83-008, appendices II and III",
-        "arm": "stanford",
-        "motion": "quintic, figures 3 to 5",
-    }
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -105,13 +101,10 @@ class StanfordTorque:
 
     def figures(self) -> dict[str, str | bytes]:
         """Return figures 3 to 11 by the name of their file."""
-        from armwright.report.figures import curves  # noqa: PLC0415 - matplotlib is slow to import
-
         files: dict[str, str | bytes] = {}
         for number in range(3, 12):
             shown = figure(self.efforts, number)
-            title = f"Figure {number}: {shown.title}"
             files[f"figure{number:02d}.svg"] = curves(
-                title, shown.t, shown.curves, x_label="time, s", y_label=shown.unit
+                f"Figure {number}: {shown.title}", self.efforts.t, shown.lines, x_label="time, s", y_label=shown.unit
             )
         return files

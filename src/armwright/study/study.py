@@ -1,6 +1,6 @@
 """The experiments of the sources behind a protocol, by name."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib import import_module
 from typing import Protocol
 
@@ -15,10 +15,6 @@ class Study(Result, Protocol):
 
     A module of this folder has a class for each experiment, whose ``run`` runs it.
     """
-
-    @property
-    def inputs(self) -> Mapping[str, str]:
-        """The inputs of the experiment in words, such as source, arm and motion."""
 
     def figures(self) -> dict[str, str | bytes]:
         """Return the figures by the name of their file."""
