@@ -220,9 +220,13 @@ def test_halves_are_removed(half: Path, speeds: Design) -> None:
 OTHER: list[tuple[Fall, Callable[[Design], Design], str]] = [
     (Fall(gravity=1.62), lambda design: design, "settings.gravity is 9.81 there, 1.62 here"),
     (Fall(name="rise"), lambda design: design, "task is 'fall' there, 'rise' here"),
-    (Fall(), lambda design: attrs.evolve(design, units={"speed": "km/h"}), "design.parameters is .*'m/s'.* there"),
-    (Fall(), lambda design: attrs.evolve(design, points=design.points + 1), "design.points is '"),
-    (Fall(samples=9), lambda _: full_factorial({"v": [1]}), "; and 4 more. Give this one a folder of its own"),
+    (
+        Fall(),
+        lambda design: attrs.evolve(design, units={"speed": "km/h"}),
+        "design.units.speed is 'm/s' there, 'km/h' here",
+    ),
+    (Fall(), lambda design: attrs.evolve(design, points=design.points + 1), r"design.points is \[40, 1, '"),
+    (Fall(samples=9), lambda _: full_factorial({"v": [1]}), "; and 5 more. Give this one a folder of its own"),
 ]
 
 
@@ -253,9 +257,9 @@ MADE = '{"date": "", "armwright": ""}'
 @pytest.mark.parametrize(
     "text",
     [
-        *("", "{", "[]", '{"format": 2}', f'{{"format": 1, "sweep": {{}}, "made": {MADE}, "block": 1}}'),
-        *(f'{{"format": 2, "sweep": {{}}, "made": {MADE}, "block": {block}}}' for block in ("0", "1.5", "true", "1e9")),
-        *(f'{{"format": 2, "sweep": {{}}, "made": {made}, "block": 1}}' for made in ("{}", '{"date": 1}')),
+        *("", "{", "[]", '{"format": 3}', f'{{"format": 2, "sweep": {{}}, "made": {MADE}, "block": 1}}'),
+        *(f'{{"format": 3, "sweep": {{}}, "made": {MADE}, "block": {block}}}' for block in ("0", "1.5", "true", "1e9")),
+        *(f'{{"format": 3, "sweep": {{}}, "made": {made}, "block": 1}}' for made in ("{}", '{"date": 1}')),
     ],
 )
 def test_damaged_manifest(text: str, half: Path, speeds: Design) -> None:

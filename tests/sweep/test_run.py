@@ -155,7 +155,11 @@ WRONG: list[tuple[Any, type[ArmwrightError], str]] = [
     (Told(returned=lambda x: {"y": ["a"] * len(x)}), SweepError, "'y': expected numbers"),
     (Told(returned=lambda x: {"y": x[:, 0], "failure": [""]}), SweepError, "expected 3 texts, one per run, got 1"),
     (Told(outputs={}), InvalidValueError, "task 'told': expected one output or more, got none"),
-    (Told(outputs={"x": Output()}), InvalidValueError, "'x' cannot be an output of the task: it is a parameter of"),
+    (
+        Told(outputs={"x": Output()}),
+        InvalidValueError,
+        "'x' cannot be an output of the task: it is already a parameter of",
+    ),
     (Told(outputs={"status": Output()}), InvalidValueError, "'status' cannot be an output of the task"),
     (Told(outputs={"a b": Output()}), InvalidValueError, "'a b' as an output of the task: expected a word"),
     (Told(outputs={"y": Output(dims=["t"])}), InvalidValueError, "'y': the task has no axis 't'. Known: none."),
@@ -171,6 +175,21 @@ def test_wrong_tasks(number: int, tmp_path: Path) -> None:
 
     with pytest.raises(error, match=text):
         run(task, THREE, tmp_path / "out", workers=1)
+
+
+@pytest.mark.parametrize(
+    ("names", "text"),
+    [
+        (("a", "a"), "'a' cannot be a parameter of the design: it is already a parameter of the design"),
+        (("a b", "c"), "'a b' as a parameter of the design: expected a word of letters, digits and _"),
+        (("status", "c"), "'status' cannot be a parameter of the design: it is already a name that every result has"),
+    ],
+)
+def test_wrong_parameters(names: tuple[str, str], text: str, tmp_path: Path) -> None:
+    """Each column of the results has a name of its own, which is a word."""
+    with pytest.raises(InvalidValueError, match=text):
+        run(Fall(), Design(names=names, points=[[1.0, 2.0]]), tmp_path / "out", workers=1)
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
@@ -297,7 +316,7 @@ def test_missing_dask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
 
     run(Fall(), THREE, tmp_path / "cores", workers=1)
-    with pytest.raises(MissingExtraError, match=r'needs distributed; install it by: pip install "armwright\[sweep\]"'):
+    with pytest.raises(MissingExtraError, match=r"needs distributed; install it by: pip install 'armwright\[sweep\]'"):
         run(Fall(), THREE, tmp_path / "cluster", scheduler="tcp://127.0.0.1:1")
 
 

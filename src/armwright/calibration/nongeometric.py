@@ -35,6 +35,7 @@ from armwright.calibration.fitting import Calibration, calibrate
 from armwright.calibration.joint_errors import compliances, transmission_errors
 from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import ContradictionError, InvalidValueError, MissingExtraError, TooFewError
+from armwright.extras import import_extra
 
 # A gain is significant from so many standard errors on, and worth having from such a part of the error on. Four
 # candidates share the level of significance that two standard errors are for one (Bonferroni).
@@ -377,14 +378,11 @@ def _fit_residuals(arm: Arm, q: Array, residuals: Array, seed: int) -> ResidualM
     Raises:
         MissingExtraError: scikit-learn is not installed.
     """
-    try:
-        from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - an extra
-        from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
-        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
-    except ImportError as error:
-        raise MissingExtraError(
-            'a model of the residuals needs scikit-learn: pip install "armwright[calibration]"'
-        ) from error
+    import_extra("sklearn.gaussian_process", "a model of the residuals", "calibration", "scikit-learn")
+    from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - an extra
+    from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
+
     x = _features(arm, q)
     scale = float(np.sqrt(np.mean(residuals**2))) or 1.0
     some = np.random.default_rng(seed).permutation(len(x))[:_MAX_POINTS]

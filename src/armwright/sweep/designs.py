@@ -14,7 +14,6 @@ import numpy as np
 from armwright.arrays import LARGEST, Array, array_key, floats, integer, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, one_of, shown
 
-KINDS = ("given", "full factorial", "latin hypercube", "sobol")
 # More runs than this are a slip in a level, not a plan.
 MAX_RUNS = 10_000_000
 
@@ -22,13 +21,7 @@ MAX_RUNS = 10_000_000
 def _names(value: Sequence[str]) -> tuple[str, ...]:
     if isinstance(value, str):
         raise KindError(f"names: expected names of parameters, one per column, got the one text {shown(value)}")
-    names = tuple(value)
-    for name in names:
-        if not isinstance(name, str) or not name.isidentifier():
-            raise InvalidValueError(f"names: expected a word of letters, digits and _, got {shown(name)}")
-        if names.count(name) > 1:
-            raise InvalidValueError(f"names: '{name}' stands there twice")
-    return names
+    return tuple(value)
 
 
 def _points(value: Any) -> Array:
@@ -40,14 +33,6 @@ def _points(value: Any) -> Array:
     return read_only(points)
 
 
-def _ranges(value: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
-    return {name: tuple(float(number) for number in numbers) for name, numbers in value.items()}
-
-
-def _seed(value: int | None) -> int | None:
-    return None if value is None else integer(value, "seed", least=0)
-
-
 @attrs.frozen(kw_only=True)
 class Design:
     """The points of the runs of a sweep. A table of the caller's own is of the kind ``given``.
@@ -56,7 +41,7 @@ class Design:
         names: of the k parameters.
         points: (n, k) values of the parameters, one row per run.
         units: of every parameter; "1" where there is none.
-        kind: how the points were made, one of ``KINDS``.
+        kind: how the points were made: given, full factorial, latin hypercube or sobol.
         seed: of the random numbers that the points were made with.
         ranges: by parameter, the levels of a full factorial or the two bounds of the others; empty for ``given``.
     """
@@ -65,17 +50,16 @@ class Design:
     points: Array = attrs.field(converter=_points, eq=array_key)
     units: Mapping[str, str] = attrs.field(factory=dict, hash=False)
     kind: str = "given"
-    seed: int | None = attrs.field(default=None, converter=_seed)
-    ranges: Mapping[str, tuple[float, ...]] = attrs.field(factory=dict, converter=_ranges, hash=False)
+    seed: int | None = None
+    ranges: Mapping[str, tuple[float, ...]] = attrs.field(factory=dict, hash=False)
 
     __reduce__ = reduce_by_fields
 
     def __attrs_post_init__(self) -> None:
-        """Refuse a column without a name, and units or ranges of an unknown parameter."""
+        """Refuse a column without a name, and units of an unknown parameter."""
         if len(self.names) != self.points.shape[1]:
             raise ShapeError(f"design: {len(self.names)} names, but points of {self.points.shape[1]} parameters")
-        one_of("kind of design", self.kind, KINDS)
-        for name in (*self.units, *self.ranges):
+        for name in self.units:
             one_of("parameter", name, self.names)
         object.__setattr__(self, "units", {name: str(self.units.get(name, "1")) for name in self.names})
 
@@ -108,7 +92,7 @@ def full_factorial(levels: Mapping[str, Sequence[float]], *, units: Mapping[str,
     grids = np.meshgrid(*columns.values(), indexing="ij")
     points = np.stack([grid.ravel() for grid in grids], axis=-1)
     ranges = {name: tuple(column.tolist()) for name, column in columns.items()}
-    return Design(names=tuple(columns), points=points, units=units or {}, kind="full factorial", ranges=ranges)
+    return Design(names=(*columns,), points=points, units=units or {}, kind="full factorial", ranges=ranges)
 
 
 def latin_hypercube(
@@ -171,29 +155,26 @@ def _sampled(
     """Return a sample of the unit cube, scaled to the bounds."""
     from scipy.stats import qmc  # noqa: PLC0415 - slow to load, and full factorials do without
 
-    lower, upper = _bounds(bounds)
+    _check_mapping(bounds, "bounds")
+    ends = np.array([_interval(name, pair) for name, pair in bounds.items()])
     rng = np.random.default_rng(integer(seed, "seed", least=0))
     _check_runs(n)
     sampler = (qmc.Sobol if kind == "sobol" else qmc.LatinHypercube)(len(bounds), rng=rng)
-    points = lower + (upper - lower) * sampler.random(n)
-    return Design(names=tuple(bounds), points=points, units=units or {}, kind=kind, seed=seed, ranges=bounds)
+    points = ends[:, 0] + (ends[:, 1] - ends[:, 0]) * sampler.random(n)
+    ranges = dict(zip(bounds, map(tuple, ends.tolist()), strict=True))
+    return Design(names=(*bounds,), points=points, units=units or {}, kind=kind, seed=seed, ranges=ranges)
 
 
-def _bounds(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
-    """Return the lower and the upper bounds, (k,) each."""
-    _check_mapping(bounds, "bounds")
-    pairs = []
-    for name, pair in bounds.items():
-        ends = floats(pair, f"bounds of {name}", LARGEST)
-        if ends.shape != (2,):
-            raise ShapeError(f"bounds of {name}: expected a lower and an upper one, got {shown(pair)}")
-        lower, upper = ends
-        if not lower < upper:
-            what = "reversed" if lower > upper else "equal"
-            raise InvalidValueError(f"bounds of {name}: they are {what}: from {lower:g} to {upper:g}")
-        pairs.append(ends)
-    lower, upper = np.transpose(pairs)
-    return lower, upper
+def _interval(name: str, pair: tuple[float, float]) -> Array:
+    """Return the lower and the upper bound of a parameter."""
+    ends = floats(pair, f"bounds of {name}", LARGEST)
+    if ends.shape != (2,):
+        raise ShapeError(f"bounds of {name}: expected a lower and an upper one, got {shown(pair)}")
+    lower, upper = ends
+    if not lower < upper:
+        what = "reversed" if lower > upper else "equal"
+        raise InvalidValueError(f"bounds of {name}: they are {what}: from {lower:g} to {upper:g}")
+    return ends
 
 
 def _check_mapping(value: Mapping[str, Any], what: str) -> None:

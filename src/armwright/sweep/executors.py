@@ -5,15 +5,23 @@ died is done again row by row, with nothing else at work, so that the row that k
 """
 
 import asyncio
-import concurrent.futures
 import multiprocessing
 import os
 import pickle
-from collections.abc import Callable, Collection, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from contextlib import closing, contextmanager
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
+import attrs
 import numpy as np
 
 from armwright.arrays import Array
@@ -24,6 +32,9 @@ from armwright.sweep.task import Rows, Status, Task, evaluate, failed_row
 from armwright.sweep.worker import initialize, work
 from armwright.version import __version__
 
+# The number of a block, and its (m, k) points.
+Block: TypeAlias = tuple[int, Array]
+
 # Time for a Dask cluster to answer, and to have a worker [s].
 PATIENCE = 20.0
 # Blocks waiting or at work, per worker: no worker waits, and memory does not grow with the sweep.
@@ -31,72 +42,71 @@ _PER_WORKER = 2
 _KILLED = "the worker process died each time it was tried"
 
 
-def serial(task: Task, blocks: Iterable[tuple[int, Array]]) -> Iterator[tuple[int, Rows]]:
-    """Evaluate blocks in this process, one after the other."""
-    with extra("threadpoolctl").threadpool_limits(1):
-        for number, points in blocks:
-            yield number, evaluate(task, points)
-
-
-def parallel(
-    executor: "Processes | Cluster", task: Task, blocks: Iterable[tuple[int, Array]]
-) -> Iterator[tuple[int, Rows]]:
-    """Evaluate blocks by workers; rows come in the order in which they are done.
+def evaluate_blocks(
+    task: Task, blocks: list[Block], workers: int, scheduler: str | None
+) -> Generator[tuple[int, Rows]]:
+    """Evaluate blocks and return the number and the rows of each, in the order in which they are done.
 
     Args:
-        executor: has the workers.
         task: what is done.
-        blocks: (m, k) points by number.
+        blocks: of the design.
+        workers: processes of this machine; 1 is this process itself.
+        scheduler: address of a Dask scheduler, whose workers do it instead.
 
     Raises:
-        SweepError: the executor cannot go on.
+        KindError: the task cannot be pickled.
+        SweepError: the workers do not start or cannot go on, or the task returned something else than its outputs.
     """
+    if scheduler is not None:
+        with cluster(task, scheduler) as executor:
+            yield from parallel(executor, task, blocks)
+    elif workers > 1:
+        with closing(Processes(task, workers)) as executor:
+            yield from parallel(executor, task, blocks)
+    else:
+        with extra("threadpoolctl").threadpool_limits(1):
+            for number, points in blocks:
+                yield number, evaluate(task, points)
+
+
+def parallel(executor: "Processes | Cluster", task: Task, blocks: Iterable[Block]) -> Iterator[tuple[int, Rows]]:
+    """Evaluate blocks by workers; see ``evaluate_blocks``."""
+    interrupted = []
+    for block, rows in _completed(executor, blocks, lambda: _PER_WORKER * executor.size()):
+        if rows is None:
+            interrupted.append(block)
+        else:
+            yield block[0], rows
+    for number, points in interrupted:
+        killed = failed_row(task, Status.KILLED, _KILLED)
+        alone = _completed(executor, enumerate(np.split(points, len(points))), lambda: 1)
+        yield number, np.concatenate([killed if row is None else row for _, row in alone])
+
+
+def _completed(
+    executor: "Processes | Cluster", blocks: Iterable[Block], most: Callable[[], int]
+) -> Iterator[tuple[Block, Rows | None]]:
+    """Evaluate blocks, so many at a time, and return each with its rows; None where its worker died."""
     queue = iter(blocks)
-    running: dict[Any, tuple[int, Array]] = {}
-    interrupted: list[tuple[int, Array]] = []
+    running: dict[Future[Rows], Block] = {}
     while True:
-        while not interrupted and len(running) < _PER_WORKER * executor.size() and (block := next(queue, None)):
-            try:
-                running[executor.submit(block[1])] = block
-            except executor.died:
-                interrupted.append(block)
-        if running:
-            for future in executor.wait(running):
-                block = running.pop(future)
-                try:
-                    rows = future.result()
-                except executor.died:
-                    interrupted.append(block)
-                else:
-                    yield block[0], rows
-        elif interrupted:
-            executor.restart()
-            while interrupted:
-                number, points = interrupted.pop()
-                yield number, np.concatenate([_alone(executor, task, points[i : i + 1]) for i in range(len(points))])
-        else:
+        while len(running) < most() and (block := next(queue, None)):
+            running[executor.submit(block[1])] = block
+        if not running:
             return
-
-
-def _alone(executor: "Processes | Cluster", task: Task, point: Array) -> Rows:
-    """Evaluate a row of a block whose worker died, with nothing else at work."""
-    for _ in range(executor.attempts):
-        try:
-            rows: Rows = executor.submit(point).result()
-        except executor.died:
-            executor.restart()
-        else:
-            return rows
-    return failed_row(task, Status.KILLED, _KILLED)
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            rows: Rows | None
+            try:
+                rows = future.result()
+            except executor.died:
+                rows = None
+            yield running.pop(future), rows
 
 
 class Processes:
     """Worker processes of this machine, each with one thread."""
 
-    died = BrokenExecutor
-    """The error of submitting, or of a future, whose worker died."""
-    attempts = 2
-    """How often a row of a block whose worker died is tried, alone."""
+    died: type[Exception] = BrokenExecutor
 
     def __init__(self, task: Task, workers: int) -> None:
         """Start the processes.
@@ -132,16 +142,12 @@ class Processes:
 
     def submit(self, points: Array) -> Future[Rows]:
         """Begin a block of (m, k) points and return the future of its rows."""
-        return self._pool.submit(work, __version__, self._payload, points)
-
-    def wait(self, futures: Collection[Future[Rows]]) -> Collection[Future[Rows]]:
-        """Wait until some of the futures are done, and return those."""
-        return concurrent.futures.wait(futures, return_when=FIRST_COMPLETED).done
-
-    def restart(self) -> None:
-        """Start all processes again: a pool that lost one does no more."""
-        self.close()
-        self._start()
+        try:
+            return self._pool.submit(work, __version__, self._payload, points)
+        except BrokenExecutor:  # a pool that lost a process does no more
+            self.close()
+            self._start()
+            return self._pool.submit(work, __version__, self._payload, points)
 
     def close(self) -> None:
         """End the processes, in the midst of their work if need be."""
@@ -150,38 +156,19 @@ class Processes:
         self._watched.close()
 
 
+@attrs.frozen(kw_only=True)
 class Cluster:
-    """The workers of a Dask cluster, which replaces those that die."""
+    """The workers of a Dask cluster, which replaces those that die and tries a block several times.
 
-    attempts = 1  # of the scheduler, each of which means several workers
+    Attributes:
+        size: number of threads of all workers, which may come and go.
+        submit: begins a block of (m, k) points and returns the future of its rows.
+        died: error of a future whose worker died.
+    """
 
-    def __init__(self, client: Any, task: Task) -> None:
-        """Use a cluster by its client.
-
-        Raises:
-            KindError: the task cannot be pickled.
-        """
-        self._client, self._distributed = client, extra("distributed")
-        self._payload = _pickled(task, extra("cloudpickle").dumps)  # workers need not have the script that sweeps
-        self.died: type[Exception] = self._distributed.KilledWorker
-
-    def size(self) -> int:
-        """Return the number of threads of all workers, which may come and go."""
-        threads: dict[str, int] = self._client.nthreads()
-        return max(1, sum(threads.values()))
-
-    def submit(self, points: Array) -> Any:
-        """Begin a block; see ``Processes.submit``."""
-        return self._client.submit(work, __version__, self._payload, points, pure=False)
-
-    def wait(self, futures: Collection[Any]) -> Collection[Any]:
-        """Wait until some of the futures are done, and return those. Their rows are fetched when they are asked for."""
-        with self._client.as_current():
-            done: Collection[Any] = self._distributed.wait(list(futures), return_when=FIRST_COMPLETED).done
-        return done
-
-    def restart(self) -> None:
-        """Do nothing: the cluster does."""
+    size: Callable[[], int]
+    submit: Callable[[Array], Future[Rows]]
+    died: type[Exception]
 
 
 @contextmanager
@@ -196,45 +183,46 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
     # closed by it, in the midst of anything: where that holds the lock that closing takes (another client or a cluster
     # being started), both wait for ever.
     kind = extra("distributed").Client
-    _check_scheduler(address)
-    # Where the workers are threads of this process, its threads are theirs.
-    with closing(kind.__new__(kind)) as client, extra("threadpoolctl").threadpool_limits(1):
-        failure = f"no Dask scheduler answers at '{address}'"
-        try:
+    payload = _pickled(task, extra("cloudpickle").dumps)  # workers need not have the script that sweeps
+    failure = f"no Dask scheduler answers at '{address}'"
+    try:
+        _check_scheduler(address)
+        # Where the workers are threads of this process, its threads are theirs.
+        with closing(kind.__new__(kind)) as client, extra("threadpoolctl").threadpool_limits(1):
             client.__init__(address, timeout=PATIENCE, set_as_default=False)
             failure = f"the Dask scheduler at '{address}' has had no worker for {PATIENCE:g} s"
             client.wait_for_workers(1, timeout=PATIENCE)
             failure = f"the Dask cluster at '{address}' cannot go on; finished blocks stay"
-            yield Cluster(client, task)
-        except ArmwrightError:
-            raise
-        except (Exception, asyncio.CancelledError) as error:
-            raise SweepError(f"{failure}: {' '.join(str(error).split()) or shown(error)}") from error
+            yield Cluster(
+                size=lambda: max(1, sum(client.nthreads().values())),
+                submit=partial(client.get_executor(pure=False).submit, work, __version__, payload),
+                died=extra("distributed").KilledWorker,
+            )
+    except ArmwrightError:
+        raise
+    except (Exception, asyncio.CancelledError) as error:
+        raise SweepError(f"{failure}: {' '.join(str(error).split()) or shown(error)}") from error
 
 
 def _check_scheduler(address: str) -> None:
     """Check that a scheduler answers at an address, before a client is made.
 
     Raises:
-        SweepError: nobody answers there, or what does is no scheduler.
+        SweepError: another part of Dask answers there.
     """
     distributed = extra("distributed")
 
     async def identity() -> Any:
-        async with asyncio.timeout(PATIENCE):
-            arguments = distributed.Security().get_connection_args("client")
-            there = distributed.rpc(address, timeout=PATIENCE, connection_args=arguments)
-            try:
-                return await there.identity()
-            finally:
-                await there.close_rpc()
+        arguments = distributed.Security().get_connection_args("client")
+        async with (
+            asyncio.timeout(PATIENCE),
+            distributed.rpc(address, timeout=PATIENCE, connection_args=arguments) as scheduler,
+        ):
+            return await scheduler.identity()
 
     # In a thread of its own: the caller may have an event loop that runs, as notebooks do.
-    with concurrent.futures.ThreadPoolExecutor(1) as thread:
-        try:
-            answer = thread.submit(asyncio.run, identity()).result()
-        except (OSError, ValueError) as error:
-            raise SweepError(f"no Dask scheduler answers at '{address}': {shown(error)}") from error
+    with ThreadPoolExecutor(1) as thread:
+        answer = thread.submit(asyncio.run, identity()).result()
     kind = answer.get("type") if isinstance(answer, dict) else answer
     if kind != "Scheduler":
         raise SweepError(f"at '{address}' answers {shown(kind)} of Dask; expected the address of its scheduler")

@@ -1,21 +1,13 @@
 """The libraries that a sweep needs beyond the core."""
 
-from importlib import import_module
 from types import ModuleType
 
-from armwright.errors import MissingExtraError
+from armwright.extras import import_extra
 
 
 def extra(name: str) -> ModuleType:
-    """Import a library of the extra ``sweep``.
-
-    Raises:
-        MissingExtraError: it is not installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise MissingExtraError(f'a sweep needs {name}; install it by: pip install "armwright[sweep]"') from error
+    """Import a library of the extra ``sweep``; see ``import_extra``."""
+    return import_extra(name, "a sweep", "sweep")
 
 
 def check_extras() -> None:

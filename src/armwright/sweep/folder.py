@@ -31,13 +31,13 @@ import scipy
 
 from armwright.errors import FileFormatError, KindError, OutputError, shown
 from armwright.files.inputs import read_text, regular
-from armwright.files.output import RECORD
+from armwright.files.output import reason
 from armwright.sweep.designs import Design
 from armwright.sweep.errors import SweepError
 from armwright.sweep.task import Rows, Task
 from armwright.version import __version__
 
-_FORMAT = 2
+_FORMAT = 3
 MANIFEST, _BLOCKS, RESULTS, _LOCK = "sweep.json", "blocks", "results.nc", "lock"
 # The name under which a file is written ends with this.
 _PARTIAL = ".tmp"
@@ -51,30 +51,26 @@ def identity(task: Task, design: Design) -> dict[str, Any]:
     Raises:
         KindError: a setting of the task is nothing that JSON holds.
     """
-    settings = dict(task.settings)
-    for name, value in settings.items():
+    for name, value in task.settings.items():
         try:
-            settings[name] = json.loads(json.dumps(value, allow_nan=False))
+            json.dumps(value, allow_nan=False)
         except (TypeError, ValueError) as error:
             raise KindError(f"setting '{name}': expected what JSON holds, got {shown(value)}: {error}") from error
-    return {
+    fields = {
         "armwright": __version__,
         "task": task.name,
-        "settings": settings,
-        "outputs": {name: [list(item.dims), item.units, item.description] for name, item in task.outputs.items()},
-        "axes": {
-            name: [item.values.size, item.units, item.description, _sha256(item.values.tobytes()).hex()]
-            for name, item in task.axes.items()
-        },
-        "design": {
-            "kind": design.kind,
-            "runs": len(design),
-            "seed": design.seed,
-            "ranges": {name: list(numbers) for name, numbers in design.ranges.items()},
-            "parameters": [list(parameter) for parameter in design.units.items()],
-            "points": _sha256(design.points.tobytes()).hex(),
-        },
+        "settings": dict(task.settings),
+        "outputs": {name: attrs.asdict(output) for name, output in task.outputs.items()},
+        "axes": {name: attrs.asdict(axis, value_serializer=_hashed) for name, axis in task.axes.items()},
+        "design": attrs.asdict(design, value_serializer=_hashed),
     }
+    as_read: dict[str, Any] = json.loads(json.dumps(fields))
+    return as_read
+
+
+def _hashed(_owner: object, _field: object, value: Any) -> Any:
+    """Return the shape and the SHA-256 hash of an array, and anything else as it is."""
+    return [*value.shape, hashlib.sha256(value.tobytes()).hexdigest()] if isinstance(value, np.ndarray) else value
 
 
 @attrs.frozen(kw_only=True)
@@ -98,13 +94,14 @@ class Folder:
     made: Mapping[str, str]
 
     @cached_property
-    def _key(self) -> bytes:
-        return json.dumps(self.sweep, sort_keys=True).encode()
+    def blocks(self) -> list[range]:
+        """The runs of each block."""
+        runs = range(len(self.design))
+        return [runs[start : start + self.block] for start in runs[:: self.block]]
 
-    @property
-    def starts(self) -> range:
-        """The first run of each block of the whole sweep."""
-        return range(0, len(self.design), self.block)
+    def block_path(self, number: int) -> Path:
+        """Return the path of a block, which is there when it is finished."""
+        return self.path / _BLOCKS / f"{number:07d}.npy"
 
     def write_block(self, number: int, rows: Rows) -> None:
         """Write a block.
@@ -115,41 +112,36 @@ class Folder:
         file = io.BytesIO()
         np.save(file, rows, allow_pickle=False)
         data = file.getvalue()
-        write_whole(self._file(number), lambda partial: partial.write_bytes(data + self._checksum(number, data)))
+        write_whole(self.block_path(number), lambda partial: partial.write_bytes(data + self._checksum(number, data)))
 
-    def read_block(self, number: int) -> Rows | None:
-        """Return a block as it was written; None if there is none.
+    def read_block(self, number: int) -> Rows:
+        """Return a block as it was written.
 
         Raises:
-            FileFormatError: it is damaged; its file is not changed.
+            FileFormatError: it is damaged, or has gone; its file is not changed.
         """
-        path = self._file(number)
-        if not path.exists():
-            return None
-        if not path.is_file():
-            raise self._damaged(number, "it is not a file")
-        try:
-            file = path.read_bytes()
-        except OSError as error:
-            raise self._damaged(number, error.strerror or str(error)) from error
-        data, checksum = file[:-32], file[-32:]
+        path = self.block_path(number)
+        data, checksum, damage = b"", b"", "it is not a file"
+        if path.is_file():
+            try:
+                file = path.read_bytes()
+            except OSError as error:
+                damage = error.strerror or str(error)
+            else:
+                data, checksum = file[:-32], file[-32:]
+                damage = "its checksum is not that of its numbers, or of another block"
         if checksum != self._checksum(number, data):
-            raise self._damaged(number, "its checksum is not that of its numbers, or of another block")
+            runs = self.blocks[number]
+            advice = "it stays as it is; move it away or delete it and start again"
+            text = f"damaged: {damage}; {advice}: only its runs, {runs[0]} to {runs[-1]}, are done again"
+            raise FileFormatError(path, None, "", text)
         rows: Rows = np.load(io.BytesIO(data), allow_pickle=False)
         return rows
 
-    def _damaged(self, number: int, why: str) -> FileFormatError:
-        runs = range(len(self.design))[number * self.block :][: self.block]
-        advice = "it stays as it is; move it away or delete it and start again"
-        text = f"damaged: {why}; {advice}: only its runs, {runs[0]} to {runs[-1]}, are done again"
-        return FileFormatError(self._file(number), None, "", text)
-
-    def _file(self, number: int) -> Path:
-        return self.path / _BLOCKS / f"{number:07d}.npy"
-
     def _checksum(self, number: int, data: bytes) -> bytes:
         """Return a checksum of a block that no other block, and none of another sweep, has."""
-        return _sha256(self._key, f"{number} of {self.block}".encode(), data)
+        key = json.dumps([self.sweep, self.block, number], sort_keys=True).encode()
+        return hashlib.sha256(key + data).digest()
 
 
 @contextlib.contextmanager
@@ -170,14 +162,18 @@ def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterato
     """
     sweep = identity(task, design)
     path = path.absolute()
+    manifest = path / MANIFEST
     try:
         path.mkdir(parents=True, exist_ok=True)
-        _check_files(path)
+        others = {file.name for file in path.iterdir()} - {_LOCK, MANIFEST + _PARTIAL}
+        if others and not manifest.exists():
+            raise SweepError(
+                f"'{path}' holds no sweep, but other things ('{min(others)}'); give the sweep a folder of its own"
+            )
         handle = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
         lock = os.fdopen(handle, "r+", encoding="utf-8", errors="replace")
     except OSError as error:
-        reason = "it is a file, and a folder is needed" if path.is_file() else error.strerror or error
-        raise OutputError(f"cannot write to '{path}': {reason}") from error
+        raise OutputError(f"cannot write to '{path}': {reason(error, path)}") from error
     with lock:
         holder = lock.read(1000).strip()
         if holder and not holder.startswith(_HOLDER):
@@ -191,10 +187,8 @@ def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterato
         lock.truncate()
         lock.write(f"{_HOLDER}{os.getpid()} on {platform.node()}, since {_now()}\n")
         lock.flush()
-        manifest = _manifest(path, sweep, block)
-        for partial in _partial_files(path):
-            partial.unlink(missing_ok=True)
-        yield Folder(path=path, task=task, design=design, **manifest)
+        fields = _read_manifest(manifest, sweep) if manifest.exists() else _write_manifest(manifest, sweep, block)
+        yield Folder(path=path, task=task, design=design, sweep=sweep, block=fields["block"], made=fields["made"])
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
@@ -209,22 +203,20 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """
     partial = path.with_name(path.name + _PARTIAL)
     try:
-        try:
-            path.parent.mkdir(exist_ok=True)
-            partial.unlink(missing_ok=True)  # a link of that name would be written through
-            write(partial)
-            _sync(partial)
-            partial.replace(path)
-            _sync(path.parent)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                partial.unlink(missing_ok=True)
-            raise
+        path.parent.mkdir(exist_ok=True)
+        partial.unlink(missing_ok=True)  # a link of that name would be written through
+        write(partial)
+        _sync(partial)
+        partial.replace(path)
+        _sync(path.parent)
     except OSError as error:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         advice = " Make room and start again: it goes on from there." if full else ""
-        reason = error.strerror or str(error)
-        raise OutputError(f"cannot write '{path}': {reason}; what was finished before stays.{advice}") from error
+        why = error.strerror or str(error)
+        raise OutputError(f"cannot write '{path}': {why}; what was finished before stays.{advice}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
 
 
 def _sync(path: Path) -> None:
@@ -235,33 +227,8 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-def _partial_files(path: Path) -> list[Path]:
-    """Return the files that a killed process left half written. Files of other names are somebody else's."""
-    files = [path / f"{name}{_PARTIAL}" for name in (MANIFEST, RESULTS, RECORD)]
-    files += (path / _BLOCKS).glob(f"{'[0-9]' * 7}.npy{_PARTIAL}")
-    return [file for file in files if file.is_symlink() or file.is_file()]
-
-
-def _check_files(path: Path) -> None:
-    known = {path / _LOCK, path / MANIFEST, *_partial_files(path)}
-    others = sorted(file.name for file in path.iterdir() if file not in known)
-    if others and not (path / MANIFEST).exists():
-        raise SweepError(
-            f"'{path}' holds no sweep, but other things ('{others[0]}'); give the sweep a folder of its own"
-        )
-
-
-def _manifest(path: Path, sweep: dict[str, Any], block: int) -> dict[str, Any]:
-    """Return the fields ``sweep``, ``block`` and ``made`` of a folder; begin it where there are none."""
-    manifest = path / MANIFEST
-    if manifest.exists():
-        fields = _read_manifest(manifest)
-        if differences := list(_differences("", fields["sweep"], sweep)):
-            more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
-            raise SweepError(
-                f"'{path}' holds another sweep: {'; '.join(differences[:3])}{more}. Give this one a folder of its own"
-            )
-        return fields
+def _write_manifest(path: Path, sweep: dict[str, Any], block: int) -> dict[str, Any]:
+    """Begin a folder, and return what its manifest says."""
     made = {
         "date": _now(),
         "armwright": __version__,
@@ -270,26 +237,32 @@ def _manifest(path: Path, sweep: dict[str, Any], block: int) -> dict[str, Any]:
         "scipy": scipy.__version__,
         "machine": f"{sys.platform} {platform.machine()}",
     }
-    fields = {"block": block, "made": made, "sweep": sweep}
-    text = json.dumps({"format": _FORMAT, **fields}, indent=2, ensure_ascii=False) + "\n"
-    write_whole(manifest, lambda partial: partial.write_text(text, encoding="utf-8"))
+    fields = {"format": _FORMAT, "block": block, "made": made, "sweep": sweep}
+    text = json.dumps(fields, indent=2, ensure_ascii=False) + "\n"
+    write_whole(path, lambda partial: partial.write_text(text, encoding="utf-8"))
     return fields
 
 
-def _read_manifest(path: Path) -> dict[str, Any]:
+def _read_manifest(path: Path, sweep: dict[str, Any]) -> dict[str, Any]:
+    """Return what the manifest of a folder says, if it is the folder of a sweep."""
     text = read_text(regular(path))
     try:
-        fields = json.loads(text)
-        version, block, made, sweep = (fields[name] for name in ("format", "block", "made", "sweep"))
-        sound = type(block) is int and block >= 1 and isinstance(sweep, dict)
-        sound = sound and all(isinstance(made[name], str) for name in ("date", "armwright"))
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        fields: dict[str, Any] = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise FileFormatError(path, None, "", f"damaged: {shown(error)}") from error
-    if version != _FORMAT:
-        raise FileFormatError(path, None, "format", f"expected {_FORMAT}, got {shown(version)}")
-    if not sound:
-        raise FileFormatError(path, None, "", "damaged: block, made or sweep is not as a sweep writes it")
-    return {"block": block, "made": made, "sweep": sweep}
+    match fields:
+        case {"format": version} if version != _FORMAT:
+            raise FileFormatError(path, None, "format", f"expected {_FORMAT}, got {shown(version)}")
+        case {"format": _, "block": block, "made": {"date": str(), "armwright": str()}, "sweep": dict(other)} if (
+            type(block) is int and block >= 1
+        ):
+            differences = list(_differences("", other, sweep))
+        case _:
+            raise FileFormatError(path, None, "", "damaged: block, made or sweep is not as a sweep writes it")
+    if differences:
+        text = "; ".join(differences[:3]) + (f"; and {len(differences) - 3} more" if len(differences) > 3 else "")
+        raise SweepError(f"'{path.parent}' holds another sweep: {text}. Give this one a folder of its own")
+    return fields
 
 
 def _differences(key: str, there: Any, here: Any) -> Iterator[str]:
@@ -299,14 +272,6 @@ def _differences(key: str, there: Any, here: Any) -> Iterator[str]:
             yield from _differences(f"{key}.{name}" if key else name, there.get(name), here.get(name))
     elif there != here:
         yield f"{key} is {shown(there)} there, {shown(here)} here"
-
-
-def _sha256(*parts: bytes) -> bytes:
-    digest = hashlib.sha256()
-    for part in parts:
-        digest.update(len(part).to_bytes(8, "little"))
-        digest.update(part)
-    return digest.digest()
 
 
 def _now() -> str:

@@ -1,6 +1,8 @@
 """The progress of a sweep."""
 
 import attrs
+import numpy as np
+import numpy.typing as npt
 
 
 @attrs.frozen(kw_only=True)
@@ -16,10 +18,14 @@ class Progress:
     """
 
     runs: int
-    done: int
-    resumed: int
-    failed: int
-    seconds: float
+    done: int = 0
+    resumed: int = 0
+    failed: int = 0
+    seconds: float = 0.0
+
+    def counting(self, status: npt.NDArray[np.int8]) -> "Progress":
+        """Return the progress after some more runs, of each of which the status is given."""
+        return attrs.evolve(self, done=self.done + len(status), failed=self.failed + int(np.count_nonzero(status)))
 
     @property
     def rate(self) -> float:

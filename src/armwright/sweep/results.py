@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armwright.errors import FileFormatError, shown
+from armwright.errors import FileFormatError
 from armwright.files.inputs import regular
 from armwright.files.output import RECORD, record_text, recorded, sha256
 from armwright.sweep.errors import SweepError
 from armwright.sweep.extras import extra
 from armwright.sweep.folder import MANIFEST, RESULTS, Folder, write_whole
-from armwright.sweep.task import Rows, Status
+from armwright.sweep.task import Rows, Status, failed_row
 
 if TYPE_CHECKING:
     import xarray
 
-# At least so much is written at a time, where there is so much [bytes].
+# So much is written at a time, where there is so much, but one block at least [bytes].
 _CHUNK = 1_000_000
-# Where the header of the file counts the records, with big-endian bytes (NASA ESDS-RFC-011v2.0, 2011).
-_RECORD_COUNT = slice(4, 8)
+# Where the header of the file counts the records, as four big-endian bytes (NASA ESDS-RFC-011v2.0, 2011).
+_RECORD_COUNT = 4
 
 
 def load(folder: Path | str) -> "xarray.Dataset":
@@ -41,22 +41,21 @@ def load(folder: Path | str) -> "xarray.Dataset":
     """
     xr = extra("xarray")
     path = Path(folder) / RESULTS
-    damaged = "it stays as it is; move it away or delete it and run the sweep again: it is made again of the blocks"
     if not path.exists():
         state = "is not finished; run it again to go on" if path.with_name(MANIFEST).exists() else "is not there"
         raise SweepError(f"'{folder}': the sweep {state}")
-    expected, actual = recorded(path.parent).get(RESULTS), sha256(regular(path))
+    damage, expected, actual = "", recorded(path.parent).get(RESULTS), sha256(regular(path))
     if expected is None:
-        raise FileFormatError(path, None, "", f"cannot be checked: no {RECORD} beside it tells its hash; {damaged}")
-    if expected != actual:
-        raise FileFormatError(path, None, "", f"damaged: its hash is not that in {RECORD}; {damaged}")
-    try:
-        # Units such as "hours" are those of a quantity, not of a calendar.
-        dataset: xarray.Dataset = xr.open_dataset(
-            path, engine="scipy", decode_times=False, decode_timedelta=False, mask_and_scale=False
-        )
-    except Exception as error:
-        raise FileFormatError(path, None, "", f"damaged: {shown(error)}; {damaged}") from error
+        damage = f"cannot be checked: no {RECORD} beside it tells its hash"
+    elif expected != actual:
+        damage = f"damaged: its hash is not that in {RECORD}"
+    if damage:
+        advice = "move it away or delete it and run the sweep again: it is made again of the blocks"
+        raise FileFormatError(path, None, "", f"{damage}; it stays as it is; {advice}")
+    # Units such as "hours" are those of a quantity, not of a calendar.
+    dataset: xarray.Dataset = xr.open_dataset(
+        path, engine="scipy", decode_times=False, decode_timedelta=False, mask_and_scale=False
+    )
     return dataset
 
 
@@ -68,8 +67,7 @@ def write_results(folder: Folder) -> None:
 
     Raises:
         OutputError: they cannot be written; the blocks stay.
-        FileFormatError: a block is damaged.
-        SweepError: a block has gone since it was done.
+        FileFormatError: a block is damaged, or has gone since it was done.
     """
 
     def write(partial: Path) -> None:
@@ -87,32 +85,36 @@ def _write(folder: Folder, path: Path) -> None:
     The runs are the records of the file, which stand one after the other behind its header. So the file is that of the
     first blocks, followed by the records of the others, with their number corrected.
     """
-    letters = max(len(text.encode()) for _, rows in _chunks(folder) for text in rows["message"].tolist())
+    letters = max(len(text.encode()) for rows in _chunks(folder) for text in rows["message"].tolist())
+    nothing = failed_row(folder.task, Status.FAILED, "")[:0]
+    header = len(_netcdf(folder, 0, nothing, letters))
+    done = 0
     with path.open("wb") as file:
-        header = 0
-        for start, rows in _chunks(folder):
-            file.write(_netcdf(folder, start, rows, letters)[header:])
-            header = header or len(_netcdf(folder, start, rows[:0], letters))
-        file.seek(_RECORD_COUNT.start)
-        file.write(len(folder.design).to_bytes(_RECORD_COUNT.stop - _RECORD_COUNT.start, "big"))
+        for rows in _chunks(folder):
+            file.write(_netcdf(folder, done, rows, letters)[header if done else 0 :])
+            done += len(rows)
+        file.seek(_RECORD_COUNT)
+        file.write(done.to_bytes(4, "big"))
 
 
-def _chunks(folder: Folder) -> Iterator[tuple[int, Rows]]:
-    """Read the blocks, some at a time, with the number of the first run of them."""
-    first, size, blocks = 0, 0, []
-    for number, start in enumerate(folder.starts):
-        rows = folder.read_block(number)
-        if rows is None:
-            raise SweepError(f"'{folder.path}': block {number} has gone just now; start again to go on")
-        blocks.append(rows)
-        size += rows.nbytes
-        if size >= _CHUNK or start == folder.starts[-1]:
-            yield first, np.concatenate(blocks)
-            first, size, blocks = start + len(rows), 0, []
+def _chunks(folder: Folder) -> Iterator[Rows]:
+    """Read the blocks, some at a time."""
+    size = failed_row(folder.task, Status.FAILED, "").nbytes * folder.block
+    some = _CHUNK // size + 1
+    numbers = range(len(folder.blocks))
+    for first in numbers[::some]:
+        yield np.concatenate([folder.read_block(number) for number in numbers[first : first + some]])
 
 
 def _netcdf(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:
-    """Return a file of some runs, as classic netCDF with 64-bit offsets."""
+    """Return a file of some runs, as classic netCDF with 64-bit offsets.
+
+    Args:
+        folder: of the sweep.
+        start: number of the first run.
+        rows: of the runs.
+        letters: length of the longest message of the sweep [bytes].
+    """
     task, design = folder.task, folder.design
     runs = np.arange(start, start + len(rows), dtype=np.int32)
     coordinates: dict[str, Any] = {"run": ("run", runs, {"long_name": "number of the run"})}
@@ -120,18 +122,18 @@ def _netcdf(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:
         coordinates[name] = (name, axis.values, {"long_name": axis.description, "units": axis.units})
     for name, column in zip(design.names, design.points.T, strict=True):
         coordinates[name] = ("run", column[runs], {"units": design.units[name]})
+    variables: dict[str, Any] = {
+        name: (("run", *output.dims), rows[name], {"long_name": output.description, "units": output.units})
+        for name, output in task.outputs.items()
+    }
     flags = {
         "long_name": "how the run ended",
         "flag_values": np.array(list(Status), dtype=np.int8),
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
+    variables["status"] = ("run", rows["status"], flags)
     # All records have texts of the same length, in bytes.
     messages = np.array([text.encode() for text in rows["message"].tolist()], dtype=f"S{max(letters, 1)}")
-    variables: dict[str, Any] = {
-        name: (("run", *output.dims), rows[name], {"long_name": output.description, "units": output.units})
-        for name, output in task.outputs.items()
-    }
-    variables["status"] = ("run", rows["status"], flags)
     variables["message"] = ("run", messages, {"long_name": "why the run failed", "_Encoding": "utf-8"})
     provenance = {
         "Conventions": "CF-1.11",

@@ -1,23 +1,22 @@
 """Running a sweep: each block once, on cores or on a Dask cluster, with everything finished on the disk."""
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import attrs
-import numpy as np
 
-from armwright.arrays import Array, cores, integer
+from armwright.arrays import cores, integer
 from armwright.errors import InvalidValueError, KindError
 from armwright.sweep.designs import Design
-from armwright.sweep.executors import Processes, cluster, parallel, serial
+from armwright.sweep.executors import evaluate_blocks
 from armwright.sweep.extras import check_extras
 from armwright.sweep.folder import RESULTS, Folder, locked_folder
 from armwright.sweep.progress import Progress
 from armwright.sweep.results import load, write_results
-from armwright.sweep.task import Rows, Task, check_task
+from armwright.sweep.task import Task, check_task
 
 if TYPE_CHECKING:
     import xarray
@@ -91,33 +90,20 @@ def run(
 def _finish(sweep: Folder, workers: int | None, scheduler: str | None, progress: Callable[[Progress], None]) -> None:
     """Do the blocks that are missing."""
     began = time.monotonic()
-    resumed = failed = 0
+    now = Progress(runs=len(sweep.design))
     missing = []
-    for number, start in enumerate(sweep.starts):
-        rows = sweep.read_block(number)
-        if rows is None:
-            missing.append((number, sweep.design.points[start : start + sweep.block]))
+    for number, runs in enumerate(sweep.blocks):
+        if sweep.block_path(number).exists():
+            now = now.counting(sweep.read_block(number)["status"])
         else:
-            resumed, failed = resumed + len(rows), failed + int(np.count_nonzero(rows["status"]))
-    now = Progress(runs=len(sweep.design), done=resumed, resumed=resumed, failed=failed, seconds=0.0)
+            missing.append((number, sweep.design.points[runs.start : runs.stop]))
+    now = attrs.evolve(now, resumed=now.done)
     progress(now)
-    with closing(_evaluated(sweep.task, missing, workers, scheduler)) as blocks:  # workers end on an error too
+    if not missing:
+        return
+    blocks = evaluate_blocks(sweep.task, missing, workers or min(cores(), len(missing)), scheduler)
+    with closing(blocks):  # workers end on an error too
         for number, rows in blocks:
             sweep.write_block(number, rows)
-            done, failed = now.done + len(rows), now.failed + int(np.count_nonzero(rows["status"]))
-            now = attrs.evolve(now, done=done, failed=failed, seconds=time.monotonic() - began)
+            now = attrs.evolve(now.counting(rows["status"]), seconds=time.monotonic() - began)
             progress(now)
-
-
-def _evaluated(
-    task: Task, blocks: list[tuple[int, Array]], workers: int | None, scheduler: str | None
-) -> Generator[tuple[int, Rows]]:
-    """Evaluate blocks by the workers that were asked for."""
-    workers = workers or min(cores(), len(blocks))
-    if not blocks:
-        return
-    if scheduler is None and workers == 1:
-        yield from serial(task, blocks)
-        return
-    with closing(Processes(task, workers)) if scheduler is None else cluster(task, scheduler) as executor:
-        yield from parallel(executor, task, blocks)

@@ -108,7 +108,7 @@ class Task(Protocol):
 
 
 def check_task(task: Task, parameters: Sequence[str]) -> None:
-    """Check that the names of a task are distinct, that the axes of its outputs exist, and that a run has a row.
+    """Check that the names of a task and a design are distinct, that axes of outputs exist, and that a run has a row.
 
     Raises:
         InvalidValueError: it has no output, two things have the same name, or a reserved one, or the outputs of a run
@@ -127,7 +127,7 @@ def check_task(task: Task, parameters: Sequence[str]) -> None:
             if not name.isidentifier():
                 raise InvalidValueError(f"'{name}' as {kind}: expected a word of letters, digits and _")
             if name in used:
-                raise InvalidValueError(f"'{name}' cannot be {kind}: it is {used[name]}")
+                raise InvalidValueError(f"'{name}' cannot be {kind}: it is already {used[name]}")
             used[name] = kind
     for name, output in task.outputs.items():
         for dim in output.dims:
@@ -149,60 +149,63 @@ def evaluate(task: Task, points: Array) -> Rows:
     Raises:
         SweepError: the task returned something else than its outputs.
     """
-    points = read_only(np.ascontiguousarray(points, dtype=np.float64))
+    points = read_only(points)
     try:
         returned = task(points)
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a run, the sweep goes on
         if len(points) == 1:
             return failed_row(task, Status.FAILED, f"{type(error).__name__}: {error}")
-        return np.concatenate([evaluate(task, points[i : i + 1]) for i in range(len(points))])
+        return np.concatenate([evaluate(task, point) for point in np.split(points, len(points))])
     return _checked(task, returned, len(points))
 
 
 def failed_row(task: Task, status: Status, message: str) -> Rows:
     """Return the row of a run without results: NaN everywhere."""
-    return _rows(task, dict.fromkeys(task.outputs, np.nan), [status], [_short(message)])
-
-
-def _rows(task: Task, values: Mapping[str, Any], status: Sequence[int], messages: Sequence[str]) -> Rows:
-    kinds = [(name, np.float64, shape) for name, shape in _shapes(task).items()]
-    longest = max(1, *map(len, messages))
-    rows = np.empty(len(status), np.dtype([*kinds, ("status", np.int8), ("message", f"U{longest}")]))
-    for name, value in {**values, "status": status, "message": messages}.items():
-        rows[name] = value
-    return rows
-
-
-def _shapes(task: Task) -> dict[str, tuple[int, ...]]:
-    """Return by output the shape of what one run returns."""
-    return {name: tuple(len(task.axes[dim].values) for dim in output.dims) for name, output in task.outputs.items()}
+    row = _empty_rows(task, [_short(message)])
+    row["status"] = status
+    for name in task.outputs:
+        row[name] = np.nan
+    return row
 
 
 def _checked(task: Task, returned: Mapping[str, Any], runs: int) -> Rows:
     """Return the outputs of a task as rows, if they are those that it declares."""
     if not isinstance(returned, Mapping):
         raise SweepError(f"task '{task.name}' returned {shown(returned)}; expected outputs by name")
-    names = {name for name in returned if name != FAILURE}
-    if names != set(task.outputs):
-        raise SweepError(
-            f"task '{task.name}' returned {', '.join(sorted(names)) or 'nothing'}; its outputs are "
-            f"{', '.join(sorted(task.outputs))}"
-        )
-    values = {}
-    for name, shape in _shapes(task).items():
-        try:
-            values[name] = np.array(returned[name], dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise SweepError(f"task '{task.name}': output '{name}': expected numbers, got {error}") from error
-        if values[name].shape != (runs, *shape):
-            raise SweepError(
-                f"task '{task.name}': output '{name}': expected shape {(runs, *shape)}, got {values[name].shape}; the "
-                "first axis is that of the runs"
-            )
+    names, expected = (", ".join(sorted(names)) for names in ({*returned} - {FAILURE}, task.outputs))
+    if names != expected:
+        raise SweepError(f"task '{task.name}' returned {names or 'nothing'}; its outputs are {expected}")
     messages = [_short(str(text)) for text in returned.get(FAILURE, ("",) * runs)]
     if len(messages) != runs:
         raise SweepError(f"task '{task.name}': '{FAILURE}': expected {runs} texts, one per run, got {len(messages)}")
-    return _rows(task, values, [Status.FAILED if text else Status.DONE for text in messages], messages)
+    rows = _empty_rows(task, messages)
+    rows["status"] = [Status.FAILED if text else Status.DONE for text in messages]
+    for name in task.outputs:
+        try:
+            values = np.array(returned[name], dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise SweepError(f"task '{task.name}': output '{name}': expected numbers, got {error}") from error
+        if values.shape != (shape := rows[name].shape):
+            raise SweepError(
+                f"task '{task.name}': output '{name}': expected shape {shape}, got {values.shape}; the first axis is "
+                "that of the runs"
+            )
+        rows[name] = values
+    return rows
+
+
+def _empty_rows(task: Task, messages: Sequence[str]) -> Rows:
+    """Return rows with messages, whose numbers are still to be filled in."""
+    kinds = [(name, np.float64, shape) for name, shape in _shapes(task).items()]
+    longest = max(1, *map(len, messages))
+    rows = np.empty(len(messages), np.dtype([*kinds, ("status", np.int8), ("message", f"U{longest}")]))
+    rows["message"] = messages
+    return rows
+
+
+def _shapes(task: Task) -> dict[str, tuple[int, ...]]:
+    """Return by output the shape of what one run returns."""
+    return {name: tuple(len(task.axes[dim].values) for dim in output.dims) for name, output in task.outputs.items()}
 
 
 def _short(text: str) -> str:

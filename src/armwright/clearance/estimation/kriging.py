@@ -17,7 +17,8 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from armwright.arrays import Array, ArrayLike, floats, one_core
-from armwright.errors import InvalidValueError, MissingExtraError, ShapeError, TooFewError
+from armwright.errors import InvalidValueError, ShapeError, TooFewError
+from armwright.extras import import_extra
 
 # Bounds of the length scales, as parts of the range of a parameter.
 _LENGTHS = (0.1, 30.0)
@@ -277,12 +278,7 @@ def check_extra() -> None:
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
-        import sklearn.gaussian_process  # noqa: F401, PLC0415 - an extra
-    except ImportError as error:
-        raise MissingExtraError(
-            'learning from simulations needs scikit-learn; install it by: pip install "armwright[clearance]"'
-        ) from error
+    import_extra("sklearn.gaussian_process", "learning from simulations", "clearance", "scikit-learn")
 
 
 def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:

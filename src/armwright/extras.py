@@ -1,0 +1,27 @@
+"""Libraries that the core does not install: they come with the extras of the package."""
+
+from importlib import import_module
+from types import ModuleType
+
+from armwright.errors import MissingExtraError
+
+
+def import_extra(module: str, purpose: str, extra: str, library: str = "") -> ModuleType:
+    """Import a module of a library that an extra installs.
+
+    Args:
+        module: full name of the module.
+        purpose: what needs it, for the message.
+        extra: name of the extra.
+        library: name of the library, where it is not the first part of the name of the module.
+
+    Raises:
+        MissingExtraError: the library is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        library = library or module.partition(".")[0]
+        raise MissingExtraError(
+            f"{purpose} needs {library}; install it by: pip install 'armwright[{extra}]'"
+        ) from error
