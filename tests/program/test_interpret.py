@@ -255,7 +255,7 @@ def test_goal_out_of_limits() -> None:
     assert "`far` cannot be reached by ARM_1" in error.diagnostic.message
     assert "joint 3" in error.diagnostic.notes[0]
     assert "1878.9 mm beyond" in error.diagnostic.notes[0]
-    assert error.diagnostic.secondary[0].text == "`far` got its place here"
+    assert error.diagnostic.secondary[0].text == "`far` got its pose here"
 
 
 def test_goal_out_of_reach() -> None:

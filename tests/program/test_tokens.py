@@ -167,7 +167,7 @@ def test_look_alikes_once() -> None:
     (odd,) = scanned("a；b；c；").diagnostics
 
     assert len(odd.fixes) == 3
-    assert odd.notes == ("it stands in 3 places",)
+    assert odd.notes == ("it occurs in 3 places",)
 
 
 @given(st.text(max_size=60), st.sampled_from(Standard))
@@ -193,7 +193,7 @@ def test_many_strange_characters() -> None:
     found = scanned("\x01" * 1_000_000 + "\nPAUSE 1").diagnostics
 
     assert [diagnostic.code for diagnostic in found] == ["E101"]
-    assert found[0].notes == ("it stands in 1000000 places",)
+    assert found[0].notes == ("it occurs in 1000000 places",)
     between = scanned("\x01a" * 90_000)
     assert [diagnostic.code for diagnostic in between.diagnostics] == ["E101"]
     assert all(token.damaged for token in between.tokens[:-1])

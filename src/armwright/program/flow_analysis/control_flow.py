@@ -51,7 +51,7 @@ def if_(context: Context, node: tree.If) -> None:
     if len(ways) > _MAX_PATHS and any(way is not None for way in ways):
         state.forget(context.writes(node))
         return
-    says, advice = "it gets one on one side of this IF only", "give it a value before the IF, or on both sides"
+    says, advice = "it gets a value on one side of this IF only", "give it a value before the IF, or on both sides"
     context.merge(*ways, parting=state.parting(node.head, says, advice))
 
 
@@ -89,7 +89,7 @@ def _perhaps_never(
 ) -> None:
     """Follow a loop that may not run once."""
     state = context.state
-    says, advice = f"it gets one inside this {word}, which may not run once", f"give it a value before the {word}"
+    says, advice = f"it gets a value inside this {word}, which may not run at all", f"give it a value before the {word}"
     parting = state.parting(head, says, advice)
     if certain:
         _loop(context, node, body)
@@ -191,8 +191,8 @@ def try_(context: Context, node: tree.Try) -> None:
     outside, context.recovering = context.recovering, True
     recovered = context.path(*node.recovery, mark=mark)
     context.recovering = outside
-    says = "it gets one in this TRY, where something may fail before"
-    advice = "give it a value before the TRY, or behind RECOVER too"
+    says = "it gets a value in this TRY, where a statement before may fail"
+    advice = "give it a value before the TRY, or after RECOVER too"
     context.merge(well, recovered, parting=state.parting(_first_word(node.span), says, advice))
 
 

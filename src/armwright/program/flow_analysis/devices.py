@@ -37,8 +37,8 @@ def grasp(state: FlowState, node: tree.Grasp) -> None:
     if arm is None:
         help_ = f"write `GRASP {state.some_arm()}`"
         if state.symbols.std is Standard.RLO_83:
-            help_ = f"name one before, as `OPEN {state.some_arm()}` does"
-        text = "GRASP does not say which arm, and none has been used yet"
+            help_ = f"name an arm before, as in `OPEN {state.some_arm()}`"
+        text = "GRASP names no arm, and no arm has been used before"
         state.report("E307", text, node.span, "which arm?", advice=help_)
         return
     state.record(node, None if arm == UNKNOWN else arm)
@@ -62,7 +62,7 @@ def _closed_on_arrival(state: FlowState, arm: str) -> None:
         f"{arm} {'may come' if opened_late else 'comes'} to `{state.name(hand.at)}` with closed fingers",
         hand.arrival,
         "it arrives here",
-        secondary=(Label(hand.opened, "they open only here"),) if hand.opened else (),
+        secondary=(Label(hand.opened, "they open here"),) if hand.opened else (),
         advice=f"write `OPEN {arm}` before this MOVE",
     )
 

@@ -48,11 +48,11 @@ def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) ->
         name = written(node)
         state.report(
             "E310",
-            f"`{name}` hangs rigidly on {state.name(leader)}, which no value moves",
+            f"`{name}` is rigidly attached to {state.name(leader)}, which an assignment cannot move",
             node.span,
-            "cannot be placed",
-            secondary=(Label(link.span, "hung rigidly here"),) if link and link.span else (),
-            advice=f"leave RIGIDLY out, or write `UNFIX {name}` before this",
+            "cannot be assigned a pose",
+            secondary=(Label(link.span, "rigidly attached here"),) if link and link.span else (),
+            advice=f"remove RIGIDLY, or write `UNFIX {name}` before this",
         )
         return
     state.table.assign(frame, span)
@@ -101,12 +101,12 @@ def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
     name = state.name
     state.report(
         "W203",
-        f"`{name(child)}` still hangs on `{name(link.parent)}`",
+        f"`{name(child)}` is still attached to `{name(link.parent)}`",
         span,
-        f"from here on it hangs on {name(parent)}",
+        f"from here on it is attached to {name(parent)}",
         secondary=(Label(link.span, f"affixed to {name(link.parent)} here"),) if link.span else (),
-        note="" if link.span else f"in the cell it hangs on {name(link.parent)}",
-        advice=f"write `UNFIX {name(child)} FROM {name(link.parent)}` first to say so",
+        note="" if link.span else f"in the cell it is attached to {name(link.parent)}",
+        advice=f"write `UNFIX {name(child)} FROM {name(link.parent)}` before to make this explicit",
     )
 
 
@@ -126,11 +126,13 @@ def _ring(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
             break
         link = state.table.links[below]
         if link and link.span and link.parent:
-            chain.append(Label(link.span, f"{name(below)} hangs on {name(link.parent)}"))
+            chain.append(Label(link.span, f"{name(below)} is attached to {name(link.parent)}"))
     on = "itself" if child == parent else name(parent)
-    text = "this AFFIX would close a ring"
-    note = "frames form a tree; each hangs on one other and in the end on WORLD"
-    state.report("E305", text, node.link, f"{name(child)} cannot hang on {on}", secondary=tuple(chain), note=note)
+    text = "this AFFIX would close a cycle"
+    note = "frames form a tree with the root WORLD; each is attached to one parent"
+    state.report(
+        "E305", text, node.link, f"{name(child)} cannot be attached to {on}", secondary=tuple(chain), note=note
+    )
 
 
 def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
@@ -141,11 +143,11 @@ def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
     name = state.name
     state.report(
         "L303",
-        f"`{name(parent)}` was moved before `{name(child)}` hung on it",
+        f"`{name(parent)}` was moved before `{name(child)}` was attached to it",
         node.link,
         f"{name(child)} follows only from here on",
         secondary=(Label(above.span, f"{name(child)} did not follow this"),),
-        advice="put the AFFIX before the assignment, or give the step with AT",
+        advice="write the AFFIX before the assignment, or specify the transformation with AT",
     )
 
 
@@ -176,12 +178,12 @@ def _not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
     link, name = state.table.links[child], state.name
     on = link.parent if link else None
     where = Label(link.span, f"{name(child)} was affixed to {name(on)} here") if link and link.span and on else None
-    instead = f"write `UNFIX {name(child)} FROM {name(on)}`" if on else "leave this UNFIX out"
+    instead = f"write `UNFIX {name(child)} FROM {name(on)}`" if on else "remove this UNFIX"
     state.report(
         "E306",
         f"`{name(child)}` is not affixed to `{written(node.parent)}`",
         node.parent.span,
-        "not the frame it hangs on" if on else f"{name(child)} hangs on nothing",
+        "not its parent" if on else f"{name(child)} has no parent",
         secondary=(where,) if where else (),
         advice=instead,
     )

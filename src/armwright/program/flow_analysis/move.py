@@ -35,7 +35,7 @@ def move(context: Context, node: tree.Move) -> None:
                 context.follow(guard.action)
             state.facts.take_back(mark)
             state.over = False
-        says, advice = "it gets one in this action, which may not happen", "give it a value before the MOVE"
+        says, advice = "it gets a value in this action, which may not run", "give it a value before the MOVE"
         state.forget_undone(writes, state.parting(guard.head, says, advice))
     halted = any(context.writes(guard.action).halts for guard in guards)
     _end(state, node, arm, halted=halted)
@@ -107,11 +107,11 @@ def _left_hanging(state: FlowState, node: tree.Move, arm: str) -> None:
         return
     state.report(
         "W209",
-        f"`{name}` still hangs on {arm}, whose fingers have let it go",
+        f"`{name}` is still attached to {arm}, whose gripper has released it",
         node.span,
-        f"{name} goes along",
+        f"{name} moves along",
         secondary=(Label(opened, "they open here"), *((Label(link.span, "affixed here"),) if link.span else ())),
-        advice=f"write `UNFIX {name} FROM {arm}` behind OPEN",
+        advice=f"write `UNFIX {name} FROM {arm}` after OPEN",
     )
 
 
@@ -150,7 +150,7 @@ def _imply(state: FlowState, node: tree.Move, moved: str, arm: str) -> None:
     name, grip = state.name(moved), state.table.grips[arm]
     state.report(
         "W201",
-        f"`{name}` is moved, but no AFFIX hangs it on {arm}",
+        f"`{name}` is moved, but no AFFIX attaches it to {arm}",
         node.span,
         f"`AFFIX {name} TO {arm}` is implied",
         secondary=(Label(grip.span, f"{arm} grasped it here"),) if grip and grip.span else (),
@@ -167,7 +167,7 @@ def _not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
         "E301",
         f"`{name}` cannot be moved: it is not affixed to an arm",
         node.moved.span,
-        f"hangs on {state.name(link.parent) if link and link.parent else WORLD}, not on an arm",
+        f"is attached to {state.name(link.parent) if link and link.parent else WORLD}, not to an arm",
         secondary=(Label(link.span, "affixed here"),) if link and link.span else (),
         advice=f"grasp it and write `AFFIX {name} TO {state.last_arm() or state.some_arm()}` first"
         if moved != WORLD
@@ -176,9 +176,9 @@ def _not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
 
 
 def _relative(state: FlowState, node: tree.Move, arm: str) -> None:
-    text = f"`{written(node.goal)}` moves together with {arm}, which is to come to it"
-    note = "the goal is taken where it is when the motion starts, so this is a relative motion"
-    state.report("L302", text, node.goal.span, f"hangs on {arm}", note=note)
+    text = f"the goal `{written(node.goal)}` is attached to {arm} and moves with it"
+    note = "the pose of the goal at the start of the motion is used, so the motion is relative to the tool"
+    state.report("L302", text, node.goal.span, f"is attached to {arm}", note=note)
 
 
 def _speed(state: FlowState, node: tree.Expression) -> None:

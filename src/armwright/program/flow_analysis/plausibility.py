@@ -54,7 +54,7 @@ def lengths(state: FlowState, *nodes: tree.Expression | None) -> None:
                 )
                 advice = f"write the lengths in {_UNITS[units.length]}"
                 if units.length == "M":
-                    advice = "put `UNITS MM ;` in front of BEGIN if they are millimetres, or write them with their unit"
+                    advice = "write `UNITS MM ;` before BEGIN if they are in millimetres, or write each with its unit"
                 _odd(state, what.format(_length(away)), numbers, reach, advice)
 
 
@@ -105,9 +105,9 @@ def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
     name, hand = state.name, table.hands[arm]
     state.report(
         "W210",
-        f"`{name(child)}` is {_length(away)} away from the hand of {arm}",
+        f"`{name(child)}` is {_length(away)} away from the gripper of {arm}",
         node.link,
-        f"the hand stands at {name(frame)}",
-        secondary=(Label(hand.arrival, f"it came to {name(frame)} here"),) if hand.arrival else (),
+        f"the gripper is at {name(frame)}",
+        secondary=(Label(hand.arrival, f"it moved to {name(frame)} here"),) if hand.arrival else (),
         advice=f"write `AFFIX {name(frame)} TO {arm}`, or move the arm to {name(child)} first",
     )

@@ -237,11 +237,11 @@ class FlowState:
             return
         self.report(
             "L305",
-            "this statement is never reached",
+            "this statement is unreachable",
             span,
-            "no way leads here",
-            secondary=(Label(self.ended, "nothing behind this is done"),),
-            advice="leave it out, or put a condition in front of what ends the way",
+            "no path leads here",
+            secondary=(Label(self.ended, "no statement after this is executed"),),
+            advice="remove it, or make the statement that ends the path conditional",
         )
 
     # ---- arms ------------------------------------------------------------------------------------------------------

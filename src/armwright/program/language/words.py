@@ -25,19 +25,19 @@ LATER_STATEMENTS = {
     "WHILE": "RLO-83 has no loops",
     "REPEAT": "RLO-83 has no loops",
     "IF": "RLO-83 has no conditions",
-    "COBEGIN": "RLO-83 has no branches side by side",
+    "COBEGIN": "RLO-83 has no concurrent branches",
     "SIGNAL": "RLO-83 has no events",
     "WAIT": "RLO-83 has no events",
     "PAUSE": "RLO-83 has no pauses",
     "LOCK": "RLO-83 has no locks",
     "TRY": "RLO-83 has no recovery",
     "RETRY": "RLO-83 has no recovery",
-    "HALT": "RLO-83 runs to END.",
+    "HALT": "RLO-83 ends a program at END.",
     "PRINT": "RLO-83 has no output",
 }
 LATER_HEADERS = {
     "IMPORT": "RLO-83 takes its frames from the cell file alone",
-    "UNITS": "RLO-83 counts lengths in metres",
+    "UNITS": "RLO-83 has lengths in metres only",
     "PROCEDURE": "RLO-83 has no procedures",
 }
 LATER_TYPES = {"ARRAY": "RLO-83 has no arrays", "EVENT": "RLO-83 has no events"}
@@ -53,16 +53,16 @@ ELSEWHERE = {
     "DETACH": "UNFIX",
 }
 ABSENT = {
-    **dict.fromkeys(("GOTO", "GO", "JUMP"), "nothing can be jumped to; write WHILE, REPEAT or FOR"),
-    **dict.fromkeys(("BREAK", "CONTINUE"), "a loop goes on by its own condition alone; write WHILE or REPEAT with it"),
+    **dict.fromkeys(("GOTO", "GO", "JUMP"), "RLO has no jumps; write WHILE, REPEAT or FOR"),
+    **dict.fromkeys(("BREAK", "CONTINUE"), "a loop ends by its own condition only; write WHILE or REPEAT"),
     **dict.fromkeys(("CASE", "SWITCH"), "write `IF ... THEN ... ELSE IF ... THEN ...`"),
-    **dict.fromkeys(("LET", "SET"), "a value is given without a word in front: `name = value`"),
+    **dict.fromkeys(("LET", "SET"), "an assignment has no keyword: `name = value`"),
     **dict.fromkeys(
         ("ENDIF", "ENDWHILE", "ENDFOR", "ENDDO", "FI", "OD"),
-        "IF, WHILE and FOR hold one statement and need no word at its end; write `BEGIN ... END` around several",
+        "IF, WHILE and FOR contain one statement and have no end keyword; write `BEGIN ... END` around several",
     ),
     "CALL": "a procedure is called by its name: `name(...)`",
-    "RETURN": "a procedure goes back at its END, and gives nothing back",
+    "RETURN": "a procedure returns at its END, without a value",
 }
 
 # What opens and closes a stretch of statements in RLO-2.

@@ -17,7 +17,7 @@ _NO_NAMES = {
     What.DEVICE: "a device, whose name the cell settles",
     What.FUNCTION: "a function of the language",
     What.UNIT: "a unit",
-    What.SENSOR: "a word of the language",
+    What.SENSOR: "a reserved word",
     What.AXIS: "an axis",
 }
 

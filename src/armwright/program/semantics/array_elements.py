@@ -70,4 +70,4 @@ def _index(names: Names, name: tree.Name, index: tree.Expression, sort: Expressi
             text = f"index {index.text} is outside 1..{size}"
             names.report("E222", text, index.span, "no such element", secondary=names.where_declared(name.key))
         elif value % 1 > 0:
-            names.report("E222", f"an index must be a whole number, not {index.text}", index.span, "not whole")
+            names.report("E222", f"an index must be an integer, not {index.text}", index.span, "not whole")

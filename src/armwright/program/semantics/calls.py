@@ -82,7 +82,7 @@ class Calls:
                 argument.span,
                 "an arm" if isinstance(argument, tree.ArmName) else "the root of all frames",
                 secondary=(Label(changed, "changed here"),),
-                note="a procedure works on the FRAME that it is given, not on a copy",
+                note="a FRAME is passed by reference: the procedure changes the frame itself",
             )
 
     def _follow(self) -> None:
@@ -166,8 +166,8 @@ def _unknown(names: Names, node: tree.Call) -> None:
             numbers = (1,) if kind.kind is VariableKind.SCALAR else (1, _NUMBERS_OF_A_PLACE)
             fixes = (Fix(Span(name.span.end, name.span.end), " ="),) if len(node.arguments) in numbers else ()
     elif name.key in FUNCTIONS:
-        message, label = f"`{name.key}` is a function and no statement", "its value goes nowhere"
-        help_ = f"write what its value goes to: `... = {name.text}(...)`"
+        message, label = f"`{name.key}` is a function and no statement", "its value is not used"
+        help_ = f"assign its value: `... = {name.text}(...)`"
     else:
         near = ELSEWHERE.get(name.key) or names.near(name.text, lambda: [*_spelled(names), *_STATEMENTS])
         message, label = f"unknown procedure `{name.text}`", "unknown procedure"

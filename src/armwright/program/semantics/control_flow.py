@@ -51,7 +51,7 @@ def for_(context: Context, node: tree.For) -> None:
             names.report("E229", message, variable.span, str(kind), secondary=names.where_declared(variable.key))
     for bound in (node.first, node.last, node.step):
         if bound is not None:
-            need(names, bound, ExpressionType.SCALAR, "E229", "FOR counts in numbers")
+            need(names, bound, ExpressionType.SCALAR, "E229", "the variable of FOR is a number")
     if isinstance(node.step, tree.Number) and node.step.value == 0:
         text = "a FOR with STEP 0 would never end"
         names.report("E229", text, node.step.span, "goes nowhere", advice="leave STEP out to count by 1")
@@ -114,7 +114,7 @@ def retry(context: Context, node: tree.Retry) -> None:
     """Check that a RETRY stands in a RECOVER part."""
     if not context.recovering:
         text = "RETRY is outside of RECOVER"
-        note = "RETRY runs the TRY part again to whose RECOVER it belongs"
+        note = "RETRY repeats the TRY of the RECOVER that contains it"
         context.names.report(
             "E225", text, node.span, "retry what?", note=note, advice="write `TRY ... RECOVER ... RETRY END`"
         )

@@ -123,7 +123,7 @@ def _child(names: Names, node: tree.Mobile, verb: str, done: str, advice: str = 
     """Check the frame that AFFIX hangs or UNFIX cuts."""
     if isinstance(node, tree.ArmName):
         text = f"an arm cannot be {done}"
-        names.report("E308", text, node.span, "an arm hangs on its own base", advice=advice)
+        names.report("E308", text, node.span, "the cell file fixes the base of an arm", advice=advice)
     elif is_world(node):
         text = f"{called(node)} cannot be {done.partition(' ')[0]}"
         names.report("E309", text, node.span, "the root of all frames")

@@ -97,7 +97,7 @@ def _size(names: Names, number: tree.Number) -> int | None:
         return int(number.value)
     # A number that was reported before is NaN.
     if not math.isnan(number.value):
-        text = f"the size of an array must be a whole number from 1, not {number.text}"
+        text = f"the size of an array must be an integer from 1, not {number.text}"
         names.report("E222", text, number.span, "no size")
     return None
 
@@ -128,7 +128,7 @@ def _units(names: Names, program: tree.Program) -> None:
 def _no_unit(names: Names, unit: tree.Name) -> None:
     if unit.key in UNITS:
         what = {"time": "times are always in seconds", "force": "forces are always in newtons"}[dimension(unit.key)]
-        text = f"UNITS settles lengths and angles, but `{unit.text}` is a unit of {dimension(unit.key)}"
+        text = f"UNITS sets the units of lengths and angles, but `{unit.text}` is a unit of {dimension(unit.key)}"
         names.report("E224", text, unit.span, "leave this out", note=what)
         return
     near = _LONG_UNITS.get(unit.key) or names.near(unit.text, lambda: DECLARABLE)
@@ -144,7 +144,13 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
     if read_import is None:
         names.open_import = True
         note = "a name that is not declared may be one of them"
-        names.report("W205", f"the frames of `{path.value}` are not looked up", header.span, "not looked up", note=note)
+        names.report(
+            "W205",
+            f"the frames of `{path.value}` are unknown: the file was not read",
+            header.span,
+            "not read",
+            note=note,
+        )
         return
     try:
         brought = read_import(path.value)

@@ -29,10 +29,10 @@ _CLAUSE_NAMES: dict[type, str] = {
     tree.Blend: "rounded corners asked for here",
 }
 _NOT_ASKED: dict[type, str] = {
-    tree.Straightly: "asks for the shortest way of the joints",
-    tree.Via: "asks for no via points",
-    tree.Approach: "asks for no approach point",
-    tree.Departure: "asks for no departure point",
+    tree.Straightly: "requests one motion of the joints to the goal",
+    tree.Via: "allows no via points",
+    tree.Approach: "allows no approach point",
+    tree.Departure: "allows no departure point",
     tree.Blend: "has no corners",
 }
 SPEED_NOTE = "100 is the normal speed and 120 the largest the arm allows"
@@ -72,7 +72,7 @@ def _pose(names: Names, node: tree.Expression, code: str, what: str, move: tree.
             return ""
         moved = "ARM_1" if isinstance(move.moved, tree.Poison) else written(move.moved)
         step = written(node)
-        return f"to move by `{step}` from the present place write `MOVE {moved} TO {moved} * {step}`"
+        return f"to move by `{step}` from the present pose write `MOVE {moved} TO {moved} * {step}`"
 
     need(names, node, ExpressionType.FRAME, code, what, advice=advice)
 
@@ -128,7 +128,7 @@ def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
                 f"STRAIGHTLY cannot be combined with {_WORDS[kind]}",
                 clause.span,
                 _CLAUSE_NAMES[kind],
-                secondary=(Label(straight.span, "asks for one straight line"),),
+                secondary=(Label(straight.span, "requests one straight line"),),
                 advice="write one `MOVE ... STRAIGHTLY` for each leg",
             )
     if blend and not direct and tree.Via not in first:
@@ -147,7 +147,7 @@ def _times(names: Names, first: dict[type, tree.Clause]) -> None:
             later.span,
             f"{words[0]} given here",
             secondary=(Label(earlier.span, f"{words[1]} given here"),),
-            note="each of them settles how long the motion takes",
+            note="each of them determines the duration of the motion",
             advice="remove one of the two",
         )
 

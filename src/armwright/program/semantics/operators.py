@@ -54,7 +54,7 @@ def negative(names: Names, node: tree.Unary, sort: ExpressionType | None) -> Exp
             node,
             f"`-` takes a number, but this is {is_what(node.operand, sort)}",
             bare(is_what(node.operand, sort)),
-            f"for the way back write `INV({written(node.operand)})`" if turned else "",
+            f"for the inverse transformation write `INV({written(node.operand)})`" if turned else "",
         )
     return None if sort is not ExpressionType.SCALAR else ExpressionType.SCALAR
 
@@ -80,14 +80,14 @@ def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> s
     """Return what was probably meant, empty where nobody knows."""
     left_text, other = written(node.left), written(node.right)
     if ExpressionType.CONDITION in (left, right):
-        return "a condition is no number; conditions are joined by AND and OR"
+        return "a condition is not a number; combine conditions with AND and OR"
     if node.operation in _COMPARISONS:
-        return f"for how far apart they are write `DIST({left_text}, {other})`" if {left, right} <= _POSES else ""
+        return f"for their distance write `DIST({left_text}, {other})`" if {left, right} <= _POSES else ""
     if node.operation in ("*", "/"):
         return _advice_on_product(node, left, right)
     if left in _POSES | _STEPS and right in _STEPS:
         back = other if node.operation == "+" else f"INV({other})"
-        return f"steps follow one another by `*`: write `{left_text} * {back}`"
+        return f"transformations are composed by `*`: write `{left_text} * {back}`"
     if {left, right} <= _POSES and node.operation == "-":
         return f"for the transformation from {other} to {left_text} write `INV({other}) * {left_text}`"
     return ""
@@ -97,7 +97,7 @@ def _advice_on_product(node: tree.Binary, left: ExpressionType, right: Expressio
     left_text, other = written(node.left), written(node.right)
     if node.operation == "/":
         return (
-            f"for the way back write `{left_text} * INV({other})`"
+            f"for the inverse transformation write `{left_text} * INV({other})`"
             if right in _STEPS and left is not ExpressionType.SCALAR
             else ""
         )
@@ -105,7 +105,7 @@ def _advice_on_product(node: tree.Binary, left: ExpressionType, right: Expressio
         case ExpressionType.FRAME, ExpressionType.FRAME:
             return f"for the transformation from {left_text} to {other} write `INV({left_text}) * {other}`"
         case ((ExpressionType.TRANS | ExpressionType.MATRIX), ExpressionType.FRAME):
-            return f"a transformation stands behind the pose it starts from: write `{other} * {left_text}`"
+            return f"write the transformation after the pose to which it applies: `{other} * {left_text}`"
         case (ExpressionType.INVERSE, _) | (_, ExpressionType.INVERSE):
             return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
         case (ExpressionType.SCALAR, _) | (_, ExpressionType.SCALAR):

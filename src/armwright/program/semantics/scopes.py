@@ -231,5 +231,5 @@ class Names:
         elif near := self.near(name.text, self._of_the_cell):
             advice = f"did you mean `{near}`, a frame of the cell? Declare it with `VAR {near} : FRAME ;`"
         elif (owner := self._owner(name.key)) is not None:
-            note = f"procedure `{owner.node.name.text}` has a name like this, which is known only there"
+            note = f"procedure `{owner.node.name.text}` declares this name, which is visible only there"
         self.report("E202", f"`{name.text}` is not declared", name.span, "unknown name", note=note, advice=advice)

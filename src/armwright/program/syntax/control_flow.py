@@ -144,7 +144,9 @@ def _else(tokens: Tokens) -> bool:
         return True
     token, after = tokens.now, tokens.ahead()
     if token.key == ";" and after.key == "ELSE":
-        tokens.say_once("E124", "no `;` stands before ELSE", token.span, "leave it out", fixes=(Fix(token.span, ""),))
+        tokens.say_once(
+            "E124", "no `;` is allowed before ELSE", token.span, "leave it out", fixes=(Fix(token.span, ""),)
+        )
         tokens.take()
         tokens.take()
         return True
@@ -294,7 +296,7 @@ def _bare(tokens: Tokens) -> tree.Block:
     """Read a statement that stands for a branch of COBEGIN."""
     token = tokens.now
     if token.key == ";":
-        tokens.lost("a `;` stands only between two branches", "expected `BEGIN`", code="E126")
+        tokens.lost("a `;` is allowed only between two branches", "expected `BEGIN`", code="E126")
     advice = "write `BEGIN ... END` around the statements of each branch"
     tokens.say_once("E126", "a branch of COBEGIN is a block", token.span, "expected `BEGIN` before this", advice=advice)
     body = statements(tokens, "END")

@@ -85,7 +85,7 @@ def _foreign(tokens: Tokens) -> bool:
     token = tokens.now
     meant = FOREIGN[token.key]
     blank = " " if meant.isalpha() else ""
-    text = f"`{token.text}` is not a sign of RLO"
+    text = f"`{token.text}` is not a symbol of RLO"
     tokens.say_once("E123", text, token.span, f"write `{meant}`", fixes=(Fix(token.span, f"{blank}{meant}{blank}"),))
     tokens.replace(meant)
     return True
@@ -112,7 +112,7 @@ def _unary(tokens: Tokens, wants: str, where: str, lowest: int) -> tree.Expressi
         return _no_value(tokens, wants, where)
     misplaced = token.key == "NOT" and lowest > _NOT
     if misplaced:
-        text = f"NOT needs parentheses behind `{tokens.before.text}`"
+        text = f"NOT needs parentheses after `{tokens.before.text}`"
         tokens.say_once("E122", text, token.span, "put `( )` around NOT and what follows")
     if token.key == "+":
         tokens.say_once("E113", "a value has no `+` in front", token.span, "leave it out", fixes=(Fix(token.span, ""),))
@@ -219,7 +219,7 @@ def variable(tokens: Tokens, wants: str, where: str) -> tree.Variable:
         LostError: there is none.
     """
     if tokens.now.kind is _ARM:
-        tokens.say_once("E111", f"expected {wants} {where}".rstrip(), tokens.now.span, "an arm is none")
+        tokens.say_once("E111", f"expected {wants} {where}".rstrip(), tokens.now.span, "this is an arm")
         return tree.Poison(tokens.take().span)
     return _lvalue(tokens, wants, where)
 
@@ -268,7 +268,7 @@ def listed(
     if tokens.now.key == closing:
         if not empty:
             text = f"expected {wants} between `{opening}{closing}`"
-            tokens.say_once("E111", text, tokens.now.span, "nothing stands in between")
+            tokens.say_once("E111", text, tokens.now.span, "there is nothing in between")
         tokens.take()
         return ()
     tokens.enter()
@@ -276,7 +276,7 @@ def listed(
     height = 0
     while True:
         if tokens.now.key == "," and items:
-            tokens.say_once("E117", "two `,` follow each other", tokens.now.span, "one is enough")
+            tokens.say_once("E117", "two `,` follow each other", tokens.now.span, "one of them is superfluous")
             tokens.take()
         items.append(item(tokens, wants, ""))
         height = max(height, tokens.height)

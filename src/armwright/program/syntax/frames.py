@@ -70,6 +70,6 @@ def unfix(tokens: Tokens) -> tree.Unfix:
     over = tokens.done or tokens.now.key in (";", *tokens.words.closing)
     if over or (tokens.now.key != "FROM" and (tokens.now.kind is TokenKind.KEYWORD or not tokens.same_line())):
         return tree.Unfix(tokens.since(start), child, None)
-    tokens.expect("FROM", "after the frame to cut")
+    tokens.expect("FROM", "after the frame to detach")
     parent = mobile(tokens, "the name of a FRAME or an arm", "after FROM")
     return tree.Unfix(tokens.since(start), child, parent)

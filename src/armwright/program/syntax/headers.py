@@ -13,9 +13,7 @@ from armwright.program.syntax.token_stream import LostError, Tokens, shown
 
 # What other languages call a procedure.
 _PROCEDURES = ("FUNCTION", "PROC", "SUB", "SUBROUTINE", "DEF")
-_BY_REFERENCE = (
-    "a procedure changes what it is given as a FRAME, an EVENT or an array, and all variables of the program"
-)
+_BY_REFERENCE = "a procedure returns results in its FRAME, EVENT and ARRAY parameters, or in variables of the program"
 
 
 def head(tokens: Tokens) -> list[tree.Header]:
@@ -80,7 +78,9 @@ def _misspelt_header(tokens: Tokens) -> str | None:
 
 def _misspelt(tokens: Tokens, near: str) -> None:
     token = tokens.now
-    tokens.report("E105", f"unknown word `{token.text}`", token.span, "not a word of RLO", advice=did_you_mean(near))
+    tokens.report(
+        "E105", f"unknown keyword `{token.text}`", token.span, "not a keyword of RLO", advice=did_you_mean(near)
+    )
     tokens.replace(near)
 
 
@@ -164,7 +164,7 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
     while tokens.sees("VAR"):
         again = tokens.now
         fix = Fix(again.span, "")
-        tokens.report("E118", "a procedure has one VAR part", again.span, "leave the word out", fixes=(fix,))
+        tokens.report("E118", "a procedure has one VAR part", again.span, "remove this word", fixes=(fix,))
         own += var_part(tokens)
     tokens.offer("BEGIN", starts=True)
     body = _body(tokens, above, name)
@@ -204,7 +204,7 @@ def _parameters(tokens: Tokens) -> list[tree.Declaration]:
     if tokens.sees(")"):
         fix = Fix(opening.span.to(tokens.now.span), "")
         text = "a procedure without parameters is declared without `( )`"
-        tokens.say_once("E111", text, tokens.now.span, "nothing stands in between", fixes=(fix,))
+        tokens.say_once("E111", text, tokens.now.span, "there is nothing in between", fixes=(fix,))
         tokens.take()
         return headers_
     while True:
@@ -237,7 +237,7 @@ def _no_result(tokens: Tokens) -> None:
     start = tokens.take()
     while not tokens.done and not tokens.sees(";", "VAR", "BEGIN"):
         tokens.take()
-    tokens.say_once("E117", "a procedure gives nothing back", tokens.since(start), "leave this out", note=_BY_REFERENCE)
+    tokens.say_once("E117", "a procedure returns no value", tokens.since(start), "leave this out", note=_BY_REFERENCE)
 
 
 def _another(tokens: Tokens) -> bool:
@@ -301,7 +301,7 @@ def late(tokens: Tokens) -> tree.Statement:
     """Read a part that belongs in front of BEGIN, and keep what it declares."""
     word: Token = tokens.now
     what = "declarations belong" if word.key == "VAR" else "it belongs"
-    tokens.report("E118", f"{word.text} stands behind BEGIN", word.span, f"{what} in front of BEGIN")
+    tokens.report("E118", f"{word.text} after BEGIN", word.span, f"{what} before BEGIN")
     tokens.late += header(tokens)
     # It has its own ``;``.
     tokens.hush()

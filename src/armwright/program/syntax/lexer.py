@@ -257,7 +257,7 @@ class _Scanner:
         advice, fixes, span = "", list[Fix](), Span(start, end)
         if _is_number(word) and "." in (word[0], word[-1]):
             cured = f"0{word}" if word[0] == "." else f"{word}0"
-            why, advice, fixes = "a digit is missing beside the point", f"write `{cured}`", [Fix(span, cured)]
+            why, advice, fixes = "a digit is missing next to the decimal point", f"write `{cured}`", [Fix(span, cured)]
         self._report("E113", f"`{word}` is not a number of RLO", span, why, advice=advice, fixes=tuple(fixes))
         return Token(TokenKind.NUMBER, word, "0", start, end, damaged=True)
 
@@ -327,7 +327,7 @@ class _Scanner:
             f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs"),
             spans[0],
             f"looks like {name}" if meant else _HINTS.get(character, "has no meaning here"),
-            note=f"it stands in {count} places" if count > 1 else "",
+            note=f"it occurs in {count} places" if count > 1 else "",
             advice=f"write {name}" if meant else "",
             fixes=tuple(Fix(span, meant) for span in spans) if meant else (),
         )

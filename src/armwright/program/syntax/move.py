@@ -93,7 +93,7 @@ def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
     if key in tokens.words.with_clauses:
         gap = Span(token.start, token.start)
         if not token.damaged:
-            text = f"{key} needs WITH in front"
+            text = f"{key} needs WITH before it"
             advice = f"write `WITH {key} = ...`"
             tokens.report(
                 "E116", text, token.span, "expected WITH before this", advice=advice, fixes=(Fix(gap, "WITH "),)
@@ -134,7 +134,7 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
     if tokens.sees(*plain):
         tokens.report(
             "E116",
-            f"{token.key} stands without WITH",
+            f"{token.key} is written without WITH",
             start.span,
             "WITH does not belong here",
             advice=f"write `{token.key}` alone",

@@ -42,7 +42,7 @@ def check(matrix: tree.Matrix, units: UnitSystem | None = None) -> Diagnostic | 
     if diagnostic is None or diagnostic.code != "E206":
         return diagnostic
     lengths = _LENGTHS[units.length if units else "M"]
-    note = f"the numbers are the columns n, o, a, p one after the other: n, o, a turn, p shifts, in {lengths}"
+    note = f"the numbers are the columns n, o, a, p in this order: n, o, a are the axes, p is the position in {lengths}"
     return attrs.evolve(diagnostic, notes=(note, *diagnostic.notes))
 
 
@@ -101,7 +101,7 @@ def _wrong_count(matrix: tree.Matrix, values: list[float]) -> Diagnostic:
     count = len(matrix.items)
     if len(values) == count == 16:
         wholes = {
-            (values[3], values[7], values[11], values[15]): (_COLUMNS_OF_16, "this matrix has its bottom row"),
+            (values[3], values[7], values[11], values[15]): (_COLUMNS_OF_16, "this matrix includes its bottom row"),
             (values[12], values[13], values[14], values[15]): (_ROW_WISE_16, "this matrix is written row by row"),
         }
         for row, (order, message) in wholes.items():
@@ -120,8 +120,8 @@ def _rearranged(matrix: tree.Matrix, order: Sequence[int], message: str) -> Diag
         code="E206",
         message=message,
         span=matrix.span,
-        label="n, o, a are no rotation this way" if is_full else "16 numbers here",
-        notes=() if is_full else ("the bottom row 0 0 0 1 is left out",),
+        label="n, o, a are not a rotation" if is_full else "16 numbers here",
+        notes=() if is_full else ("omit the bottom row 0 0 0 1",),
         helps=(f"write `{literal}`",),
         fixes=(Fix(matrix.span, literal),),
     )

@@ -186,7 +186,7 @@ class _Visitor:
 
     def _grasp(self, node: tree.Grasp) -> tree.Grasp:
         if node.arm is not None:
-            self._report("GRASP with an arm", node.arm.span, "RLO-83 closes the hand of the arm named last")
+            self._report("GRASP with an arm", node.arm.span, "RLO-83 closes the gripper of the arm named last")
         return node
 
     def _operate(self, node: tree.Operate) -> tree.Operate:
@@ -230,7 +230,7 @@ class _Visitor:
         return attrs.evolve(node, value=math.nan, unit=None)
 
     def _affix(self, node: tree.Affix) -> tree.Affix:
-        instead = "in RLO-83 a frame follows its parent, never the other way"
+        instead = "in RLO-83 a frame follows its parent, never the reverse"
         self._tail(node.span, "AFFIX ...", instead, "RIGIDLY", "NONRIGIDLY")
         child, parent = self._operand(node.child, _FRAME), self._operand(node.parent, _MOVED)
         step = None if node.at is None else self._operand(node.at, "the name of a TRANS")
@@ -240,14 +240,14 @@ class _Visitor:
         child = self._operand(node.child, _FRAME)
         if node.parent is None:
             gap = Span(node.span.end, node.span.end)
-            self._report("UNFIX without FROM", gap, "RLO-83 names the frame it hangs on: `FROM ...`")
+            self._report("UNFIX without FROM", gap, "RLO-83 names the parent: `FROM ...`")
             return attrs.evolve(node, child=child)
         return attrs.evolve(node, child=child, parent=self._operand(node.parent, _MOVED))
 
     def _open(self, node: tree.Open) -> tree.Open:
         if node.width is not None:
             word = self._tokens[bisect_left(self._starts, node.arm.span.end)]
-            self._report("OPEN ... TO", word.span, "RLO-83 opens the fingers wholly")
+            self._report("OPEN ... TO", word.span, "RLO-83 opens the fingers completely")
         return attrs.evolve(node, arm=self._operand(node.arm, _ARM), width=None)
 
     def _read_visions(self, node: tree.ReadVisions) -> tree.ReadVisions:

@@ -185,16 +185,18 @@ def _no_statement(tokens: Tokens) -> tree.Statement:
         text, label = f"{shown(token)} does not start a statement", "expected a statement"
     if token.key in tokens.procedures:
         tokens.take()
-        tokens.insert("()", "behind the name of a procedure")
+        tokens.insert("()", "after the name of a procedure")
         return tree.Call(token.span, tree.Name(token.span, token.text, token.key), ())
     if _is_known(tokens, token):
         _value_missing(tokens)
     if token.key in ELSEWHERE:
         advice = did_you_mean(ELSEWHERE[token.key])
     else:
-        general = "statements begin with a word such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
+        general = (
+            "statements begin with a keyword such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
+        )
         advice = ABSENT.get(token.key, general)
-    note = "line numbers count only in a text whose first line has one" if token.kind is _NUMBER else ""
+    note = "line numbers are allowed only if the first line has one" if token.kind is _NUMBER else ""
     tokens.report("E105", text, token.span, label, note=note, advice=advice)
     raise LostError
 

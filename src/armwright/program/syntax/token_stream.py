@@ -244,8 +244,8 @@ class Tokens:
         statement = self.statement_depth > MAX_DEPTH // 2
         what = "statements" if statement else "parentheses and operations"
         if self.deep < 0:
-            text = f"{what} lie too deep in one another here"
-            advice = "give a part of it to a procedure" if statement else "split the expression"
+            text = f"{what} are nested too deeply here"
+            advice = "move a part of it to a procedure" if statement else "split the expression"
             self.say_once("E119", text, self.now.span, f"more than {MAX_DEPTH} deep", advice=advice)
         self.deep = self.at
         raise TooDeepError if statement else LostError
@@ -348,12 +348,12 @@ class Tokens:
         advice = did_you_mean(closest(token.text, self.declared, limit=0))
         if not advice and is_later(token.key):
             if self.standard is Standard.RLO_83:
-                text = f"`{token.text}` as a word belongs to RLO-2"
-                self.report("E214", text, token.span, "in RLO-83 it may be a name, and is declared nowhere")
+                text = f"the keyword `{token.text}` belongs to RLO-2"
+                self.report("E214", text, token.span, "in RLO-83 it may be a name, but it is not declared")
                 return
-            advice = f"take another name; a program of RLO-83 that uses `{token.text}` is translated with `--std=83`"
+            advice = f"choose another name; check a program of RLO-83 that uses `{token.text}` with `--std=83`"
         text = f"`{token.text}` is a reserved word and cannot be a name"
-        self.report("E107", text, token.span, "a word of the language", advice=advice)
+        self.report("E107", text, token.span, "a reserved word", advice=advice)
 
 
 Rule: TypeAlias = Callable[[Tokens], tree.Statement]

@@ -153,14 +153,14 @@ def too_deep(machine: Machine, process: Process, motion: Motion) -> NoReturn:
     motion.alarm = None
     allowed = machine.cell.contact.deepest
     least = _least_depth(machine, motion)
-    notes = [f"the arm is stopped within its limits, and has pressed {_deep(motion.pressed)} then"]
-    helps = ["stop sooner: at a smaller force, or at a lower speed"]
+    notes = [f"the arm brakes within its limits; at rest it is pressed {_deep(motion.pressed)}"]
+    helps = ["end the MOVE at a smaller force, or use a lower speed"]
     if least is not None and least > allowed:
-        text = "at this speed that cannot be avoided: stopped from the first contact on, it presses"
-        notes.append(f"{text} {least * 1e3:.3g} mm deep")
+        text = "at this speed that is unavoidable: even if it brakes from the first contact on, the depth is"
+        notes.append(f"{text} {least * 1e3:.3g} mm")
         helps = _slower(motion, allowed / least)
     elif least is not None:
-        notes.append(f"stopped from the first contact on, it would press {least * 1e3:.3g} mm deep")
+        notes.append(f"if it brakes from the first contact on, the depth is {least * 1e3:.3g} mm")
     raise machine.error(
         process,
         "E404",
@@ -177,7 +177,7 @@ def _slower(motion: Motion, share: float) -> list[str]:
     speed = math.floor(motion.speed * math.sqrt(_IN_HAND * share))
     if speed < _SLOWEST:
         return ["end this MOVE above the plane"]
-    return [f"come down more slowly: `WITH SPEED = {speed}`"]
+    return [f"use a lower speed: `WITH SPEED = {speed}`"]
 
 
 def _least_depth(machine: Machine, motion: Motion) -> float | None:
@@ -202,10 +202,10 @@ def comes_down(machine: Machine, process: Process, motion: Motion, to: str) -> N
     raise machine.error(
         process,
         "E404",
-        f"`{machine.spelled(motion.moved)}` comes down on the plane{_height(machine)} on its way to `{to}`",
+        f"`{machine.spelled(motion.moved)}` would enter the plane{_height(machine)} on its path to `{to}`",
         motion.span,
-        "this MOVE is stopped there, and no ON of this MOVE looks out for it",
-        helps=["look out for the contact: `ON FORCE(Z) > 10 DO HALT`"],
+        "this MOVE has no ON that ends it at the contact",
+        helps=["guard the motion: `ON FORCE(Z) > 10 DO HALT`"],
     )
 
 

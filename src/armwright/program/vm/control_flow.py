@@ -53,7 +53,7 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
     name = str(step.operands[0])
     procedure = machine.code.procedures[name]
     if len(process.stack) > machine.limits.depth:
-        text = f"procedures call one another more than {machine.limits.depth} deep"
+        text = f"procedure calls are nested more than {machine.limits.depth} deep"
         raise machine.error(process, "E505", text, step.span, f"`{machine.spelled(name)}` is called once more")
     machine.state.activations += 1
     bindings, own = {}, []
@@ -131,7 +131,7 @@ def _room(machine: Machine, process: Process, step: Instruction) -> None:
     deep = len(process.path) >= most // 10
     if not deep and len(machine.state.processes) + len(process.branches) < most:
         return
-    text = f"COBEGINs begin one another more than {most // 10} deep" if deep else f"more than {most} processes run"
+    text = f"COBEGINs are nested more than {most // 10} deep" if deep else f"more than {most} processes run"
     raise machine.error(process, "E505", text, step.span, "one more would begin here")
 
 

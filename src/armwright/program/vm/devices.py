@@ -15,7 +15,7 @@ def _gripper(machine: Machine, process: Process, step: Instruction) -> None:
     arm = machine.name(process, step.operands[0]) if step.operands else process.last_arm
     if arm is None:
         known = min(machine.cell.arms, default="ARM_1")
-        text = "GRASP does not say which arm, and none has been used yet"
+        text = "GRASP names no arm, and no arm has been used before"
         raise machine.error(process, "E307", text, step.span, "which arm?", helps=[f"write `GRASP {known}`"])
     machine.claim(process, arm, step.span)
     width = machine.number(process, step.operands[1], step) if len(step.operands) > 1 else None

@@ -41,7 +41,7 @@ def _element(machine: Machine, process: Process, step: Instruction) -> None:
         index = round(value)
         if abs(value - index) > _WHOLE or not 1 <= index <= size:
             which = f"index {number}" if len(sizes) > 1 else "the index"
-            text = f"{which} of `{machine.spelled(array)}` is {value:g}, not a whole number from 1 to {size}"
+            text = f"{which} of `{machine.spelled(array)}` is {value:g}, not an integer from 1 to {size}"
             raise machine.error(process, "E222", text, step.span, "no such element")
         indices.append(index)
     to = step.operands[0]

@@ -126,7 +126,7 @@ def _advance(machine: Machine, process: Process) -> None:
             machine.state.ticks = max(0, math.floor(last))
             under_way = process.pending or process.motion or machine.code.instructions[process.at]
             text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
-            raise machine.error(process, "E506", text, under_way.span, "it has come to here")
+            raise machine.error(process, "E506", text, under_way.span, "it has reached this statement")
     if process.motion is not None and process.motion.alarm is not None and process.motion.alarm <= machine.state.ticks:
         too_deep(machine, process, process.motion)
     if (pending := process.pending) is not None:
@@ -142,9 +142,9 @@ def _advance(machine: Machine, process: Process) -> None:
     step = machine.code.instructions[process.at]
     machine.state.idle += 1
     if machine.state.idle > machine.limits.steps:
-        text = f"the program has done {machine.limits.steps} steps and no time has gone by"
+        text = f"the program has executed {machine.limits.steps} steps, and no time has passed"
         help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"
-        raise machine.error(process, "E504", text, step.span, "it is still running here", helps=[help_])
+        raise machine.error(process, "E504", text, step.span, "it is running this statement", helps=[help_])
     process.at += 1
     HANDLERS[step.op](machine, process, step)
 
@@ -202,5 +202,5 @@ def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:
         f"{(needed / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
         span=stage.span,
         label=f"at {stage.t0 + stage.peak_time[joint]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
-        helps=(f"a lower speed than {stage.speed:g} asks for less where it is motion and not weight that costs",),
+        helps=(f"a speed below {stage.speed:g} reduces the effort of acceleration, but not that of gravity",),
     )

@@ -221,8 +221,10 @@ class Machine:
             text = f"`{self.spelled(name)}` cannot be given a value"
             raise self.error(process, "E218", text, span, "an arm" if is_arm(name) else "the root of all frames")
         if leader != name and (is_arm(leader) or leader == WORLD):
-            text = f"`{self.spelled(name)}` hangs rigidly on {self.spelled(leader)}, which no value moves"
-            raise self.error(process, "E310", text, span, "cannot be placed")
+            text = (
+                f"`{self.spelled(name)}` is rigidly attached to {self.spelled(leader)}, which an assignment cannot move"
+            )
+            raise self.error(process, "E310", text, span, "cannot be assigned a pose")
         self.grow(self.state.tree.place(name, X), name, span)
 
     def set_hand(self, arm: str, span: Span, *, at: int | None = None) -> None:

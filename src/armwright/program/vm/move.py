@@ -152,8 +152,8 @@ def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction)
         "E301",
         f"`{spelled}` cannot be moved: it is not affixed to an arm",
         begin.span,
-        f"hangs on {machine.spelled(machine.state.tree.ancestors(moved)[0])}, not on an arm",
-        secondary=machine.origin(moved, f"{spelled} got its place here"),
+        f"is attached to {machine.spelled(machine.state.tree.ancestors(moved)[0])}, not to an arm",
+        secondary=machine.origin(moved, f"{spelled} got its pose here"),
         helps=[f"grasp it and write `AFFIX {spelled} TO {likely}`"],
     )
 
@@ -168,8 +168,8 @@ def _one_at_a_time(machine: Machine, process: Process, arm: str, span: Span) -> 
     if other is None or other.motion is None:
         return
     text = f"{arm} cannot begin a MOVE in {process.title} before that of {other.title} is over"
-    on_its_way = Label(other.motion.span, f"{arm} is on this way")
-    raise machine.error(process, "E503", text, span, "begins in the middle of the other", secondary=[on_its_way])
+    on_its_way = Label(other.motion.span, f"{arm} executes this MOVE")
+    raise machine.error(process, "E503", text, span, "begins before the other has ended", secondary=[on_its_way])
 
 
 def _plan(
@@ -217,7 +217,7 @@ def _timed(
     """Return the stages slowed so that the whole MOVE takes as long as was asked for."""
     least = sum(stage.trajectory.duration for stage in stages)
     if asked_for < least - machine.cell.period:
-        text = f"this MOVE cannot be done in {asked_for:g} s"
+        text = f"this MOVE is infeasible in {asked_for:g} s"
         raise machine.error(process, "E405", text, request.span, f"it takes {least:.3f} s or more")
     if not least:
         # Nothing is to be moved: the arm stands still for so long.
@@ -245,7 +245,7 @@ def _fail_move(
     goal, kind = request.goals[label], stage.kind.value
     secondary = []
     if machine.names_variable(process, goal.operand):
-        secondary = machine.origin(machine.name(process, goal.operand), f"`{label}` got its place here")
+        secondary = machine.origin(machine.name(process, goal.operand), f"`{label}` got its pose here")
     raise machine.error(
         process,
         CODES[obstacle.cause],

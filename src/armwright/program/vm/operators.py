@@ -41,7 +41,7 @@ def _divide(a: float, b: float) -> float:
 
 def _number(value: float) -> float:
     if not abs(value) <= LARGEST:
-        raise ValueFault("E240", "the result is larger than any number of a robot", "too large")
+        raise ValueFault("E240", f"the result exceeds {LARGEST:g}, the largest number", "too large")
     return value
 
 
