@@ -10,9 +10,9 @@ M1 = (CORPUS / "m1.rlo").read_text(encoding="utf-8")
 LEVELS = {"error", "warning", "note", "none"}
 
 
-def log(text: str, path: str | None = None) -> dict:
+def log(text: str, path: str = "m.rlo") -> dict:
     source = Source("m.rlo", text)
-    return json.loads(json.dumps(to_sarif(translate(source, BARE).diagnostics, source, path)))
+    return json.loads(json.dumps(to_sarif([(translate(source, BARE).diagnostics, source, path)])))
 
 
 def test_whole() -> None:

@@ -71,10 +71,10 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
         results = [_as_data(compilation, emit) for compilation in compilations]
         print_json(results[0] if len(results) == 1 else _joined_data(results, paths))
     elif output_format is Format.SARIF:
-        from armwright.program.diagnostics.sarif import sarif_of
+        from armwright.program.diagnostics.sarif import to_sarif
 
         pairs = zip(compilations, paths, strict=True)
-        print_json(sarif_of([(result.diagnostics, result.source, path.as_posix()) for result, path in pairs]))
+        print_json(to_sarif([(result.diagnostics, result.source, path.as_posix()) for result, path in pairs]))
     else:
         for compilation in compilations:
             _print(compilation, emit)

@@ -1,6 +1,7 @@
 """``armwright fix``: correct mistakes in programs that have a single certain correction."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,9 +15,7 @@ from armwright.errors import ArmwrightError, ExitStatus, counted
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.cell.model import Cell
-    from armwright.program import Compilation, Source
-    from armwright.program.diagnostics.fixes import Fixed, Translate
+    from armwright.program.diagnostics.fixes import Fixed
 
 
 def fix(
@@ -43,6 +42,8 @@ def fix(
     from armwright.cli.programs import read_cell_option
     from armwright.cli.source_files import is_stream, print_difference, read_source, write_back
     from armwright.cli.terminal import print_verbatim
+    from armwright.program import compile as compile_program
+    from armwright.program.api import import_reader
     from armwright.program.diagnostics.fixes import fixed
 
     option_cell = read_cell_option(cell)
@@ -51,7 +52,8 @@ def fix(
         printed = is_stream(path)
         try:
             source = read_source(path)
-            result = fixed(source, _compiler(path.parent, option_cell, std))
+            read = import_reader(path.parent)
+            result = fixed(source, partial(compile_program, cell=option_cell, std=std, read_import=read))
             if result.cures and not (diff or printed):
                 write_back(source, path, result.text)
         except ArmwrightError as error:
@@ -71,24 +73,6 @@ def fix(
         print_json(rows)
     if any(row["exit_status"] for row in rows):
         raise typer.Exit(max(row["exit_status"] for row in rows))
-
-
-def _compiler(folder: Path, cell: "Cell | None", std: Standard) -> "Translate":
-    """Return a function that compiles a program for a cell, or for the cell that the program IMPORTs."""
-    from armwright.program import compile as compile_program, known_cell
-    from armwright.program.api import import_reader
-
-    def compile_source(source: "Source") -> "Compilation":
-        read = import_reader(folder)
-        known = known_cell(cell) if cell else None
-        compilation = compile_program(source, known, std=std, read_import=read)
-        imports = compilation.imports
-        own = next((imported.cell for imported in imports if imported.cell and imported.cell.arms), None)
-        if known is None and own is not None:
-            return compile_program(source, known_cell(own), std=std, read_import=read)
-        return compilation
-
-    return compile_source
 
 
 def _print(result: "Fixed", *, done: str, to_errors: bool) -> None:

@@ -117,12 +117,8 @@ def compile(  # noqa: A001 - what a translator does
         path = Path(program)
         source, read_import = Source(path.name, read_program(path)), read_import or import_reader(path.parent)
     model = read_cell(Path(cell)) if isinstance(cell, str | Path) else cell
-    known = known_cell(model) if isinstance(model, Cell) else model
     with no_collection():
-        compiled = _compile(source, known, strict=strict, std=std, read_import=read_import, generate_code=generate_code)
-    if model is None:
-        model = next((imported.cell for imported in compiled.imports if imported.cell and imported.cell.arms), None)
-    return attrs.evolve(compiled, cell=with_imports(model, compiled.imports) if isinstance(model, Cell) else None)
+        return _compile(source, model, strict=strict, std=std, read_import=read_import, generate_code=generate_code)
 
 
 def run(
@@ -221,7 +217,7 @@ def _bounded(read_import: ReadImport) -> ReadImport:
     return read
 
 
-def _imported(program: tree.Program, read_import: ReadImport) -> KnownCell | None:
+def _imported_cell(program: tree.Program, read_import: ReadImport) -> Cell | None:
     """Return the first cell with arms that a program imports; None without one."""
     for header in program.headers:
         if isinstance(header, tree.Import):
@@ -229,13 +225,13 @@ def _imported(program: tree.Program, read_import: ReadImport) -> KnownCell | Non
             with suppress(ArmwrightError):
                 cell = read_import(header.path.value).cell
                 if cell is not None and cell.arms:
-                    return known_cell(cell)
+                    return cell
     return None
 
 
 def _compile(
     source: Source,
-    cell: KnownCell | None,
+    cell: Cell | KnownCell | None,
     *,
     strict: bool,
     std: Standard,
@@ -247,8 +243,9 @@ def _compile(
     program, syntax_errors = parse(source, scanned.tokens, std)
     if read_import is not None:
         read_import = cache(_bounded(read_import))
-        cell = _imported(program, read_import) if cell is None else cell
-    symbols, name_errors, imports = check.check(program, cell, std=std, read_import=read_import)
+        cell = _imported_cell(program, read_import) if cell is None else cell
+    known = known_cell(cell) if isinstance(cell, Cell) else cell
+    symbols, name_errors, imports = check.check(program, known, std=std, read_import=read_import)
     spelling = {token.key: token.text for token in reversed(scanned.tokens) if token.kind is TokenKind.NAME}
     diagnostics += [*scanned.diagnostics, *syntax_errors]
     guessed = any(diagnostic.is_syntax for diagnostic in diagnostics)
@@ -256,7 +253,7 @@ def _compile(
     diagnostics += [error for error in name_errors if not (guessed and error.code == "L304")]
     code = flow = None
     if not guessed:
-        flow, flow_errors = analysis.check(program, symbols, spelling, cell, strict=strict, source=source)
+        flow, flow_errors = analysis.check(program, symbols, spelling, known, strict=strict, source=source)
         diagnostics += flow_errors
         if generate_code and not any(diagnostic.is_error for diagnostic in diagnostics):
             code = attrs.evolve(generate(source, program, symbols, flow, spelling), standard=std)
@@ -271,4 +268,5 @@ def _compile(
         flow=flow,
         diagnostics=in_order(diagnostics),
         code=code,
+        cell=with_imports(cell, imports) if isinstance(cell, Cell) else None,
     )

@@ -16,11 +16,12 @@ import attrs
 from armwright.cell.model import Around, Cell, CellArm
 from armwright.cell.reader import read_cell
 from armwright.errors import FileFormatError
-from armwright.program.api import compile as translate
+from armwright.program.api import compile as translate, run
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
-from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadImport, known_cell
+from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadImport
+from armwright.program.vm.interpreter import Limits, RunError, warnings
 
 _CELLS = Path(__file__).parent / "pages" / "cells"
 _RUN = re.compile(r"^// run in (\w+)$", re.MULTILINE)
@@ -43,21 +44,16 @@ def answer(source: Source) -> tuple[Diagnostic, ...]:
     cell = _cell(source.text)
     compiled = translate(
         source,
-        _known(source.text) if cell is None else known_cell(cell),
+        cell or _known(source.text),
         strict=bool(_STRICT.search(source.text)),
         std=Standard.RLO_83 if _OLD.search(source.text) else Standard.RLO_2,
         read_import=_imports(source.text),
     )
     if cell is None or compiled.code is None:
         return compiled.diagnostics
-    from armwright.cell.simulator import Simulator  # noqa: PLC0415 - only who runs waits for it
-    from armwright.program.vm.interpreter import Limits, RunError, interpret, warnings  # noqa: PLC0415
-
-    limits = Limits()
-    for what, count in _LIMIT.findall(source.text):
-        limits = attrs.evolve(limits, **{what: int(count)})
+    limits = Limits(**{quantity: int(count) for quantity, count in _LIMIT.findall(source.text)})
     try:
-        recording = interpret(compiled.code, cell, Simulator(cell), limits=limits)
+        recording = run(compiled, limits=limits)
     except RunError as error:
         return (*compiled.diagnostics, error.diagnostic)
     return (*compiled.diagnostics, *warnings(recording.stages, recording.cell))

@@ -191,5 +191,5 @@ def _description(fix: Fix, source: Source) -> str:
     old, new = (" ".join(text.split()) for text in (source.slice(fix.span), fix.replacement))
     old, new = (text if len(text) <= _MAX_SHOWN_LENGTH else f"{text[:_MAX_SHOWN_LENGTH]}..." for text in (old, new))
     if not new:
-        return f"left out `{old}`"
-    return f"wrote `{new}` for `{old}`" if old else f"put in `{new}`"
+        return f"removed `{old}`"
+    return f"replaced `{old}` by `{new}`" if old else f"inserted `{new}`"

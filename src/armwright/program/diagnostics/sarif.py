@@ -12,19 +12,8 @@ from armwright.version import __version__
 _LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning"}
 
 
-def to_sarif(diagnostics: Sequence[Diagnostic], source: Source, path: str | None = None) -> dict[str, Any]:
-    """Return diagnostics as a SARIF log.
-
-    Args:
-        diagnostics: what is to be said.
-        source: the program.
-        path: of the program as it shall stand in the log; its name when left out.
-    """
-    return sarif_of([(diagnostics, source, path or source.name)])
-
-
-def sarif_of(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> dict[str, Any]:
-    """Return what is to be said of several programs as one SARIF log.
+def to_sarif(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> dict[str, Any]:
+    """Return the diagnostics of programs as one SARIF log.
 
     Args:
         programs: of each the diagnostics, the text, and the path as it shall stand in the log.

@@ -10,7 +10,7 @@ from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.cell_lookup import Cells
-from armwright.program.semantics.cell_symbols import Imported, known_cell
+from armwright.program.semantics.cell_symbols import Imported
 
 
 @attrs.frozen(kw_only=True)
@@ -39,7 +39,6 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: Cells, 
         settings: cell, standard and strictness.
     """
     around = cells.around(folder, codec.text, settings.cell)
-    cell = None if around.file is None else around.file.cell
     imports: list[Path] = []
 
     def read_import(path: str) -> Imported:
@@ -50,7 +49,7 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: Cells, 
 
     compiled = compile_program(
         Source(name, codec.text),
-        None if cell is None else known_cell(cell),
+        None if around.file is None else around.file.cell,
         strict=settings.strict,
         std=settings.std,
         read_import=None if folder is None else read_import,
@@ -60,9 +59,7 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: Cells, 
     if around.file is not None:
         files.append(around.file)
     lines = {name: (file.path.absolute().as_uri(), line) for file in files for name, line in file.lines.items()}
+    # Where nothing has arms, an imported file still tells where its frames are.
     imported = (imported.cell for imported in compiled.imports)
-    cell = with_imports(cell or next(filter(None, imported), None), compiled.imports)
-    frames = None if cell is None else cell.tree()
-    if around.file is not None and around.file.cell is cell:
-        frames = around.file.frames
-    return Analysis(compiled=compiled, codec=codec, cell=cell, frames=frames, files=lines, problem=around.problem)
+    cell = compiled.cell or with_imports(next(filter(None, imported), None), compiled.imports)
+    return Analysis(compiled=compiled, codec=codec, cell=cell, files=lines, problem=around.problem)

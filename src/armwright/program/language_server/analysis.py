@@ -28,7 +28,6 @@ class Analysis:
         compiled: the translation.
         codec: of its text.
         cell: what it acts on, with what it imports; None where that is not known.
-        frames: the frames of the cell at the start; None without a cell.
         files: where frames and arms are declared, by name: the URI of the file, and the line from 1.
         problem: why the cell of the settings cannot be read; empty if it can.
     """
@@ -36,7 +35,6 @@ class Analysis:
     compiled: Compilation
     codec: PositionCodec
     cell: Cell | None = None
-    frames: FrameTree | None = None
     files: Mapping[str, tuple[str, int]] = attrs.field(factory=dict)
     problem: str = ""
 
@@ -44,6 +42,11 @@ class Analysis:
     def text(self) -> str:
         """The text of the program."""
         return self.compiled.source.text
+
+    @cached_property
+    def frames(self) -> FrameTree | None:
+        """The frames of the cell at the start; None without a cell."""
+        return None if self.cell is None else self.cell.tree()
 
     @cached_property
     def scopes(self) -> ScopeExtents:

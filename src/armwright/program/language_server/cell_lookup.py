@@ -6,7 +6,6 @@ from pathlib import Path
 
 import attrs
 
-from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, FileFormatError
@@ -29,13 +28,11 @@ class CellFile:
     Attributes:
         path: the file.
         cell: what it says.
-        frames: where everything is at the start.
         lines: of frames and arms, from 1, by name.
     """
 
     path: Path
     cell: Cell
-    frames: FrameTree
     lines: Mapping[str, int]
 
 
@@ -136,7 +133,7 @@ def _read(path: Path) -> CellFile | FileFormatError:
     try:
         # A program or a setting names it, and neither may name what never ends.
         cell = read_cell(regular(path), arms_needed=False)
-        return CellFile(path=path, cell=cell, frames=cell.tree(), lines=_lines(path))
+        return CellFile(path=path, cell=cell, lines=_lines(path))
     except FileFormatError as error:
         return error
     except (ArmwrightError, ArithmeticError) as error:

@@ -40,7 +40,7 @@ def code_actions(
     certain = all_fixes(analysis.compiled.diagnostics)
     if certain and _wanted(FIX_ALL, context):
         edit = _workspace_edit(analysis, uri, certain)
-        actions.append(lsp.CodeAction("fix all that is certain", kind=FIX_ALL, edit=edit))
+        actions.append(lsp.CodeAction("apply all certain fixes", kind=FIX_ALL, edit=edit))
     return actions
 
 
@@ -115,5 +115,5 @@ def _title(diagnostic: Diagnostic, source: Source) -> str:
     if len(diagnostic.fixes) > 1 or len(old) > _MAX_SHOWN_LENGTH or len(new) > _MAX_SHOWN_LENGTH:
         return (diagnostic.helps or (f"correct this: {diagnostic.message}",))[0].partition("\n")[0]
     if not new.strip():
-        return f"leave `{old.strip()}` out"
-    return f"insert `{new.strip()}`" if not old.strip() else f"write `{new.strip()}` instead of `{old.strip()}`"
+        return f"remove `{old.strip()}`"
+    return f"insert `{new.strip()}`" if not old.strip() else f"replace `{old.strip()}` by `{new.strip()}`"

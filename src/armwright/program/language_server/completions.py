@@ -273,7 +273,7 @@ class _Maker:
         frames = self._analysis.frames
         if kind != VariableType(VariableKind.FRAME) or frames is None or key not in frames or self._scope.is_local(key):
             return ""
-        return f"hangs on {frames.parent(key)} in the cell"
+        return f"attached to {frames.parent(key)} in the cell"
 
     def arms(self, operand: _Operand) -> Iterator[CompletionItem]:
         """Give the arms of the cell, or those of the program where there is none."""

@@ -124,7 +124,7 @@ def _procedure(analysis: Analysis, key: str) -> _Description | None:
 def _variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:
     symbols = analysis.compiled.symbols
     declared = analysis.declaration(occurrence)
-    code = f"{declared.text if declared else text} : {occurrence.type or 'of a type that is wrong'}"
+    code = f"{declared.text if declared else text} : {occurrence.type or 'of an invalid type'}"
     lines = []
     if declared is not None:
         line = analysis.compiled.source.line(declared.span.start)
@@ -151,11 +151,11 @@ def _frame(analysis: Analysis, key: str) -> list[str]:
     if key in frames:
         parent = frames.parent(key)
         if parent is not None:
-            lines.append(f"hangs on {_shown(parent)} in {cell.name}")
+            lines.append(f"attached to {_shown(parent)} in {cell.name}")
         if parent is not None and frames.has_value(key):
             units = analysis.compiled.symbols.units
             if parent != "WORLD":
-                lines.append(f"seen from {_shown(parent)}: {pose_text(frames.relation(key, parent), units)}")
+                lines.append(f"relative to {_shown(parent)}: {pose_text(frames.relation(key, parent), units)}")
             lines.append(f"in the world: {pose_text(frames.world(key), units)}")
     if count := len(cell.visions.get(key, ())):
         lines.append(f"the camera of {cell.name} has {count} answer{'s' * (count > 1)} for it")
@@ -166,14 +166,14 @@ def _arm(analysis: Analysis, key: str) -> list[str]:
     """Return what the cell knows of an arm."""
     cell, frames = analysis.cell, analysis.frames
     if cell is None or frames is None:
-        return ["an arm; its value is the pose of the hand"]
+        return ["an arm; its value is the pose of its gripper"]
     if key not in cell.arms:
         return [f"{cell.name} has no such arm; it has {', '.join(sorted(cell.arms))}"]
     units = analysis.compiled.symbols.units
     return [
-        f"{cell.arms[key].arm.name} in {cell.name}; its value is the pose of the hand",
+        f"{cell.arms[key].arm.name} in {cell.name}; its value is the pose of its gripper",
         f"base: {pose_text(cell.arms[key].base, units)}",
-        f"hand at the start: {pose_text(frames.world(key), units)}",
+        f"gripper at the start: {pose_text(frames.world(key), units)}",
     ]
 
 

@@ -58,12 +58,12 @@ def _move(analysis: Analysis, move: tree.Move) -> Iterator[lsp.InlayHint]:
         return
     source, flow = analysis.compiled.source, analysis.compiled.flow
     text = stages_text(form_of(move, lambda node: " ".join(source.slice(node.span).split())))
-    tooltip = "the stages of this motion: PTP all joints at once, LINE straight, SPLINE and BLEND through places"
+    tooltip = "the stages of this motion: PTP all joints at once, LINE straight, SPLINE and BLEND past poses"
     arm = None if flow is None else flow.arms.get(move.span.start)
     if arm and not (isinstance(move.moved, tree.ArmName) and is_arm(move.moved.key)):
         text = f"{arm}: {text}"
     if flow is not None and move.span.start in flow.implied:
-        tooltip += "; the frame is hung on the arm first, as if by AFFIX"
+        tooltip += "; the frame is attached to the arm first, as if by AFFIX"
     yield _hint(analysis, move.span.end, text, tooltip)
 
 

@@ -31,22 +31,22 @@ _ARRAY = "name : ARRAY [sizes] OF type"
 WORDS: Mapping[str, Word] = {
     # in front of BEGIN
     "VAR": Word("VAR name, name : TYPE ;", "Declares variables: SCALAR, TRANS, FRAME or EVENT, single or in an ARRAY."),
-    "UNITS": Word("UNITS MM, DEG ;", "Settles what bare lengths and angles count; metres and degrees without it."),
-    "IMPORT": Word('IMPORT "file" ;', "Brings the frames of a cell file, and its arms where no other cell is given."),
+    "UNITS": Word("UNITS MM, DEG ;", "Sets the units of bare lengths and angles; the default is metres and degrees."),
+    "IMPORT": Word('IMPORT "file" ;', "Imports the frames of a cell file, and its arms if no other cell is specified."),
     "PROCEDURE": Word(
         "PROCEDURE name (a, b : TYPE, c : TYPE) ; [VAR ...] BEGIN ... END ;",
-        "Declares a procedure: SCALAR and TRANS are handed over as values, FRAME, EVENT and arrays themselves.",
+        "Declares a procedure: SCALAR and TRANS are passed by value; FRAME, EVENT and arrays by reference.",
     ),
     "BEGIN": Word("BEGIN statements END", "Opens the statements of the program, of a procedure, or a block."),
-    "END": Word("BEGIN statements END", "Closes what BEGIN or TRY opened; the END of the program has a point."),
+    "END": Word("BEGIN statements END", "Closes a BEGIN or TRY; the END of the program is followed by a full stop."),
     "SCALAR": Word("name : SCALAR", "A number."),
     "TRANS": Word("name : TRANS", "A transformation from one frame to another: a rotation and a translation."),
     "FRAME": Word(
         "name : FRAME", "A position and an orientation; a frame may be affixed to another frame and follows it then."
     ),
-    "EVENT": Word("name : EVENT", "Counts SIGNALs; WAIT waits for one and takes it."),
-    "ARRAY": Word(_ARRAY, "Declares elements that are numbered by indices from 1."),
-    "OF": Word(_ARRAY, "Stands in front of the type of the elements."),
+    "EVENT": Word("name : EVENT", "A counter of SIGNALs; WAIT waits until it is above 0 and subtracts one."),
+    "ARRAY": Word(_ARRAY, "Declares an array, whose indices start at 1."),
+    "OF": Word(_ARRAY, "Precedes the type of the elements."),
     # frames
     "AFFIX": Word(
         _AFFIX, "Affixes the first frame to the second and lets it follow: at its present pose, or AT a transformation."
@@ -87,8 +87,8 @@ WORDS: Mapping[str, Word] = {
         f"From {LOWEST_SPEED:g} to {HIGHEST_SPEED:g}: {NORMAL_SPEED:g} is the normal speed, "
         f"{HIGHEST_SPEED:g} the largest the arm allows.",
     ),
-    "BLEND": Word("WITH BLEND = distance", "Goes straight between via points and rounds the corners within this."),
-    "DURATION": Word("WITH DURATION = seconds", "How long the motion takes, instead of a speed."),
+    "BLEND": Word("WITH BLEND = distance", "Moves in straight lines between via points and rounds the corners within this distance."),
+    "DURATION": Word("WITH DURATION = seconds", "The duration of the motion, instead of a speed."),
     # control
     "IF": Word(_IF, "Chooses between two statements."),
     "THEN": Word(_IF, "Precedes the statement that runs when the condition holds."),
@@ -99,27 +99,27 @@ WORDS: Mapping[str, Word] = {
     ),
     "UNTIL": Word("REPEAT statements UNTIL condition", "Ends the loop when the condition holds."),
     "FOR": Word(_FOR, "Repeats a statement while a SCALAR counts."),
-    "STEP": Word(_FOR, "What the variable grows by each time; 1 without it."),
+    "STEP": Word(_FOR, "The increment of the variable in each pass; 1 without it."),
     "DO": Word("WHILE ... DO | FOR ... DO | LOCK ... DO | ON ... DO", "Precedes the statement that it governs."),
     "AND": Word("condition AND condition", "Holds when both hold."),
     "OR": Word("condition OR condition", "Holds when one of them holds, or both."),
     "NOT": Word("NOT condition", "Holds when the condition does not."),
     "HALT": Word("HALT", "Ends the program; in an action of ON, or a procedure that it calls, that motion alone."),
     "PRINT": Word('PRINT ("text", value, ...)', "Prints texts and values on one line."),
-    "PAUSE": Word("PAUSE seconds", "Waits that long."),
+    "PAUSE": Word("PAUSE seconds", "Waits for this time."),
     # processes
     "COBEGIN": Word(_COBEGIN, "Runs blocks side by side and waits for all of them; an arm belongs to one of them."),
     "COEND": Word(_COBEGIN, "Closes COBEGIN."),
-    "PRIORITY": Word(_COBEGIN, "Of branches that ask at one instant, the one with the larger number comes first."),
+    "PRIORITY": Word(_COBEGIN, "Of branches that run at the same time, the one with the larger number is served first."),
     "SIGNAL": Word("SIGNAL event", "Adds one to an event."),
     "WAIT": Word("WAIT event", "Waits until an event has been signalled, and takes one from it."),
     "LOCK": Word(
-        "LOCK (variables) DO statement", "Keeps other LOCKs of these variables waiting until the statement is done."
+        "LOCK (variables) DO statement", "Other LOCKs of these variables wait until the statement has ended."
     ),
     # recovery
-    "TRY": Word(_TRY, "Runs statements; when one of them fails, those behind RECOVER run instead of the rest."),
-    "RECOVER": Word(_TRY, "Precedes the statements that run when a statement behind TRY fails."),
-    "RETRY": Word("RETRY", "Inside RECOVER: runs the statements behind TRY again."),
+    "TRY": Word(_TRY, "Runs statements; when one of them fails, those after RECOVER run instead of the rest."),
+    "RECOVER": Word(_TRY, "Precedes the statements that run when a statement after TRY fails."),
+    "RETRY": Word("RETRY", "Inside RECOVER: runs the statements after TRY again."),
     # functions
     "XYZ": Word("XYZ (x, y, z)", "A TRANS: a translation without a rotation, in the length unit of the program."),
     "ROTX": Word("ROTX (angle)", "A TRANS: a rotation about x."),

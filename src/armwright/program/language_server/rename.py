@@ -13,8 +13,8 @@ from armwright.program.semantics.symbols import PREDECLARED
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ARM = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)
 _NO_NAMES = {
-    What.ARM: "an arm, whose name the cell settles",
-    What.DEVICE: "a device, whose name the cell settles",
+    What.ARM: "an arm, whose name is defined by the cell",
+    What.DEVICE: "a device, whose name is defined by the cell",
     What.FUNCTION: "a function of the language",
     What.UNIT: "a unit",
     What.SENSOR: "a reserved word",
@@ -43,7 +43,7 @@ def nameable(analysis: Analysis, offset: int) -> Occurrence:
         if occurrence.key in PREDECLARED:
             raise InvalidValueError(f"`{text}` is predeclared, and cannot be renamed")
         if undeclared:
-            raise InvalidValueError(f"`{text}` is not declared, so it is unknown what it is")
+            raise InvalidValueError(f"`{text}` is not declared, and cannot be renamed")
         source = _known_by(analysis, occurrence.key)
         if source is not None:
             raise InvalidValueError(f"`{text}` {source} by this name; rename it there first")
@@ -54,7 +54,7 @@ def _known_by(analysis: Analysis, key: str) -> str | None:
     """Return how the cell knows a frame by its name; None where it does not."""
     cell = analysis.cell
     if cell is not None and key in cell.frames:
-        return f"gets its place from {cell.name}"
+        return f"gets its pose from {cell.name}"
     return f"is found by the camera of {cell.name}" if cell is not None and key in cell.visions else None
 
 
@@ -102,7 +102,7 @@ def _require_unused(analysis: Analysis, occurrence: Occurrence, new: str) -> Non
     if key in PREDECLARED:
         raise InvalidValueError(f"'{new}' is a frame that is predeclared")
     if key in procedure.types:
-        raise InvalidValueError(f"procedure `{procedure.node.name.text}` has a name '{new}' already")
+        raise InvalidValueError(f"procedure `{procedure.node.name.text}` already has a name '{new}'")
     span = procedure.node.span
     if any(other.key == key and span.start <= other.start < span.end for other in _meant(analysis)):
         name = procedure.node.name.text
@@ -115,7 +115,7 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
     if key in PREDECLARED or key in symbols.imported:
         raise InvalidValueError(f"'{new}' is a frame that is {'predeclared' if key in PREDECLARED else 'imported'}")
     if key in symbols.declared or key in symbols.procedures:
-        raise InvalidValueError(f"the program has a name '{new}' already")
+        raise InvalidValueError(f"the program already has a name '{new}'")
     if key in FUNCTIONS:
         raise InvalidValueError(f"'{new}' is a function of the language")
     if cell is not None and occurrence.what is What.VARIABLE and (key in cell.frames or key in cell.visions):
