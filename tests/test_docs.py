@@ -318,11 +318,11 @@ def test_energy_of_the_picture() -> None:
     assert np.abs(found.imbalance).max() < 2e-10
     height = found.energy[0] - found.potential.min()
     heat, impact = found.heat[-1].sum(), found.impact[-1]
-    assert f"Of its {height:.1f} J of height" in text
-    assert f"dry friction takes {heat:.1f} J and the two stops {impact:.1f} J" in text
+    assert f"Of its {height:.1f} J of potential energy" in text
+    assert f"Coulomb friction dissipates {heat:.1f} J and the two stops {impact:.1f} J" in text
     moves = {joint: [e.t for e in found.events if e.joint == joint and e.after == JointState.MOVES] for joint in (0, 2)}
-    assert f"Joint 3 is dragged along after {moves[2][0]:.2f} s and joint 1 after {moves[0][0]:.2f} s" in text
-    assert f"at {found.events[-1].t:.2f} s all is held" in text
+    assert f"Joint 3 starts to move after {moves[2][0]:.2f} s and joint 1 after {moves[0][0]:.2f} s" in text
+    assert f"at {found.events[-1].t:.2f} s all joints are at rest" in text
 
 
 def test_numbers_of_the_study() -> None:
