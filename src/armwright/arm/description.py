@@ -117,8 +117,7 @@ def _limits(model: Arm) -> ResultTable:
     rows = []
     for i, joint in enumerate(model.joints, 1):
         limits = joint.limits
-        unit = "N m" if joint.revolute else "N"
-        effort = "-" if math.isinf(limits.effort) else f"{limits.effort:g} {unit}"
+        effort = "-" if math.isinf(limits.effort) else f"{limits.effort:g} {joint.units.effort}"
         positions = _position(joint, limits.lower), _position(joint, limits.upper)
         rates = _position(joint, limits.speed, "/s"), _position(joint, limits.acceleration, "/s²")
         rows.append((str(i), *positions, *rates, effort))
@@ -147,11 +146,10 @@ def _inertia(model: Arm) -> ResultTable:
 def _motors(model: Arm) -> ResultTable:
     rows = []
     for i, (motor, joint) in enumerate(zip(model.motors, model.joints, strict=True), 1):
-        inertia, viscous, dry = ("kg m²", "N m s", "N m") if joint.revolute else ("kg", "N s/m", "N")
-        forward, backward = motor.coulomb_forward, motor.coulomb_backward
-        coulomb = f"{forward:g} {dry}" if forward == backward else f"+{forward:g} / -{backward:g} {dry}"
-        friction = f"{motor.viscous:g} {viscous}", coulomb
-        rows.append((str(i), f"{motor.inertia:g} {inertia}", *friction, f"{motor.gear_ratio:g}"))
+        forward, backward, units = motor.coulomb_forward, motor.coulomb_backward, joint.units
+        coulomb = f"{forward:g}" if forward == backward else f"+{forward:g} / -{backward:g}"
+        friction = f"{motor.viscous:g} {units.viscous}", f"{coulomb} {units.effort}"
+        rows.append((str(i), f"{motor.inertia:g} {units.inertia}", *friction, f"{motor.gear_ratio:g}"))
     return ResultTable(
         title="Drives, reflected to the joint",
         heads=("joint", "inertia", "viscous", "Coulomb friction", "gear ratio"),

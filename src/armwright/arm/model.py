@@ -21,7 +21,18 @@ import numpy as np
 
 from armwright.arm.tensors import ROUNDING, impossible_moments
 from armwright.arm.uncertainty import Uncertainty
-from armwright.arrays import LARGEST, Array, ArrayLike, array_key, exact_shape, number, read_only, reduce_by_fields
+from armwright.arm.units import PRISMATIC, REVOLUTE, JointUnits
+from armwright.arrays import (
+    LARGEST,
+    Array,
+    ArrayLike,
+    Flags,
+    array_key,
+    exact_shape,
+    number,
+    read_only,
+    reduce_by_fields,
+)
 from armwright.errors import InvalidValueError, KindError, ShapeError, counted, shown
 from armwright.notebook import html_table
 from armwright.spatial.poses import one_pose
@@ -199,6 +210,11 @@ class Joint:
     def revolute(self) -> bool:
         """Whether the joint turns."""
         return self.kind == "revolute"
+
+    @property
+    def units(self) -> JointUnits:
+        """The units of its position, its effort and its drive."""
+        return REVOLUTE if self.revolute else PRISMATIC
 
     @property
     def behind(self) -> Array:
@@ -406,6 +422,15 @@ class Arm:
         """Return one of the limits of all joints, (n,), by its name in ``limits``."""
         limit: Array = getattr(self.limits, name)
         return limit
+
+    @cached_property
+    def revolute(self) -> Flags:
+        """Which joints rotate, (n,)."""
+        return read_only(np.array([joint.revolute for joint in self.joints]))
+
+    def drive(self, name: str) -> Array:
+        """Return one of the numbers of all motors, (n,), by its name in ``Motor``."""
+        return np.array([getattr(motor, name) for motor in self.motors])
 
     def _repr_html_(self) -> str:
         """Show the joints, their Denavit-Hartenberg parameters and their limits as a table."""

@@ -78,7 +78,7 @@ def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
 
 def _per_rate(model: "Arm") -> list[str]:
     """Return the headings of the columns of a Jacobian: the joint with the unit of its velocity."""
-    return [f"j{i} {'rad/s' if joint.revolute else 'm/s'}" for i, joint in enumerate(model.joints, 1)]
+    return [f"j{i} {joint.units.position}/s" for i, joint in enumerate(model.joints, 1)]
 
 
 def configurations(model: "Arm", configuration: str | None, file: TableFile | None) -> "list[Array]":

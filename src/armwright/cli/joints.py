@@ -1,6 +1,5 @@
 """Joint values from the command line, in degrees and millimetres, and from tables, in SI units."""
 
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,12 +24,12 @@ def units(arm: "Arm") -> "Array":
     """Return, per joint, the SI value of a degree or of a millimetre, (n,)."""
     import numpy as np
 
-    return np.array([math.pi / 180 if joint.revolute else 1e-3 for joint in arm.joints])
+    return np.array([joint.units.scale for joint in arm.joints])
 
 
 def unit_names(arm: "Arm") -> list[str]:
     """Return the headings of a table with joint values in ``units``: ``j1 deg``, ``j3 mm``."""
-    return [f"j{i} {'deg' if joint.revolute else 'mm'}" for i, joint in enumerate(arm.joints, 1)]
+    return [f"j{i} {joint.units.display}" for i, joint in enumerate(arm.joints, 1)]
 
 
 def rows(arm: "Arm", file: "TableFile", quantities: tuple[str, ...]) -> list["Array"]:

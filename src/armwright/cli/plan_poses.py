@@ -72,17 +72,9 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
         print(f"poses: {output}")
 
 
-def _columns(model: "Arm") -> list[tuple[str, float]]:
-    """Return the names of the columns, each with the factor from SI to its unit."""
-    import math
-
-    return [
-        (f"joint_{i}_deg", 180 / math.pi) if joint.revolute else (f"joint_{i}_mm", 1e3)
-        for i, joint in enumerate(model.joints, 1)
-    ]
-
-
 def _csv(model: "Arm", plan: "MeasurementPlan") -> str:
-    columns = _columns(model)
-    rows = [",".join(f"{x * scale:z.4f}" for x, (_, scale) in zip(q, columns, strict=True)) for q in plan.q]
-    return "\n".join([",".join(name for name, _ in columns), *rows]) + "\n"
+    from armwright.cli.joints import units
+
+    heads = [f"joint_{i}_{joint.units.display}" for i, joint in enumerate(model.joints, 1)]
+    rows = [",".join(f"{x:z.4f}" for x in q / units(model)) for q in plan.q]
+    return "\n".join([",".join(heads), *rows]) + "\n"

@@ -100,7 +100,7 @@ def _causes(terms: "Terms") -> "dict[str, Array]":
 
 
 def _print(model: "Arm", efforts: dict[str, list[float]]) -> None:
-    names = [f"joint {i + 1}, {'N m' if joint.revolute else 'N'}" for i, joint in enumerate(model.joints)]
+    names = [f"joint {i + 1}, {joint.units.effort}" for i, joint in enumerate(model.joints)]
     width = max(map(len, names)) + 2
     print(f"{'':<18}" + "".join(f"{name:>{width}}" for name in names))
     for cause, values in efforts.items():

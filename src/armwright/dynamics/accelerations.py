@@ -120,11 +120,10 @@ def eliminated(arm: Arm, M: Array) -> list[Pivot]:
     """
     M = M.copy()
     diagonal = np.diagonal(M, axis1=-2, axis2=-1).copy()
-    revolute = np.array([joint.revolute for joint in arm.joints])
     pivots: list[Pivot] = []
     for i in reversed(range(arm.n)):
         # Moments of inertia are compared with moments of inertia, masses with masses.
-        size = diagonal[..., revolute == revolute[i]].max(axis=-1)
+        size = diagonal[..., arm.revolute == arm.revolute[i]].max(axis=-1)
         pivots.append(Pivot(inertia=M[..., i, i].copy(), size=size))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             M[..., :i, :i] -= M[..., :i, i, None] * M[..., i, None, :i] / M[..., i, i, None, None]

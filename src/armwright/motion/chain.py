@@ -183,8 +183,7 @@ def _along_one_branch(solver: Solver, branches: Array, singular: Array, q: Array
     """Fill in the branch that the first configuration belongs to, where it goes on to the end without a jump."""
     branch = int(np.abs(branches[0] - q[0]).max(axis=-1).argmin())
     steps = np.diff(branches[:, branch], axis=0)
-    turns = np.array([joint.revolute for joint in solver.arm.joints])
-    steps -= np.where(turns, 2 * np.pi * np.round(steps / (2 * np.pi)), 0.0)
+    steps -= np.where(solver.arm.revolute, 2 * np.pi * np.round(steps / (2 * np.pi)), 0.0)
     if singular[:, branch].any() or np.abs(branches[0, branch] - q[0]).max() > _OTHER or np.abs(steps).max() > _JUMP:
         return False
     q[1:] = q[0] + np.cumsum(steps, axis=0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
-from armwright.arrays import Array, ArrayLike, Flags
+from armwright.arrays import Array, ArrayLike
 from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.forward_kinematics import forward
@@ -261,12 +261,8 @@ def _on_joint_moves(solver: Solver, q: Array, X_goal: Array) -> Iterator[list[Ar
     for scatter in _SCATTER:
         parts = chance.uniform(*_PARTS, size=(_SCATTERED, 1))
         offsets = scatter * chance.standard_normal((_SCATTERED, arm.n))
-        yield list(solver.forward(q + parts * (ends[0] - q) + np.where(_turning(arm), offsets, 0.0)))
-
-
-def _turning(arm: Arm) -> Flags:
-    """Return which joints rotate (n,): a slide is not moved by radians."""
-    return np.array([joint.revolute for joint in arm.joints])
+        # A slide is not moved by radians.
+        yield list(solver.forward(q + parts * (ends[0] - q) + np.where(arm.revolute, offsets, 0.0)))
 
 
 def _moved(X: Array, shift: Array, rotation: Array) -> Array:

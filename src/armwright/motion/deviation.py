@@ -203,7 +203,7 @@ def hand_bounds(arm: Arm, joints: Array, lengths: Array, qd: Array, qdd: Array) 
         qd: (m, n) the largest speeds of the joints on them.
         qdd: (m, n) the largest accelerations.
     """
-    turns = np.array([joint.revolute for joint in arm.joints])
+    turns = arm.revolute
     lever = np.where(turns, _levers(arm, joints, lengths), 1.0)
     n = arm.n
     later = np.maximum(np.arange(n)[:, None], np.arange(n))

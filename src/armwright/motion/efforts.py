@@ -162,7 +162,7 @@ def checked(arm: Arm, trajectory: Trajectory, what: str = "trajectory") -> None:
 
 def refuse_lasting(arm: Arm, joint: int, effort: float, location: str) -> IncapableArmError:
     """Return the error for a position where holding the arm takes more than a joint, from 0, may give."""
-    unit = "N m" if arm.joints[joint].revolute else "N"
+    unit = arm.joints[joint].units.effort
     return IncapableArmError(
         f"{location} gravity and dry friction alone ask {arm.called(joint)} for {abs(effort):.4g} {unit}, "
         f"{arm.joints[joint].limits.effort:.4g} {unit} are allowed: no slowing helps"
@@ -177,9 +177,7 @@ def lasting_efforts(solver: Solver, q: Array, qd: Array) -> Array:
 
 def dry_frictions(arm: Arm, qd: Array) -> Array:
     """Return what dry friction takes of joints (..., n) that move as ``qd`` does."""
-    forward = np.array([motor.coulomb_forward for motor in arm.motors])
-    backward = np.array([motor.coulomb_backward for motor in arm.motors])
-    return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
+    return np.where(qd > 0, arm.drive("coulomb_forward"), np.where(qd < 0, -arm.drive("coulomb_backward"), 0.0))
 
 
 def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
@@ -190,7 +188,7 @@ def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
     m, each = len(trajectory.coefficients), _each(trajectory)
     parts = np.linspace(_INSIDE, 1 - _INSIDE, each)
     samples = _Samples(np.repeat(np.arange(m), each), np.tile(parts, m))
-    rubs = np.array([motor.coulomb_forward + motor.coulomb_backward > 0 for motor in arm.motors])
+    rubs = arm.drive("coulomb_forward") + arm.drive("coulomb_backward") > 0
     speeds = _states(trajectory, samples)[1].reshape(m, each, -1)
     segment, before, joint = np.nonzero((speeds[:, 1:] * speeds[:, :-1] < 0) & rubs)
     low, high, sign = parts[before], parts[before + 1], np.sign(speeds[segment, before, joint])
@@ -225,7 +223,7 @@ def _efforts(solver: Solver, trajectory: Trajectory, samples: _Samples) -> Array
 def _shares(solver: Solver, trajectory: Trajectory, samples: _Samples) -> _Shares:
     q, qd, qdd = _states(trajectory, samples)
     lasting = lasting_efforts(solver, q, qd)
-    viscous = qd * np.array([motor.viscous for motor in solver.arm.motors])
+    viscous = qd * solver.arm.drive("viscous")
     return _Shares(lasting, viscous, solver.inverse_dynamics(q, qd, qdd) - lasting - viscous)
 
 

@@ -77,13 +77,13 @@ class MoveAssessment:
     def tables(self) -> Iterator[ResultTable]:
         """Yield the table of the poses [deg, mm], followed by the utilization of the limits."""
         move = self.move
-        units = [("deg", np.pi / 180) if joint.revolute else ("mm", 1e-3) for joint in move.arm.joints]
-        heads = ["pose", "s", *(f"j{i} {unit}" for i, (unit, _) in enumerate(units, 1))]
+        units = [joint.units for joint in move.arm.joints]
+        heads = ["pose", "s", *(f"j{i} {unit.display}" for i, unit in enumerate(units, 1))]
         rows = []
         for name, t, q, distance in zip(
             self.names, move.times, move.configurations, move.passing_distances, strict=True
         ):
-            values = [f"{x / scale:z.1f}" for x, (_, scale) in zip(q, units, strict=True)]
+            values = [f"{x / unit.scale:z.1f}" for x, unit in zip(q, units, strict=True)]
             rows.append([name, f"{t:.3f}", *values, *([f"{distance * 1e3:.1f}"] if move.tool_path else [])])
         if move.tool_path:
             heads.append("deviation mm")

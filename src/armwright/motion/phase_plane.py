@@ -141,7 +141,7 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
     """Write down the bounds of all limits that there are."""
     arm = solver.arm
     speed, acceleration, effort = (arm.limit(name) for name in ("speed", "acceleration", "effort"))
-    viscous = np.array([motor.viscous for motor in arm.motors])
+    viscous = arm.drive("viscous")
     least, most = _dry_frictions(solver, grid)
     limits: list[_Rows] = []
     for part in _PARTS:

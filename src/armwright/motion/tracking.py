@@ -244,7 +244,7 @@ def _whole_turns(arm: Arm, q: Array, failed: int | None) -> Array:
     lowest, highest = q[:failed].min(axis=0), q[:failed].max(axis=0)
     least, most = (arm.limit("lower") - lowest) / _TURN, (arm.limit("upper") - highest) / _TURN
     turns = np.where(least > _NONE, np.ceil(least), np.where(most < -_NONE, np.floor(most), 0.0))
-    fits = (turns >= least - _NONE) & (turns <= most + _NONE) & [joint.revolute for joint in arm.joints]
+    fits = (turns >= least - _NONE) & (turns <= most + _NONE) & arm.revolute
     return np.asarray(q + _TURN * np.where(fits, turns, 0.0))
 
 

@@ -98,20 +98,17 @@ class Plant:
     @cached_property
     def viscous(self) -> Array:
         """Friction per speed, (n,)."""
-        return self._of_motors("viscous")
+        return self.arm.drive("viscous")
 
     @cached_property
     def forward(self) -> Array:
         """Dry friction against motion forward, (n,)."""
-        return self._of_motors("coulomb_forward")
+        return self.arm.drive("coulomb_forward")
 
     @cached_property
     def backward(self) -> Array:
         """Dry friction against motion backward, (n,)."""
-        return self._of_motors("coulomb_backward")
-
-    def _of_motors(self, name: str) -> Array:
-        return np.array([getattr(motor, name) for motor in self.arm.motors])
+        return self.arm.drive("coulomb_backward")
 
     @property
     def dry(self) -> Flags:

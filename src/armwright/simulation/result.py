@@ -172,9 +172,9 @@ class Simulation:
         """Yield the tables of the joints [deg, mm], of the energy balance, and of the first events."""
         rows = []
         for i, joint in enumerate(self.arm.joints):
-            unit, scale = ("deg", 180 / math.pi) if joint.revolute else ("mm", 1e3)
             values = (self.q[0, i], self.q[-1, i], self.qd[-1, i])
-            rows.append((self.arm.called(i), unit, *(f"{x * scale:z.3f}" for x in values)))
+            texts = (f"{x / joint.units.scale:z.3f}" for x in values)
+            rows.append((self.arm.called(i), joint.units.display, *texts))
         heads = ("joint", "unit", "start", "end", "speed at the end, per s")
         yield ResultTable(title="", heads=heads, rows=rows, numbers=(2, 3, 4))
         energies = ((name.replace("_", " "), f"{value:z.6g}") for name, value in self._energies().items())

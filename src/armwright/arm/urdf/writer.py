@@ -68,20 +68,20 @@ def lost_in_urdf(arm: Arm) -> list[str]:
 def _lost_of_joint(arm: Arm, at: int) -> Iterator[str]:
     """Say what of one joint, from 0, and its link is lost."""
     called, joint, motor, link = arm.called(at), arm.joints[at], arm.motors[at], arm.links[at]
-    dry = "N m" if joint.revolute else "N"
+    units = joint.units
     if motor.inertia:
-        unit = "kg m²" if joint.revolute else "kg"
-        yield f"{called}: the inertia of the drive, {motor.inertia:g} {unit}, is not in the file"
+        yield f"{called}: the inertia of the drive, {motor.inertia:g} {units.inertia}, is not in the file"
     if motor.gear_ratio != 1:
         yield f"{called}: the gear ratio {motor.gear_ratio:g} is not in the file"
     if motor.coulomb_forward != motor.coulomb_backward:
         yield (
-            f"{called}: dry friction of {motor.coulomb_forward:g} {dry} forward and "
-            f"{motor.coulomb_backward:g} {dry} backward is {_dry(motor):g} {dry} either way in the file"
+            f"{called}: dry friction of {motor.coulomb_forward:g} {units.effort} forward and "
+            f"{motor.coulomb_backward:g} {units.effort} backward is {_dry(motor):g} {units.effort} either way in the "
+            "file"
         )
     if math.isfinite(joint.limits.acceleration):
-        unit = "rad/s²" if joint.revolute else "m/s²"
-        yield f"{called}: the largest acceleration, {joint.limits.acceleration:g} {unit}, is not in the file"
+        largest = f"{joint.limits.acceleration:g} {units.position}/s²"
+        yield f"{called}: the largest acceleration, {largest}, is not in the file"
     if link.unknown:
         yield f"link {at + 1}: its mass and inertia are unknown and not in the file: {link.unknown}"
 

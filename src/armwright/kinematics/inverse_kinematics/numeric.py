@@ -144,8 +144,7 @@ def _same(arm: Arm, q: Array, other: Candidate) -> bool:
     """Whether a configuration is another one, or a member of the family that is free there."""
     locked = [i for i in range(arm.n) if i + 1 not in other.free]
     apart = q - other.q
-    revolute = np.array([joint.revolute for joint in arm.joints])
-    apart = np.where(revolute, np.remainder(apart + np.pi, 2 * np.pi) - np.pi, apart)
+    apart = np.where(arm.revolute, np.remainder(apart + np.pi, 2 * np.pi) - np.pi, apart)
     return bool((np.abs(apart[locked]) < _SAME_CONFIGURATION).all())
 
 
@@ -189,7 +188,7 @@ def _descend(task: _Task, q: Array) -> Array:
     damping = np.full(len(q), _DAMPING)
     e, J = _residual_and_jacobian(task, q, X)
     square = np.sum(e**2, axis=-1)
-    weights = np.array([task.size**2 if joint.revolute else 1.0 for joint in task.arm.joints])
+    weights = np.where(task.arm.revolute, task.size**2, 1.0)
     for _ in range(_STEPS):
         moved = _bounded_step(task, q[running], e, J, (damping * square / task.size**2)[:, None] * weights)
         e_moved, J_moved = _residual_and_jacobian(task, moved, X[running])
@@ -224,7 +223,7 @@ def _bounded_step(task: _Task, q: Array, e: Array, J: Array, damping: Array) -> 
             break
         locked |= outwards
     # More than a radian, or a third of the arm, is no longer the neighbourhood that the step was made for.
-    longest = np.array([1.0 if joint.revolute else task.size / 3 for joint in task.arm.joints])
+    longest = np.where(task.arm.revolute, 1.0, task.size / 3)
     step /= np.maximum(np.max(np.abs(step) / longest, axis=-1, keepdims=True), 1.0)
     return np.clip(q + np.where(locked, 0.0, step), lower, upper)
 
@@ -254,7 +253,7 @@ def _starts(task: _Task, near: Array, first: int, count: int) -> Array:
         g = (1 + g) ** (1 / (n + 1))
     fractions = (0.5 + np.arange(first, first + count)[:, None] * g ** -np.arange(1.0, n + 1)) % 1.0
     around = np.clip(near, task.lower, task.upper)
-    reach = np.array([math.pi if joint.revolute else task.size for joint in task.arm.joints])
+    reach = np.where(task.arm.revolute, math.pi, task.size)
     middle = midpoints(task.lower, task.upper, around)
     low, high = np.maximum(task.lower, middle - reach), np.minimum(task.upper, middle + reach)
     starts: Array = low + fractions * (high - low)

@@ -53,8 +53,7 @@ def equivalent_configurations(arm: Arm, q: ArrayLike) -> Array:
 
 def wrapped_near(arm: Arm, q: Array, near: Array) -> Array:
     """Shift angles (..., n) by whole revolutions to within 180 deg of ``near``, whatever the limits."""
-    revolute = np.array([joint.revolute for joint in arm.joints])
-    return np.asarray(np.where(revolute, q + _TURN * np.round((near - q) / _TURN), q))
+    return np.asarray(np.where(arm.revolute, q + _TURN * np.round((near - q) / _TURN), q))
 
 
 def same_configuration(arm: Arm, a: Array, b: Array, tolerance: float) -> bool:
