@@ -66,6 +66,32 @@ def number(value: float, what: str) -> float:
         ) from error
 
 
+def positive(value: float, what: str, unit: str = "") -> float:
+    """Return a number above 0 as a float; messages name its unit, if it has one.
+
+    Raises:
+        KindError: the value is not a real number.
+        InvalidValueError: it is not above 0, or larger than any of a robot.
+    """
+    result = number(value, what)
+    if not 0 < result <= LARGEST:
+        raise InvalidValueError(f"{what}: expected more than {f'0 {unit}'.strip()}, got {result}")
+    return result
+
+
+def not_negative(value: float, what: str, unit: str = "") -> float:
+    """Return a number of 0 or above as a float; messages name its unit, if it has one.
+
+    Raises:
+        KindError: the value is not a real number.
+        InvalidValueError: it is below 0, or larger than any of a robot.
+    """
+    result = number(value, what)
+    if not 0 <= result <= LARGEST:
+        raise InvalidValueError(f"{what}: expected {f'0 {unit}'.strip()} or more, got {result}")
+    return result
+
+
 def integer(value: int, what: str, *, least: int) -> int:
     """Return an integer.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, Flags, number, read_only, reduce_by_fields
-from armwright.errors import InvalidValueError, KindError, shown
+from armwright.arrays import Array, Flags, not_negative, read_only, reduce_by_fields
+from armwright.errors import KindError, shown
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.trajectory import Trajectory
 
@@ -88,9 +88,7 @@ def continuity(trajectory: Trajectory, *, tolerance: float = 1e-9) -> Continuity
     """
     if not isinstance(trajectory, Trajectory):
         raise KindError(f"continuity: expected a trajectory, got {shown(trajectory)}")
-    tolerance = number(tolerance, "tolerance")
-    if not 0 <= tolerance <= LARGEST:
-        raise InvalidValueError(f"tolerance: expected 0 or more, got {tolerance}")
+    tolerance = not_negative(tolerance, "tolerance")
     lengths = np.diff(trajectory.times)
     lasting = lengths > 0
     if not lasting.any():

@@ -15,7 +15,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, one_per_joint
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, not_negative, one_per_joint, positive
 from armwright.errors import ArmwrightError, InvalidValueError, MissingExtraError
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.efforts import checked
@@ -42,16 +42,14 @@ class OnlineError(ArmwrightError, ValueError):
 
 
 class _Task(NamedTuple):
-    """What is asked for, (n,) each."""
+    """The state of an arm, and the positions and speeds to reach from it, (n,) each."""
 
+    arm: Arm
     q: Array
     qd: Array
     qdd: Array
     q_goal: Array
     qd_goal: Array
-    speed: Array
-    acceleration: Array
-    jerk: Array
 
 
 def retarget(
@@ -101,29 +99,21 @@ def retarget(
     """
     start, goal = single_configuration(arm, q, "q"), single_configuration(arm, q_goal, "q_goal")
     n = arm.n
-    task = _Task(
-        start,
-        one_per_joint(qd, n, "qd"),
-        one_per_joint(qdd, n, "qdd"),
-        goal,
-        np.zeros(n) if qd_goal is None else one_per_joint(qd_goal, n, "qd_goal"),
-        arm.limit("speed"),
-        arm.limit("acceleration"),
-        np.empty(n),
-    )
-    _check_goal(arm, task)
-    task = task._replace(jerk=_jerk(arm, task, jerk, brake=brake))
+    qd, qdd = one_per_joint(qd, n, "qd"), one_per_joint(qdd, n, "qdd")
+    task = _Task(arm, start, qd, qdd, goal, np.zeros(n) if qd_goal is None else one_per_joint(qd_goal, n, "qd_goal"))
+    _check_goal(task)
+    jerk_limits = _jerk_limits(task, jerk, brake=brake)
     if not synchronised and (task.qd_goal.any() or period is not None):
         raise InvalidValueError(
             "synchronised=False: joints that arrive by themselves rest there, so neither qd_goal nor period fits"
         )
-    if period is not None and not 0 < number(period, "period") <= LARGEST:
-        raise InvalidValueError(f"period: expected more than 0 s, got {period}")
+    if period is not None:
+        period = positive(period, "period", "s")
     if not (task.qd.any() or task.qdd.any() or task.qd_goal.any()) and np.abs(goal - start).max() <= _NOWHERE:
         return hold(start, 0.0)
-    phases = _phases(task, synchronised=synchronised, period=period)
-    _check_range(arm, task, phases)
-    return _trajectory(task, phases)
+    motion = _motion(task, *_phases(task, jerk_limits, synchronised=synchronised, period=period))
+    _check_range(task, motion)
+    return motion
 
 
 def replace_goal(
@@ -162,7 +152,7 @@ def replace_goal(
     """
     goal = single_configuration(arm, q_goal, "q_goal")
     checked(arm, running, "running")
-    before = _up_to(running, number(t, "t"))
+    before = _up_to(running, not_negative(t, "t", "s"))
     q, qd, qdd = (before(before.duration, order) for order in (0, 1, 2))
     after = retarget(
         arm, q, qd, qdd, goal, qd_goal=qd_goal, jerk=jerk, synchronised=synchronised, brake=brake, period=period
@@ -172,8 +162,6 @@ def replace_goal(
 
 def _up_to(running: Trajectory, t: float) -> Trajectory:
     """Return the part of a motion before a time, so that its end is the state just before that time."""
-    if not 0 <= t <= LARGEST:
-        raise InvalidValueError(f"t: expected 0 s or more, got {t:g}")
     if t > running.duration:
         end = running(running.duration)
         if np.abs(running(running.duration, 1)).max() > _AT_LIMIT:
@@ -186,96 +174,91 @@ def _up_to(running: Trajectory, t: float) -> Trajectory:
     return Trajectory(times=times, coefficients=running.coefficients[:count])
 
 
-def _check_goal(arm: Arm, task: _Task) -> None:
+def _check_goal(task: _Task) -> None:
     """Refuse a goal that no motion can end in, and an arm without limits."""
+    arm, speed = task.arm, task.arm.limit("speed")
     for fault in violations(arm, task.q_goal):
         raise InvalidValueError(f"q_goal: {fault}")
-    for j in np.flatnonzero(np.abs(task.qd_goal) > task.speed * (1 + _AT_LIMIT)).tolist():
-        raise InvalidValueError(
-            f"qd_goal: {arm.called(j)} would move at {task.qd_goal[j]:.6g} {_unit(arm, j)}/s, its limit is "
-            f"{task.speed[j]:.6g} {_unit(arm, j)}/s"
-        )
-    for j in np.flatnonzero(~np.isfinite(task.acceleration)).tolist():
+    for j in np.flatnonzero(np.abs(task.qd_goal) > speed * (1 + _AT_LIMIT)).tolist():
+        beyond = _beyond_limit(arm, j, "s", task.qd_goal[j], speed[j])
+        raise InvalidValueError(f"qd_goal: {arm.called(j)} would move at {beyond}")
+    for j in np.flatnonzero(~np.isfinite(arm.limit("acceleration"))).tolist():
         raise InvalidValueError(
             f"arm '{arm.name}': {arm.called(j)} has no limit of acceleration, so the motion to a new goal has no "
             "duration"
         )
 
 
-def _jerk(arm: Arm, task: _Task, jerk_limits: ArrayLike | None, *, brake: bool) -> Array:
-    """Return the jerks (n,) to plan with; refuse a state that they cannot keep inside the limits."""
-    n = len(task.q)
-    if jerk_limits is None:
-        jerk = task.acceleration / JERK_TIME
+def _jerk_limits(task: _Task, limits: ArrayLike | None, *, brake: bool) -> Array:
+    """Return the largest jerks (n,) to plan with; refuse a state that they cannot keep inside the limits."""
+    arm, n = task.arm, task.arm.n
+    speed, acceleration = arm.limit("speed"), arm.limit("acceleration")
+    if limits is None:
+        jerk = acceleration / JERK_TIME
     else:
-        jerks = floats(jerk_limits, "jerk", LARGEST)
+        jerks = floats(limits, "jerk", LARGEST)
         jerk = np.full(n, jerks) if jerks.ndim == 0 else np.array(one_per_joint(jerks, n, "jerk"))
         if not (jerk > 0).all():
             raise InvalidValueError(f"jerk: expected more than 0, got {jerk.min():g}")
-        for j in np.flatnonzero(jerk * _SHORTEST_RISE > task.acceleration).tolist():
+        for j in np.flatnonzero(jerk * _SHORTEST_RISE > acceleration).tolist():
+            largest = f"{acceleration[j] / _SHORTEST_RISE:.3g} {arm.joints[j].units.position}/s³"
             raise InvalidValueError(
                 f"jerk: {arm.called(j)} would have its full acceleration in less than a microsecond; expected "
-                f"{task.acceleration[j] / _SHORTEST_RISE:.3g} {_unit(arm, j)}/s³ at most, got {jerk[j]:.3g}"
+                f"{largest} at most, got {jerk[j]:.3g}"
             )
-    speed, acceleration = (limit * (1 + _AT_LIMIT) for limit in (task.speed, task.acceleration))
     # While an acceleration dies away at a constant jerk the speed still grows by a²/(2 jerk).
-    room = speed - task.qd * np.sign(task.qdd)
+    room = speed * (1 + _AT_LIMIT) - task.qd * np.sign(task.qdd)
     with np.errstate(divide="ignore", invalid="ignore"):
         least = np.where(task.qdd != 0, task.qdd**2 / (2 * np.maximum(room, 0.0)), 0.0)
-    if jerk_limits is None:
+    if limits is None:
         jerk = np.clip(least, jerk, jerk * _MAX_JERK)
-    if brake:
-        return jerk
-    allowed = "; brake=True accepts it and brings it back inside first"
-    for j in np.flatnonzero(np.abs(task.qdd) > acceleration).tolist():
-        raise OnlineError(
-            f"{arm.called(j)} of '{arm.name}' accelerates by {task.qdd[j]:.6g} {_unit(arm, j)}/s², its limit is "
-            f"{task.acceleration[j]:.6g} {_unit(arm, j)}/s²{allowed}"
-        )
-    for j in np.flatnonzero(np.abs(task.qd) > speed).tolist():
-        raise OnlineError(
-            f"{arm.called(j)} of '{arm.name}' moves at {task.qd[j]:.6g} {_unit(arm, j)}/s, its limit is "
-            f"{task.speed[j]:.6g} {_unit(arm, j)}/s{allowed}"
-        )
-    for j in np.flatnonzero(least > jerk * (1 + _AT_LIMIT)).tolist():
-        top = task.qd[j] + task.qdd[j] * abs(task.qdd[j]) / (2 * jerk[j])
-        raise OnlineError(
-            f"{arm.called(j)} of '{arm.name}' would come to {top:.6g} {_unit(arm, j)}/s while its acceleration of "
-            f"{task.qdd[j]:.6g} {_unit(arm, j)}/s² dies away, its limit is {task.speed[j]:.6g} {_unit(arm, j)}/s: a "
-            f"jerk of {least[j]:.3g} {_unit(arm, j)}/s³ instead of {jerk[j]:.3g} keeps it{allowed}"
-        )
+    if not brake:
+        _check_state(task, jerk, least)
     return jerk
 
 
-def _unit(arm: Arm, j: int) -> str:
-    return "rad" if arm.joints[j].revolute else "m"
+def _check_state(task: _Task, jerk: Array, least: Array) -> None:
+    """Refuse a state beyond a limit, or one that passes its limit of speed with jerks below the ``least`` (n,)."""
+    arm, speed, acceleration = task.arm, task.arm.limit("speed"), task.arm.limit("acceleration")
+    allowed = "; brake=True accepts it and brings it back inside first"
+    for does, per, rates, limits in (
+        ("accelerates by", "s²", task.qdd, acceleration),
+        ("moves at", "s", task.qd, speed),
+    ):
+        for j in np.flatnonzero(np.abs(rates) > limits * (1 + _AT_LIMIT)).tolist():
+            beyond = _beyond_limit(arm, j, per, rates[j], limits[j])
+            raise OnlineError(f"{arm.called(j)} of '{arm.name}' {does} {beyond}{allowed}")
+    for j in np.flatnonzero(least > jerk * (1 + _AT_LIMIT)).tolist():
+        top, unit = task.qd[j] + task.qdd[j] * abs(task.qdd[j]) / (2 * jerk[j]), arm.joints[j].units.position
+        raise OnlineError(
+            f"{arm.called(j)} of '{arm.name}' would come to {top:.6g} {unit}/s while its acceleration of "
+            f"{task.qdd[j]:.6g} {unit}/s² dies away, its limit is {speed[j]:.6g} {unit}/s: a jerk of {least[j]:.3g} "
+            f"{unit}/s³ instead of {jerk[j]:.3g} keeps it{allowed}"
+        )
 
 
-class _Phases(NamedTuple):
-    """Of every joint, (n, k) each: when its phases begin [s], its jerk, and its state when they begin.
+def _beyond_limit(arm: Arm, j: int, per: str, rate: float, limit: float) -> str:
+    """Return a rate of a joint, from 0, and the limit that it passes, in words."""
+    unit = f"{arm.joints[j].units.position}/{per}"
+    return f"{rate:.6g} {unit}, its limit is {limit:.6g} {unit}"
 
-    The first phase begins at 0; the last one is the rest after the joint has arrived.
+
+def _phases(task: _Task, jerk_limits: Array, *, synchronised: bool, period: float | None) -> tuple[Array, Array, float]:
+    """Ask Ruckig for the phases of constant jerk of every joint.
+
+    Returns:
+        How long they last (n, k) [s]; their jerks (n, k + 1), the last of which is that of the rest after the joint has
+        arrived; and the duration of the motion [s].
     """
-
-    starts: Array
-    jerk: Array
-    q: Array
-    qd: Array
-    qdd: Array
-    duration: float
-
-
-def _phases(task: _Task, *, synchronised: bool, period: float | None) -> _Phases:
-    """Ask Ruckig for the phases of constant jerk; states come by integrating them, so that they join exactly."""
     ruckig = _ruckig()
-    n = len(task.q)
+    n, arm = task.arm.n, task.arm
     request = ruckig.InputParameter(n)
     request.current_position, request.current_velocity = task.q.tolist(), task.qd.tolist()
     request.current_acceleration = task.qdd.tolist()
     request.target_position, request.target_velocity = task.q_goal.tolist(), task.qd_goal.tolist()
     request.target_acceleration = [0.0] * n
-    request.max_velocity, request.max_acceleration = task.speed.tolist(), task.acceleration.tolist()
-    request.max_jerk = task.jerk.tolist()
+    request.max_velocity, request.max_acceleration = arm.limit("speed").tolist(), arm.limit("acceleration").tolist()
+    request.max_jerk = jerk_limits.tolist()
     request.synchronization = ruckig.Synchronization.Time if synchronised else ruckig.Synchronization.No
     if period is not None:
         request.duration_discretization = ruckig.DurationDiscretization.Discrete
@@ -289,57 +272,43 @@ def _phases(task: _Task, *, synchronised: bool, period: float | None) -> _Phases
         raise OnlineError(_GAVE_UP)
     profiles = result.profiles[0]
     lengths = np.array([[*profile.brake.t, *profile.t] for profile in profiles])
-    jerk = np.array([[*profile.brake.j, *profile.j, 0.0] for profile in profiles])
-    starts = np.concatenate([np.zeros((n, 1)), np.cumsum(lengths, axis=1)], axis=1)
-    q, qd, qdd = (np.empty_like(jerk) for _ in range(3))
+    jerks = np.array([[*profile.brake.j, *profile.j, 0.0] for profile in profiles])
+    return lengths, jerks, float(result.duration)
+
+
+def _motion(task: _Task, lengths: Array, jerks: Array, duration: float) -> Trajectory:
+    """Return the motion of phases of constant jerk, cut wherever some joint changes its jerk.
+
+    States come by integrating the phases, so that they join exactly.
+    """
+    q, qd, qdd = (np.empty_like(jerks) for _ in range(3))
     q[:, 0], qd[:, 0], qdd[:, 0] = task.q, task.qd, task.qdd
     for k in range(lengths.shape[1]):
-        h = lengths[:, k]
-        qdd[:, k + 1] = qdd[:, k] + h * jerk[:, k]
-        qd[:, k + 1] = qd[:, k] + h * (qdd[:, k] + h * jerk[:, k] / 2)
-        q[:, k + 1] = q[:, k] + h * (qd[:, k] + h * (qdd[:, k] / 2 + h * jerk[:, k] / 6))
+        q[:, k + 1], qd[:, k + 1], qdd[:, k + 1] = _after(lengths[:, k], q[:, k], qd[:, k], qdd[:, k], jerks[:, k])
     # What is left there of speed and acceleration is rounding.
     qd[:, -1], qdd[:, -1] = task.qd_goal, 0.0
-    return _Phases(starts, jerk, q, qd, qdd, float(result.duration))
-
-
-def _check_range(arm: Arm, task: _Task, phases: _Phases) -> None:
-    """Refuse a motion that passes the end of a joint's range; one that begins beyond it may come back."""
-    lengths = np.diff(phases.starts, axis=1)
-    q, qd, qdd, jerk = (array[:, :-1] for array in (phases.q, phases.qd, phases.qdd, phases.jerk))
-    candidates = [phases.q]
-    # A joint reverses where its speed, a parabola in each phase, is 0.
-    root = np.sqrt(np.maximum(qdd**2 - 2 * jerk * qd, 0.0))
-    for side in (-1.0, 1.0):
-        divisor = qdd + side * root
-        t = np.clip(np.where(divisor != 0, -2 * qd / np.where(divisor != 0, divisor, 1.0), 0.0), 0.0, lengths)
-        candidates.append(q + t * (qd + t * (qdd / 2 + t * jerk / 6)))
-    positions = np.concatenate(candidates, axis=1)
-    lowest, highest = positions.min(axis=1), positions.max(axis=1)
-    if (lowest >= arm.limit("lower")).all() and (highest <= arm.limit("upper")).all():
-        return
-    for extreme, worse in ((lowest, np.less), (highest, np.greater)):
-        for fault in violations(arm, extreme):
-            j = fault.joint - 1
-            if worse(fault.value, fault.limit) and worse(fault.value, task.q[j]):
-                raise OnlineError(f"on its motion to the new goal {fault}: it moves too fast to reverse before")
-
-
-def _trajectory(task: _Task, phases: _Phases) -> Trajectory:
-    """Return the motion, cut wherever some joint changes its jerk."""
-    cuts = np.unique(phases.starts)
-    times = np.append(cuts[cuts < phases.duration], phases.duration)
-    coefficients = np.empty((len(times) - 1, 4, len(task.q)))
+    starts = np.concatenate([np.zeros((len(q), 1)), np.cumsum(lengths, axis=1)], axis=1)
+    cuts = np.unique(starts)
+    times = np.append(cuts[cuts < duration], duration)
     # The phase that each joint is in, (segments, n), and the time since that began.
-    k = (phases.starts <= times[:-1, None, None]).sum(axis=2) - 1
-    joint = np.arange(len(task.q))
-    h, jerk = times[:-1, None] - phases.starts[joint, k], phases.jerk[joint, k]
-    q, qd, qdd = phases.q[joint, k], phases.qd[joint, k], phases.qdd[joint, k]
-    coefficients[:, 0] = q + h * (qd + h * (qdd / 2 + h * jerk / 6))
-    coefficients[:, 1] = qd + h * (qdd + h * jerk / 2)
-    coefficients[:, 2] = (qdd + h * jerk) / 2
-    coefficients[:, 3] = jerk / 6
-    return Trajectory(times=times, coefficients=coefficients)
+    k = (starts <= times[:-1, None, None]).sum(axis=2) - 1
+    joint = np.arange(len(q))
+    jerk = jerks[joint, k]
+    q, qd, qdd = _after(times[:-1, None] - starts[joint, k], q[joint, k], qd[joint, k], qdd[joint, k], jerk)
+    return Trajectory(times=times, coefficients=np.stack([q, qd, qdd / 2, jerk / 6], axis=1))
+
+
+def _after(h: Array, q: Array, qd: Array, qdd: Array, jerk: Array) -> tuple[Array, Array, Array]:
+    """Return positions, speeds and accelerations after a time of constant jerk."""
+    return q + h * (qd + h * (qdd / 2 + h * jerk / 6)), qd + h * (qdd + h * jerk / 2), qdd + h * jerk
+
+
+def _check_range(task: _Task, motion: Trajectory) -> None:
+    """Refuse a motion that passes the end of a joint's range; one that begins beyond it may come back."""
+    for extreme, worse in zip(motion.extremes(0), (np.less, np.greater), strict=True):
+        for fault in violations(task.arm, extreme):
+            if worse(fault.value, fault.limit) and worse(fault.value, task.q[fault.joint - 1]):
+                raise OnlineError(f"on its motion to the new goal {fault}: it moves too fast to reverse before")
 
 
 def _ruckig() -> Any:

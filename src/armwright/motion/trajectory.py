@@ -10,7 +10,7 @@ from numbers import Integral
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, read_only, reduce_by_fields
+from armwright.arrays import Array, ArrayLike, floats, not_negative, number, positive, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import one_way
 from armwright.motion.polynomials import derivative, extremes, peaks, shifted
@@ -122,8 +122,7 @@ class Trajectory:
             KindError: the order is no whole number.
             InvalidValueError: it is below 0.
         """
-        _check_order(order)
-        lowest, highest = extremes(derivative(self.coefficients, order), np.diff(self.times))
+        lowest, highest = self._segment_extremes(order)
         return lowest.min(axis=0), highest.max(axis=0)
 
     def segment_peaks(self, order: int) -> Array:
@@ -133,9 +132,12 @@ class Trajectory:
             KindError: the order is no whole number.
             InvalidValueError: it is below 0.
         """
-        _check_order(order)
-        lowest, highest = extremes(derivative(self.coefficients, order), np.diff(self.times))
+        lowest, highest = self._segment_extremes(order)
         return np.maximum(np.abs(lowest), np.abs(highest))
+
+    def _segment_extremes(self, order: int) -> tuple[Array, Array]:
+        _check_order(order)
+        return extremes(derivative(self.coefficients, order), np.diff(self.times))
 
     def peaks(self, order: int) -> Array:
         """Return the largest magnitude of a derivative for every joint, (n,), exactly and not by sampling.
@@ -154,9 +156,7 @@ class Trajectory:
             KindError: the factor is no number.
             InvalidValueError: it is not above 0.
         """
-        factor = number(factor, "factor")
-        if not 0 < factor <= LARGEST:
-            raise InvalidValueError(f"factor: expected more than 0, got {factor}")
+        factor = positive(factor, "factor")
         with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
             powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
             coefficients = self.coefficients * powers[:, None]
@@ -172,9 +172,7 @@ class Trajectory:
             KindError: the duration is no number.
             InvalidValueError: it is not above 0, or the motion has no duration that could change.
         """
-        duration = number(duration, "duration")
-        if not 0 < duration <= LARGEST:
-            raise InvalidValueError(f"duration: expected more than 0 s, got {duration}")
+        duration = positive(duration, "duration", "s")
         if self.duration == 0:
             raise InvalidValueError(
                 f"a motion of 0 s cannot be run in {duration:g} s; hold(q, {duration:g}) stands still"
@@ -196,9 +194,7 @@ class Trajectory:
             KindError: the time is no number.
             InvalidValueError: it is below 0.
         """
-        t = number(t, "t")
-        if not 0 <= t <= LARGEST:
-            raise InvalidValueError(f"t: expected 0 s or more, got {t}")
+        t = not_negative(t, "t", "s")
         if t >= self.duration:
             return self
         segments = int(np.searchsorted(self.times, t, side="right"))
@@ -215,7 +211,7 @@ class Trajectory:
             KindError: the period is no number.
             InvalidValueError: it is not above 0, or so short that there would be more than 1e8 samples.
         """
-        period = _period(period)
+        period = positive(period, "period", "s")
         if self.duration / period > _MAX_SAMPLES:
             raise InvalidValueError(
                 f"period: {period:g} s cuts {self.duration:g} s into {self.duration / period:.3g} samples, "
@@ -242,9 +238,7 @@ def hold(q: ArrayLike, duration: float) -> Trajectory:
         ShapeError: q is not (n,).
         InvalidValueError: a number is NaN or infinite, or the duration below 0.
     """
-    duration = number(duration, "duration")
-    if not 0 <= duration <= LARGEST:
-        raise InvalidValueError(f"duration: expected 0 s or more, got {duration}")
+    duration = not_negative(duration, "duration", "s")
     return Trajectory(times=(0.0, duration), coefficients=one_way(q, "q")[None, None, :])
 
 
@@ -285,13 +279,6 @@ def _check_order(order: int) -> None:
         raise InvalidValueError(f"order: expected 0 or more, got {order}")
 
 
-def _period(period: float) -> float:
-    period = number(period, "period")
-    if not 0 < period <= LARGEST:
-        raise InvalidValueError(f"period: expected more than 0 s, got {period}")
-    return period
-
-
 def _check_meeting(last: Trajectory, part: Trajectory, number_of_last: int, gap: float) -> None:
     """Refuse two parts of which the second does not begin where the first ends."""
     where = f"join: part {number_of_last + 1}"
@@ -318,7 +305,7 @@ def whole_ticks(trajectory: Trajectory, period: float) -> Trajectory:
         KindError: the period is no number.
         InvalidValueError: it is not above 0.
     """
-    period = _period(period)
+    period = positive(period, "period", "s")
     if trajectory.duration == 0:
         return trajectory
     return trajectory.retimed(_ticks(trajectory.duration, period) * period)
@@ -338,7 +325,7 @@ def slowed_together(trajectories: Sequence[Trajectory], duration: float, period:
         KindError: the period is no number.
         InvalidValueError: it is not above 0.
     """
-    period = _period(period)
+    period = positive(period, "period", "s")
     ends = np.cumsum([round(each.duration / period) for each in trajectories])
     least = int(ends[-1])
     if least == 0:

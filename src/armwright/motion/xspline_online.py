@@ -18,7 +18,7 @@ from functools import cache
 
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, number, one_per_joint
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, one_per_joint, positive
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.cubic_polynomials import hermite
 from armwright.motion.knots import one_way
@@ -48,7 +48,7 @@ def begin(first: ArrayLike, second: ArrayLike, step: float, rate: ArrayLike | No
     q0 = one_way(first, "first")
     q1 = one_per_joint(second, len(q0), "second")
     m0 = np.zeros(len(q0)) if rate is None else one_per_joint(rate, len(q0), "rate")
-    return np.concatenate([q0, q1, m0, [_step(step)]])
+    return np.concatenate([q0, q1, m0, [positive(step, "step", "s")]])
 
 
 def push(state: ArrayLike, knot: ArrayLike, step: float) -> tuple[Array, Array]:
@@ -69,7 +69,7 @@ def push(state: ArrayLike, knot: ArrayLike, step: float) -> tuple[Array, Array]:
     """
     q_last, q, m_last, h_last = _parts(state)
     coming = one_per_joint(knot, len(q), "knot")
-    h = _step(step)
+    h = positive(step, "step", "s")
     m, segment = _advanced((q_last, q, coming), m_last, (h_last, h))
     return np.concatenate([q, coming, m, [h]]), np.stack(segment)
 
@@ -152,11 +152,4 @@ def _parts(state: ArrayLike) -> tuple[Array, Array, Array, float]:
         raise ShapeError(f"state: expected a planner, shape (3 n + 1,), got {array.shape}; see begin")
     n = len(array) // 3
     q_last, q, m_last = exact_shape(array[:-1].reshape(3, n), (3, n), "state")
-    return q_last, q, m_last, _step(float(array[-1]), "the last step")
-
-
-def _step(value: float, what: str = "step") -> float:
-    step = number(value, what)
-    if not 0 < step <= LARGEST:
-        raise InvalidValueError(f"{what}: expected more than 0 s, got {step}")
-    return step
+    return q_last, q, m_last, positive(float(array[-1]), "the last step", "s")

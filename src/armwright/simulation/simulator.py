@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
-from armwright.arrays import Array, ArrayLike, exact_shape, number, one_per_joint
+from armwright.arrays import Array, ArrayLike, exact_shape, one_per_joint, positive
 from armwright.dynamics.accelerations import check_pivots, eliminated
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
@@ -83,7 +83,7 @@ def simulate(
     """
     start = single_configuration(arm, q)
     speed = np.zeros(arm.n) if qd is None else one_per_joint(qd, arm.n, "qd")
-    duration, period = _time(duration, "duration"), _time(period, "period")
+    duration, period = positive(duration, "duration", "s"), positive(period, "period", "s")
     if duration / period > _MOMENTS:
         raise InvalidValueError(
             f"duration: {duration:g} s, one moment every {period:g} s, would be {duration / period:.3g} moments; "
@@ -104,14 +104,6 @@ def simulate(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         status = run.go(start, speed)
         return run.result(status)
-
-
-def _time(value: float, what: str) -> float:
-    """Return a time above 0 [s]."""
-    time = number(value, what)
-    if not 0 < time < math.inf:
-        raise InvalidValueError(f"{what}: expected more than 0 s, got {value}")
-    return time
 
 
 def _check_kinds(controller: Controller | None, integrator: Integrator, brakes: Sequence[Brake]) -> None:
@@ -144,8 +136,9 @@ def _check(plant: Plant, q: Array, qd: Array) -> None:
     """Refuse a start outside the stops, a brake without a joint, a controller that drives another arm."""
     arm = plant.arm
     for i in np.flatnonzero((q < plant.lower) | (q > plant.upper)):
-        scale, unit = (180 / np.pi, "deg") if arm.joints[i].revolute else (1e3, "mm")
-        position, lower, upper = (float(x[i]) * scale for x in (q, plant.lower, plant.upper))
+        units = arm.joints[i].units
+        unit = units.display
+        position, lower, upper = (float(x[i]) / units.scale for x in (q, plant.lower, plant.upper))
         raise InvalidValueError(
             f"{arm.called(int(i))} starts at {position:g} {unit}, outside its stops at {lower:g} and {upper:g} {unit}; "
             "start inside, or simulate without stops"
