@@ -61,6 +61,18 @@ def test_what_the_compiler_makes(path: Path) -> None:
             "MUL expects two numbers, or two poses or transformations",
         ),
         ("loops", r"ELEM   (%\d+) A ", r"ELEM   \1 N ", "N is not an array of 1 dimension"),
+        (
+            "loops",
+            r"ELEM   %\d+ A ",
+            "ELEM   N A ",
+            "ELEM expects a temporary such as %1 for its result, got N",
+        ),
+        (
+            "guards",
+            r"MVON   (@\d+) %\d+",
+            r"MVON   \1 WORLD",
+            "MVON expects a temporary such as %1 for the value of its condition, got WORLD",
+        ),
         ("loops", r"STOP", "RET", "RET cannot end the program"),
         ("loops", r"STOP", "QUIT", "QUIT cannot end the program"),
         ("loops", r"STOP", "RETRY", "RETRY is outside of RECOVER"),

@@ -8,7 +8,7 @@ arm that the cell does not have) is left to the run, which has messages for it.
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 import attrs
@@ -32,51 +32,107 @@ from armwright.program.language.kinds import VariableKind
 from armwright.program.syntax.pose_literals import EXACT
 from armwright.spatial.rotations import orthonormality_error
 
-# What each operation takes: n a name or element, v a value, k a constant, p a jump target, t text or value, x a word;
-# in brackets what may be left out, + for any number more of the last.
+# The operands of each operation, a letter for each: N a number, P a pose or transformation, T a truth value, v any
+# value, t any value or a text; F, S and E the name of a FRAME, a SCALAR or an EVENT, n any name, C a counter; k and K
+# a constant of one and of twelve numbers, j a jump target; a an axis, o ON or OFF, r RIGIDLY, w any word. What is in
+# brackets may be left out, + stands for any number more of the last. In front of `=` is what the result is, which goes
+# to the first operand.
 _TAKES: Mapping[str, str] = {
-    "LOADM LOADS": "nk",
-    "COPY NEG INV NOT ROTX ROTY ROTZ": "nv",
-    "MUL DIV ADD SUB LT LE EQ NE GE GT DIST": "nvv",
-    "XYZ": "nvvv",
-    "MATX": "nvvvvvvvvvvvv",
-    "FORCE": "nx",
-    "ELEM": "nxv+",
-    "AFFIX": "nn(x)",
-    "AFFAT": "nnv(x)",
-    "UNFIX": "n(n)",
-    "OPEN": "x(v)",
-    "GRASP": "(x)",
-    "OPER": "xx",
-    "READV": "n",
-    "READS": "x",
-    "MVBEG": "nv",
-    "MVVIA": "v+",
-    "MVAPP MVDEP MVSPD MVBLD MVDUR": "v",
-    "MVON": "pnp",
+    "LOADM": "P=K",
+    "LOADS": "N=k",
+    "COPY": "nv",
+    "MUL": "nvv",
+    "DIV ADD SUB": "N=NN",
+    "NEG": "N=N",
+    "LT LE EQ NE GE GT": "T=NN",
+    "NOT": "T=T",
+    "DIST": "N=PP",
+    "INV": "P=P",
+    "ROTX ROTY ROTZ": "P=N",
+    "XYZ": "P=NNN",
+    "MATX": "P=NNNNNNNNNNNN",
+    "FORCE": "N=a",
+    "ELEM": "nwN+",
+    "AFFIX": "FF(r)",
+    "AFFAT": "FFP(r)",
+    "UNFIX": "F(F)",
+    "READV": "F",
+    "OPEN": "w(N)",
+    "GRASP": "(w)",
+    "OPER": "wo",
+    "READS": "w",
+    "MVBEG": "FP",
+    "MVVIA": "P+",
+    "MVAPP MVDEP": "P",
+    "MVSPD MVBLD MVDUR PAUSE": "N",
+    "MVON": "jnj",
     "MVDIR MVSTR MVEND MVHLT RET JOIN QUIT ENDR RETRY HALT STOP": "",
-    "JMP TRY ENDT": "p",
-    "JZ": "vp",
-    "FOR": "nnvvvp",
-    "CALL": "x(v+)",
-    "FORK": "p(v)",
-    "SIG WAIT": "n",
-    "PAUSE": "v",
+    "JMP TRY ENDT": "j",
+    "JZ": "Tj",
+    "FOR": "SCNNNj",
+    "CALL": "w(v+)",
+    "FORK": "j(N)",
+    "SIG WAIT": "E",
     "LOCK UNLK": "n+",
     "PRINT": "t+",
 }
-TAKES: Mapping[Op, str] = {Op[name]: takes for names, takes in _TAKES.items() for name in names.split()}
-_PATTERNS = {
-    op: re.compile(
-        takes.replace("(", "(?:")
-        .replace(")", ")?")
-        .replace("n", "[wq]")
-        .replace("v", "[wqd]")
-        .replace("x", "w")
-        .replace("t", "[wqds]")
-    )
-    for op, takes in TAKES.items()
+_VALUES: Mapping[str, tuple[Value, ...]] = {
+    **dict.fromkeys("NC", (Value.NUMBER,)),
+    "P": (Value.POSE,),
+    "T": (Value.TRUTH, Value.NUMBER),
 }
+_NAMES = {"F": VariableKind.FRAME, "S": VariableKind.SCALAR, "E": VariableKind.EVENT}
+# The words that an operand may be, and what is said of others.
+_WORDS: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "a": (("X", "Y", "Z"), "{op} expects the axis X, Y or Z, got {word}"),
+    "o": (("ON", "OFF"), "{op} expects ON or OFF, got {word}"),
+    "r": (("RIGIDLY",), "the last operand of {op} may only be RIGIDLY"),
+}
+# The forms of operands, by the letters of `_letter`.
+_FORMS: Mapping[str, str] = {
+    "(": "(?:",
+    ")": ")?",
+    "t": "[wqds]",
+    "K": "k",
+    **dict.fromkeys("nFSEC", "[wq]"),
+    **dict.fromkeys("vNPT", "[wqd]"),
+    **dict.fromkeys("aor", "w"),
+}
+
+
+@attrs.frozen
+class _Signature:
+    """The result of an operation, the letters of all its operands, and the form that these have."""
+
+    result: Value | None
+    letters: str
+    form: re.Pattern[str]
+
+    def pairs(self, operands: Sequence[Operand]) -> Iterator[tuple[str, Operand]]:
+        """Give each operand of an instruction with its letter."""
+        return zip(self.letters.ljust(len(operands), self.letters[-1:] or " "), operands, strict=False)
+
+
+def _signature(takes: str) -> _Signature:
+    """Return a signature that is written as in the table."""
+    result, _, operands = takes.rpartition("=")
+    letters = f"n{operands}" if result else operands
+    form = re.compile("".join(_FORMS.get(letter, letter) for letter in letters))
+    return _Signature(_VALUES[result][0] if result else None, re.sub(r"[()+]", "", letters), form)
+
+
+_SIGNATURES = {Op[name]: _signature(takes) for names, takes in _TAKES.items() for name in names.split()}
+# What works a value out: all that a condition may do, beside jumps and its end.
+_OF_CONDITIONS = {
+    *(op for op, signature in _SIGNATURES.items() if signature.result),
+    Op.COPY,
+    Op.MUL,
+    Op.ELEM,
+    Op.JZ,
+    Op.RET,
+}
+
+
 _PARTS = {Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON}
 _ENDS = {Op.STOP, Op.RET, Op.QUIT, Op.JMP, Op.HALT, Op.MVHLT, Op.ENDT, Op.RETRY}
 
@@ -95,11 +151,34 @@ def verify(code: Code) -> None:
 
 
 def _rule(verifier: Verifier, state: State) -> Flow:
-    """Check one instruction."""
-    op = verifier.op
+    """Check one instruction: its operands, what it writes, and what it does to the flow."""
+    op, operands, signature = verifier.op, verifier.operands, _SIGNATURES[verifier.op]
     if verifier.entry.routine is Routine.CONDITION and op not in _OF_CONDITIONS:
         raise verifier.wrong(f"the code of a condition must not contain {op}")
-    return _RULES[op](verifier, state)
+    for letter, operand in signature.pairs(operands):
+        _need(verifier, state, letter, operand)
+    if signature.result is not None:
+        state = verifier.write(state, operands[0], signature.result)
+    rule = _RULES.get(op)
+    return Flow(state) if rule is None else rule(verifier, state)
+
+
+def _need(verifier: Verifier, state: State, letter: str, operand: Operand) -> None:
+    """Check the value of an operand, which has the form that its letter stands for."""
+    if letter in _VALUES:
+        verifier.need(state, operand, *_VALUES[letter])
+    elif letter in _NAMES:
+        verifier.need_name(state, operand, _NAMES[letter])
+    elif letter == "t" and not isinstance(operand, Text):
+        verifier.value(state, operand)
+    elif letter in _WORDS:
+        words, fault = _WORDS[letter]
+        if operand not in words:
+            raise verifier.wrong(fault.format(op=verifier.op, word=operand))
+    elif isinstance(operand, Constant):
+        is_pose = isinstance(verifier.code.constants[operand.index], tuple)
+        if is_pose != (letter == "K"):
+            raise verifier.wrong(f"{verifier.op} does not take a constant of {12 if is_pose else 1} numbers")
 
 
 # ---- form ----------------------------------------------------------------------------------------------------------
@@ -108,7 +187,7 @@ def _rule(verifier: Verifier, state: State) -> Flow:
 def _wrong_operands(code: Code) -> Iterator[CodeError]:
     last = len(code.instructions)
     for number, step in enumerate(code.instructions):
-        if not _PATTERNS[step.op].fullmatch("".join(map(_letter, step.operands))):
+        if not _SIGNATURES[step.op].form.fullmatch("".join(map(_letter, step.operands))):
             yield CodeError(number, f"the operands of {step.op} have wrong kinds or a wrong number")
         for operand in step.operands:
             if fault := _fault(operand, last, len(code.constants)):
@@ -154,7 +233,7 @@ def _letter(operand: Operand) -> str:
         case Constant():
             return "k"
         case JumpTarget():
-            return "p"
+            return "j"
         case Text():
             return "s"
         case _:
@@ -176,27 +255,6 @@ def _fault(operand: Operand, instructions: int, constants: int) -> str:
 # ---- values --------------------------------------------------------------------------------------------------------
 
 
-def _operation(operands: Value, result: Value) -> Rule:
-    """Return the rule of an operation on values of one sort."""
-
-    def rule(verifier: Verifier, state: State) -> Flow:
-        to, *values = verifier.operands
-        for operand in values:
-            verifier.need(state, operand, operands)
-        return Flow(verifier.write(state, to, result))
-
-    return rule
-
-
-def _load(verifier: Verifier, state: State) -> Flow:
-    to, constant = verifier.operands
-    assert isinstance(constant, Constant)  # noqa: S101 - the sorts of operands have been checked
-    is_pose = isinstance(verifier.code.constants[constant.index], tuple)
-    if is_pose != (verifier.op is Op.LOADM):
-        raise verifier.wrong(f"{verifier.op} does not take a constant of {12 if is_pose else 1} numbers")
-    return Flow(verifier.write(state, to, Value.POSE if is_pose else Value.NUMBER))
-
-
 def _copy(verifier: Verifier, state: State) -> Flow:
     to, value = verifier.operands
     return Flow(verifier.write(state, to, verifier.value(state, value)))
@@ -210,100 +268,26 @@ def _multiply(verifier: Verifier, state: State) -> Flow:
     return Flow(verifier.write(state, to, left))
 
 
-def _not(verifier: Verifier, state: State) -> Flow:
-    to, value = verifier.operands
-    verifier.need(state, value, Value.TRUTH, Value.NUMBER)
-    return Flow(verifier.write(state, to, Value.TRUTH))
-
-
-def _force(verifier: Verifier, state: State) -> Flow:
-    to, axis = verifier.operands
-    if axis not in ("X", "Y", "Z"):
-        raise verifier.wrong(f"FORCE expects the axis X, Y or Z, got {axis}")
-    return Flow(verifier.write(state, to, Value.NUMBER))
-
-
 def _element(verifier: Verifier, state: State) -> Flow:
     to, array, *indices = verifier.operands
     kind = verifier.declared(str(array))
     if kind is None or len(kind.sizes) != len(indices):
         raise verifier.wrong(f"{array} is not an array of {counted(len(indices), 'dimension')}")
-    for index in indices:
-        verifier.need(state, index, Value.NUMBER)
     if not str(to).startswith("%"):
-        raise verifier.wrong("ELEM expects a temporary such as %1 for its result, got {to}")
+        raise verifier.wrong(f"ELEM expects a temporary such as %1 for its result, got {to}")
     return Flow(verifier.define(state, str(to), Element(kind.kind)))
-
-
-# ---- frames and devices --------------------------------------------------------------------------------------------
-
-
-def _frames(verifier: Verifier, state: State) -> Flow:
-    """AFFIX, AFFAT, UNFIX and READV: frames, then the step, then RIGIDLY."""
-    op, operands = verifier.op, list(verifier.operands)
-    most = {Op.AFFIX: 2, Op.AFFAT: 3}.get(op, len(operands))
-    if len(operands) > most and operands.pop() != "RIGIDLY":
-        raise verifier.wrong(f"the last operand of {op} may only be RIGIDLY")
-    if op is Op.AFFAT:
-        verifier.need(state, operands.pop(), Value.POSE)
-    for operand in operands:
-        verifier.need_name(state, operand, VariableKind.FRAME)
-    return Flow(state)
-
-
-def _open(verifier: Verifier, state: State) -> Flow:
-    for width in verifier.operands[1:]:
-        verifier.need(state, width, Value.NUMBER)
-    return Flow(state)
-
-
-def _operate(verifier: Verifier, state: State) -> Flow:
-    if verifier.operands[1] not in ("ON", "OFF"):
-        raise verifier.wrong(f"OPER expects ON or OFF, got {verifier.operands[1]}")
-    return Flow(state)
-
-
-def _nothing(_: Verifier, state: State) -> Flow:
-    """The operands have been checked, and there is nothing else."""
-    return Flow(state)
-
-
-# ---- motion --------------------------------------------------------------------------------------------------------
-
-
-def _begin_of_move(verifier: Verifier, state: State) -> Flow:
-    moved, goal = verifier.operands
-    verifier.need_name(state, moved, VariableKind.FRAME)
-    verifier.need(state, goal, Value.POSE)
-    return Flow(state)
-
-
-def _all(wanted: Value) -> Rule:
-    """Return the rule of an instruction that takes values of one sort, and gives none."""
-
-    def rule(verifier: Verifier, state: State) -> Flow:
-        for operand in verifier.operands:
-            verifier.need(state, operand, wanted)
-        return Flow(state)
-
-    return rule
 
 
 def _guard(verifier: Verifier, state: State) -> Flow:
     condition, truth, action = verifier.operands
     if not str(truth).startswith("%"):
-        raise verifier.wrong("MVON expects a temporary such as %1 for the value of its condition, got {truth}")
+        raise verifier.wrong(f"MVON expects a temporary such as %1 for the value of its condition, got {truth}")
     verifier.begin(condition, Routine.CONDITION, state, str(truth))
     verifier.begin(action, Routine.ACTION, state)
     return Flow(state)
 
 
 # ---- control flow --------------------------------------------------------------------------------------------------
-
-
-def _event(verifier: Verifier, state: State) -> Flow:
-    verifier.need_name(state, verifier.operands[0], VariableKind.EVENT)
-    return Flow(state)
 
 
 def _lock(verifier: Verifier, state: State) -> Flow:
@@ -335,39 +319,23 @@ def _call(verifier: Verifier, state: State) -> Flow:
     return Flow(state)
 
 
-def _print(verifier: Verifier, state: State) -> Flow:
-    for operand in verifier.operands:
-        if not isinstance(operand, Text):
-            verifier.value(state, operand)
-    return Flow(state)
-
-
 def _jump(verifier: Verifier, state: State) -> Flow:
     return Flow(state, (index_of(verifier.operands[0]), state), falls=False)
 
 
 def _jump_if_not(verifier: Verifier, state: State) -> Flow:
-    truth, operand = verifier.operands
-    verifier.need(state, truth, Value.TRUTH, Value.NUMBER)
-    target = index_of(operand)
+    target = index_of(verifier.operands[1])
     if verifier.entry.routine is Routine.CONDITION and target <= verifier.at:
         raise verifier.wrong("the code of a condition must not jump backward")
     return Flow(state, (target, state))
 
 
 def _for(verifier: Verifier, state: State) -> Flow:
-    variable, *numbers, over = verifier.operands
-    verifier.need_name(state, variable, VariableKind.SCALAR)
-    for operand in numbers:
-        verifier.need(state, operand, Value.NUMBER)
-    return Flow(state, (index_of(over), state))
+    return Flow(state, (index_of(verifier.operands[-1]), state))
 
 
 def _fork(verifier: Verifier, state: State) -> Flow:
-    target, *priority = verifier.operands
-    for operand in priority:
-        verifier.need(state, operand, Value.NUMBER)
-    verifier.begin(target, Routine.BRANCH, state)
+    verifier.begin(verifier.operands[0], Routine.BRANCH, state)
     return Flow(state)
 
 
@@ -418,38 +386,14 @@ def _end_of(*routines: Routine) -> Rule:
     return rule
 
 
-_NUMBER, _TRUTH, _POSE = Value.NUMBER, Value.TRUTH, Value.POSE
-_OF_VALUES: Mapping[Op, Rule] = {
-    Op.LOADM: _load,
-    Op.LOADS: _load,
+_RULES: Mapping[Op, Rule] = {
     Op.COPY: _copy,
     Op.MUL: _multiply,
-    **dict.fromkeys((Op.DIV, Op.ADD, Op.SUB, Op.NEG), _operation(_NUMBER, _NUMBER)),
-    **dict.fromkeys((Op.LT, Op.LE, Op.EQ, Op.NE, Op.GE, Op.GT), _operation(_NUMBER, _TRUTH)),
-    **dict.fromkeys((Op.XYZ, Op.ROTX, Op.ROTY, Op.ROTZ, Op.MATX), _operation(_NUMBER, _POSE)),
-    Op.NOT: _not,
-    Op.INV: _operation(_POSE, _POSE),
-    Op.DIST: _operation(_POSE, _NUMBER),
-    Op.FORCE: _force,
     Op.ELEM: _element,
-}
-_OF_CONDITIONS = {*_OF_VALUES, Op.JZ, Op.RET}
-_RULES: Mapping[Op, Rule] = {
-    **_OF_VALUES,
-    **dict.fromkeys((Op.AFFIX, Op.AFFAT, Op.UNFIX, Op.READV), _frames),
-    Op.OPEN: _open,
-    Op.OPER: _operate,
-    **dict.fromkeys((Op.GRASP, Op.READS, Op.MVDIR, Op.MVSTR, Op.MVEND, Op.JOIN), _nothing),
-    Op.MVBEG: _begin_of_move,
-    **dict.fromkeys((Op.MVVIA, Op.MVAPP, Op.MVDEP), _all(_POSE)),
-    **dict.fromkeys((Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.PAUSE), _all(_NUMBER)),
     Op.MVON: _guard,
-    Op.SIG: _event,
-    Op.WAIT: _event,
     Op.LOCK: _lock,
     Op.UNLK: _unlock,
     Op.CALL: _call,
-    Op.PRINT: _print,
     Op.JMP: _jump,
     Op.JZ: _jump_if_not,
     Op.FOR: _for,
