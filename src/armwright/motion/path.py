@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import accumulate
+from typing import NamedTuple
 
 import attrs
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, of_shape
@@ -54,8 +56,7 @@ class Path:
         return between(self.poses[segment], self.poses[segment + 1], fraction)
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Knots:
+class Knots(NamedTuple):
     """Where on a path the joints are solved for, and when they pass.
 
     Attributes:
@@ -65,8 +66,8 @@ class Knots:
     """
 
     times: Array
-    segments: tuple[int, ...]
-    fractions: tuple[float, ...]
+    segments: npt.NDArray[np.intp]
+    fractions: Array
 
 
 def closest_to_axis(A: ArrayLike, B: ArrayLike) -> float:
@@ -103,6 +104,18 @@ def report_speed(arm: Arm, A: ArrayLike, B: ArrayLike, speed: float) -> float:
     return check_speed(speed) / TOP_SPEED * min(r_min / arm.reach, 1.0) * arm.tool_speed
 
 
+def check_reach(arm: Arm) -> None:
+    """Refuse an arm for which the report's rule gives no speed.
+
+    Raises:
+        IncapableArmError: it has no reach or tool speed.
+    """
+    if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
+        raise IncapableArmError(
+            f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
+        )
+
+
 def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: int = 1) -> Knots:
     """Choose knots on a path by the report's rule.
 
@@ -123,10 +136,7 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
     Source:
         TR-83-008, "straight line motion" step 5 and "continuous motion".
     """
-    if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
-        raise IncapableArmError(
-            f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
-        )
+    check_reach(arm)
     tolerance(deviation)
     lengths = path.lengths()
     moving = [i for i, length in enumerate(lengths) if length > NEGLIGIBLE]
@@ -140,16 +150,10 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
             times.append(times[-1] + per_step)
             segments.append(i)
             fractions.append(done / sum(steps))
-    return Knots(times=np.array(times), segments=tuple(segments), fractions=tuple(fractions))
+    return Knots(np.array(times), np.array(segments, dtype=np.intp), np.array(fractions))
 
 
 def _steps(count: int, *, first: bool, last: bool) -> Sequence[float]:
     """Return the relative lengths of the steps on one segment."""
-    count = max(count, 1)
-    if first and last:
-        return [0.5, *[1.0] * (count - 1), 0.5]
-    if first:
-        return [0.5, *[1.0] * count]
-    if last:
-        return [*[1.0] * count, 0.5]
-    return [1.0] * count
+    whole = max(count, 1) - (first and last)
+    return [*[0.5] * first, *[1.0] * whole, *[0.5] * last]

@@ -10,12 +10,11 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike
-from armwright.errors import IncapableArmError
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.certified_motion import CertifiedMotion, fastest, standstill
 from armwright.motion.obstruction import Obstruction, PathError
-from armwright.motion.path import NEGLIGIBLE, Path, report_speed, report_step
+from armwright.motion.path import NEGLIGIBLE, Path, check_reach, report_speed, report_step
 from armwright.motion.quintic_polynomials import check_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight_path import StraightPath, line
@@ -158,10 +157,7 @@ def even_time(arm: Arm, A: Array, B: Array, speed: float) -> float | None:
     length = float(Path(poses=np.stack([A, B])).lengths()[0])
     if length <= NEGLIGIBLE:
         return None
-    if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
-        raise IncapableArmError(
-            f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
-        )
+    check_reach(arm)
     return length / report_speed(arm, A[:3, 3], B[:3, 3], speed)
 
 

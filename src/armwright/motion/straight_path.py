@@ -212,7 +212,7 @@ def report_path(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
         poses=poses,
         rotations=rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]),
         corners=np.append(0.0, knots.times[last]),
-        progress=xspline(knots.times, (way + np.array(knots.fractions))[:, None]),
+        progress=xspline(knots.times, (way + knots.fractions)[:, None]),
         numbers=numbers,
         near=np.inf,
     )

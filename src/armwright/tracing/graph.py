@@ -69,6 +69,21 @@ class Graph:
         return self._known[key]
 
 
+_Operator: TypeAlias = Callable[["Traced", Any], "Traced"]
+
+
+def _binary(op: str) -> tuple[_Operator, _Operator]:
+    """Return the method of an operator of two scalars, and that of the same with its scalars exchanged."""
+
+    def method(self: "Traced", other: Any) -> "Traced":
+        return traced(op, self, other)
+
+    def exchanged(self: "Traced", other: Any) -> "Traced":
+        return traced(op, other, self)
+
+    return method, exchanged
+
+
 class Traced:
     """A scalar that writes down what is done with it."""
 
@@ -81,52 +96,21 @@ class Traced:
         """Stand for a node of a graph."""
         self.graph, self.node = graph, node
 
-    def __add__(self, other: Any) -> "Traced":
-        return traced("add", self, other)
-
-    def __radd__(self, other: Any) -> "Traced":
-        return traced("add", other, self)
-
-    def __sub__(self, other: Any) -> "Traced":
-        return traced("subtract", self, other)
-
-    def __rsub__(self, other: Any) -> "Traced":
-        return traced("subtract", other, self)
-
-    def __mul__(self, other: Any) -> "Traced":
-        return traced("multiply", self, other)
-
-    def __rmul__(self, other: Any) -> "Traced":
-        return traced("multiply", other, self)
-
-    def __truediv__(self, other: Any) -> "Traced":
-        return traced("divide", self, other)
-
-    def __rtruediv__(self, other: Any) -> "Traced":
-        return traced("divide", other, self)
+    __add__, __radd__ = _binary("add")
+    __sub__, __rsub__ = _binary("subtract")
+    __mul__, __rmul__ = _binary("multiply")
+    __truediv__, __rtruediv__ = _binary("divide")
+    __lt__, __gt__ = _binary("less")
+    __le__, __ge__ = _binary("less_equal")
 
     def __neg__(self) -> "Traced":
         return traced("negate", self)
 
-    def __pow__(self, power: int) -> "Traced":
-        if power != 2:
-            return NotImplemented
-        return self * self
-
     def __abs__(self) -> "Traced":
         return traced("absolute", self)
 
-    def __lt__(self, other: Any) -> "Traced":
-        return traced("less", self, other)
-
-    def __le__(self, other: Any) -> "Traced":
-        return traced("less_equal", self, other)
-
-    def __gt__(self, other: Any) -> "Traced":
-        return traced("less", other, self)
-
-    def __ge__(self, other: Any) -> "Traced":
-        return traced("less_equal", other, self)
+    def __pow__(self, power: int) -> "Traced":
+        return self * self if power == 2 else NotImplemented
 
     def __bool__(self) -> bool:
         raise TypeError("a traced scalar has no truth value yet: write select(condition, then, otherwise)")
