@@ -183,7 +183,7 @@ def bench_run() -> RunPage:
         duration=9.0,
         messages=(
             Message(
-                severity="warning", code="W203", line=10, text="'part' hung on WORLD; it hangs on ARM_1 from here on"
+                severity="warning", code="W203", line=10, text="'part' is still attached to WORLD"
             ),
             Message(severity="note", text="two arms, one clock"),
         ),

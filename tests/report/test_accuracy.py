@@ -9,7 +9,7 @@ import pytest
 from armwright.accuracy.assessment import Assessment, assess
 from armwright.accuracy.measurement_file import read_measurements
 from armwright.report.accuracy_figures import drawings
-from armwright.report.accuracy_page import accuracy_page
+from armwright.report.accuracy_files import accuracy_files
 
 NAME = r"P<1>&$\x$"
 
@@ -73,7 +73,7 @@ def test_symbols(everything: Assessment) -> None:
 
 def test_page(everything: Assessment) -> None:
     """The page has a table per test, a row per measure, and what was reduced; no name on it can be taken for HTML."""
-    page = accuracy_page(everything, drawings(everything), title="A & B", command="armwright iso9283 <x>")
+    page = accuracy_files(everything, title="A & B", command="armwright iso9283 <x>")["report.html"]
 
     assert page.count("<tr") == len(list(everything.tables())) + len(everything.measures)
     assert "<1>" not in page

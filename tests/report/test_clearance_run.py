@@ -201,14 +201,14 @@ def test_film(run: ClearanceRun) -> None:
     """The film puts every point where the linkage has it: without play on the path, with play off by the error."""
     shown = film(run)
 
-    rows = len(shown.t)
-    tip = shown.points_m.reshape(rows, -1, 2)[:, shown.tip]
-    np.testing.assert_allclose(tip, shown.path_m, atol=1e-12)
-    shift = shown.shifts_um.reshape(rows, -1, 2)[:, shown.tip]
-    np.testing.assert_allclose(shift, shown.error_um, atol=1e-6)
-    for i, pin in enumerate(shown.pins):
-        ends = [shown.shifts_um.reshape(rows, -1, 2)[:, pin[name]] for name in ("journal", "bearing")]
-        np.testing.assert_allclose(ends[0] - ends[1], shown.gaps_um[:, 2 * i : 2 * i + 2], atol=1e-6)
+    rows = len(shown["t"])
+    tip = shown["points_m"].reshape(rows, -1, 2)[:, shown["tip"]]
+    np.testing.assert_allclose(tip, shown["path_m"], atol=1e-12)
+    shift = shown["shifts_um"].reshape(rows, -1, 2)[:, shown["tip"]]
+    np.testing.assert_allclose(shift, shown["error_um"], atol=1e-6)
+    for i, pin in enumerate(shown["pins"]):
+        ends = [shown["shifts_um"].reshape(rows, -1, 2)[:, pin[name]] for name in ("journal", "bearing")]
+        np.testing.assert_allclose(ends[0] - ends[1], shown["gaps_um"][:, 2 * i : 2 * i + 2], atol=1e-6)
 
 
 def test_long_runs_are_thinned(simulation: Simulation) -> None:
@@ -229,9 +229,9 @@ def test_long_runs_are_thinned(simulation: Simulation) -> None:
 
     shown = film(run)
 
-    assert len(shown.t) <= 2601
-    assert shown.t[-1] == time[-1]
-    assert np.array_equal(shown.forces_N.max(axis=0), simulation.forces.max(axis=0))
+    assert len(shown["t"]) <= 2601
+    assert shown["t"][-1] == time[-1]
+    assert np.array_equal(shown["forces_N"].max(axis=0), simulation.forces.max(axis=0))
 
 
 def test_page_carries_all(run: ClearanceRun) -> None:
@@ -253,12 +253,12 @@ def test_other_linkages(cranked: dict[str, ClearanceRun], name: str) -> None:
     run = cranked[name]
     shown = film(run)
 
-    assert len(shown.rails) == (1 if name == "slider-crank" else 0)
-    assert shown.motors == [[0.0, 0.0]]
-    assert len(shown.pins) == 1
+    assert len(shown["rails"]) == (1 if name == "slider-crank" else 0)
+    assert shown["motors"] == [[0.0, 0.0]]
+    assert len(shown["pins"]) == 1
     task = run.simulation.scenario
     ideal = tip_of(task.linkage, task.ideal.q)[:: task.stride]
-    np.testing.assert_allclose(shown.path_m[[0, -1]], ideal[[0, -1]], atol=1e-12)
+    np.testing.assert_allclose(shown["path_m"][[0, -1]], ideal[[0, -1]], atol=1e-12)
     # Its path has no goal of the tip but the start.
     assert [one["time"] for one in run.as_data()["targets"]] == [0.0]
 
@@ -273,7 +273,7 @@ def test_bearing_in_the_ground() -> None:
 
     run = ClearanceRun.of(simulate(prepare(other, path, Settings(start="centred"))))
 
-    (shown,) = film(run).pins
+    (shown,) = film(run)["pins"]
     assert shown["bearing"] == [0.3, 0.0]
     assert isinstance(shown["journal"], int)
     assert all(one.svg for one in clearance_run_figures(run))

@@ -72,7 +72,8 @@ def test_texts_stay_texts() -> None:
 
 def test_numbers_and_marks() -> None:
     """Numbers end at the right, heads above them too, and a row that is beyond its limit is marked."""
-    text = table(("pose", "AP"), [("P1", "0.1"), ("P2", "0.3")], numbers=(1,), marks=("holds", "over"))
+    rows = [("P1", "0.1"), ("P2", "0.3")]
+    text = table(ResultTable(title="", heads=("pose", "AP"), rows=rows, numbers=(1,), marks=("holds", "over")))
 
     assert text.count('<th class="number">AP</th>') == 1
     assert text.count('<td class="number">') == 2
@@ -82,4 +83,4 @@ def test_numbers_and_marks() -> None:
 def test_rows_fit_heads() -> None:
     """A row with more texts than there are columns is a mistake of ours."""
     with pytest.raises(ValueError, match="longer"):
-        table(("pose",), [("P1", "0.1")])
+        table(ResultTable(title="", heads=("pose",), rows=[("P1", "0.1")]))

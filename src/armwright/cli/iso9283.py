@@ -8,7 +8,7 @@ import typer
 from armwright.cli.failures import outcome
 from armwright.cli.numbers import Named, named_numbers
 from armwright.cli.options import Json, OutputFolder, Quiet
-from armwright.cli.output import command_line, json_text, print_result
+from armwright.cli.output import command_line, print_result
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 from armwright.errors import CheckFailedError, TooFewError
@@ -27,14 +27,14 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     ],
     output: OutputFolder = None,
     few: Annotated[
-        bool, typer.Option("--few", help="Accept fewer cycles than the standard requires, and state it.")
+        bool, typer.Option("--few", help="Accept fewer cycles than the standard requires; the results are marked.")
     ] = False,
     band_mm: Annotated[
         float | None,
-        typer.Option(help="Radius within which a pose counts as attained; the default is RP of the same pose."),
+        typer.Option(help="Radius in mm within which a pose counts as attained; the default is RP of the same pose."),
     ] = None,
     corners_mm: Annotated[
-        float, typer.Option(help="Distance from a corner within which AT and RT are not evaluated.")
+        float, typer.Option(help="Distance in mm from a corner within which AT and RT are not evaluated.")
     ] = 0.0,
     limit: Annotated[
         list[str] | None, typer.Option(help="Limit of a characteristic, as in RP=0.05mm; may be repeated.")
@@ -55,6 +55,7 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
     """
     from armwright.accuracy.measurement_file import read_measurements
+    from armwright.report.accuracy_files import accuracy_files
 
     _check_lengths(band_mm, corners_mm)
     bounds = _bounds(limit or [])
@@ -63,7 +64,8 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     tests = read_measurements(files, columns=columns_of(columns), skip_incomplete=skip_incomplete)
     assessment = _assessed(tests, bounds, few=few, band_mm=band_mm, corners_mm=corners_mm)
     if output is not None:
-        write_results(output, _files(assessment, files))
+        title = f"ISO 9283: {', '.join(path.name for path in files)}"
+        write_results(output, accuracy_files(assessment, title=title, command=command_line()))
     exceeded = CheckFailedError(_exceeded(assessment.exceeded)) if assessment.exceeded else None
     print_result(assessment, as_json=as_json, quiet=quiet, output=output, head=outcome(exceeded))
     if exceeded is not None:
@@ -127,17 +129,3 @@ def _in_si(assessment: "Assessment", symbol: str, value: float, unit: str) -> fl
             f"{symbol} is in {shown}: {symbol}={value:g}{shown}, got '{unit}'", param_hint="--limit"
         )
     return value / measure.scale
-
-
-def _files(assessment: "Assessment", files: list[Path]) -> dict[str, str]:
-    """Return the files of an assessment by name."""
-    from armwright.report.accuracy_figures import drawings
-    from armwright.report.accuracy_page import accuracy_page
-
-    figures = drawings(assessment)
-    title = f"ISO 9283: {', '.join(path.name for path in files)}"
-    return {
-        "measures.json": json_text(assessment.as_data()) + "\n",
-        "report.html": accuracy_page(assessment, figures, title=title, command=command_line()),
-        **{f"{figure.name}.svg": figure.svg for figure in figures},
-    }

@@ -8,6 +8,9 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.report.figures import empty_figure, literal, svg_text
 
+# Half the width of what is shown around a target [mm].
+_CLOSE = 1.5
+
 
 def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> str:
     """Draw a quantity over two others, as a surface with its points and the contours below it.
@@ -31,43 +34,6 @@ def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> 
     axis.locator_params(nbins=5)
     axis.view_init(elev=24, azim=-128)
     axis.set_box_aspect(None, zoom=0.88)
-    return svg_text(figure)
-
-
-def marked_curves(
-    title: str,
-    x: Array,
-    lines: Mapping[str, Array],
-    *,
-    labels: Sequence[str],
-    spans: Sequence[tuple[float, float]] = (),
-    fits: Mapping[str, tuple[Array, Array]] | None = None,
-) -> str:
-    """Draw curves over a common axis, with shaded intervals and fitted straight lines.
-
-    Args:
-        title: title of the figure.
-        x: (m,) the common axis.
-        lines: (m,) values by the name of the curve.
-        labels: labels of both axes, with units.
-        spans: bounds of the shaded intervals.
-        fits: abscissae (k,) and values (k,) of lines over the curves, by name.
-
-    Returns:
-        An SVG file's text.
-    """
-    figure = empty_figure((7.2, 4.2))
-    axis = figure.subplots()
-    for name, y in lines.items():
-        axis.plot(x, y, linewidth=1.3, label=literal(name))
-    for name, (abscissae, values) in (fits or {}).items():
-        axis.plot(abscissae, values, "k--", linewidth=1.4, label=literal(name))
-    for low, high in spans:
-        axis.axvspan(low, high, color="0.88", zorder=0)
-    axis.set(title=literal(title), xlabel=labels[0], ylabel=labels[1], xlim=(float(x[0]), float(x[-1])))
-    axis.grid(visible=True, alpha=0.3)
-    if len(lines) + len(fits or {}) > 1:
-        axis.legend(fontsize="small")
     return svg_text(figure)
 
 
@@ -119,19 +85,12 @@ def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array)
         for k, target in enumerate(targets):
             close = figure.add_subplot(grid[1, i * near + k])
             _plane(close, lines, targets)
-            close.set(
-                xlim=(target[0] - _CLOSE, target[0] + _CLOSE),
-                ylim=(target[1] - _CLOSE, target[1] + _CLOSE),
-                title=f"Q{k + 1}",
-            )
+            xlim, ylim = ((x - _CLOSE, x + _CLOSE) for x in target)
+            close.set(xlim=xlim, ylim=ylim, title=f"Q{k + 1}")
             close.set_aspect("equal")
             close.tick_params(labelsize="x-small")
     figure.suptitle(literal(title))
     return svg_text(figure)
-
-
-# Half the width of what is shown around a target [mm].
-_CLOSE = 1.5
 
 
 def _plane(axis: Any, lines: Mapping[str, Array], targets: Array) -> None:

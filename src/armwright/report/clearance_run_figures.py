@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import tip_of
@@ -50,8 +51,14 @@ def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
 def magnification(run: ClearanceRun) -> float:
     """Return a round number by which errors are magnified so that one sees them beside the path."""
     path = tip_of(run.simulation.scenario.linkage, run.simulation.scenario.ideal.q)
-    size, largest = float(np.ptp(path, axis=0).max()), float(run.distance.max())
-    return round_number(_SHOWN * size / largest) if largest > 0 else 1.0
+    return magnified(path, run.error, _SHOWN)
+
+
+def magnified(points: Array, errors: Array, share: float) -> float:
+    """Return a round factor by which errors (..., 2) are magnified to at most this share of the extent of points."""
+    size = float(np.ptp(points, axis=0).max())
+    largest = float(np.linalg.norm(errors, axis=-1).max())
+    return round_number(share * size / largest) if largest > 0 else 1.0
 
 
 def round_number(x: float) -> float:

@@ -7,17 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from string import Template
 from typing import Any
 
-import attrs
 import numpy as np
 
-from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.ideal import point_of
 from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage, Pin
-from armwright.report.clearance_run_figures import round_number
+from armwright.report.clearance_run_figures import magnified
 from armwright.report.elements import badge, facts, figures, notes as shown_notes, pairs, table
 from armwright.report.figures import Drawing
 from armwright.report.markup import asset, page_html
+from armwright.report.sticks import thinned
 from armwright.version import __version__
 
 # Rows of a page at most, and the size of the largest error on the screen relative to that of the linkage.
@@ -28,11 +27,10 @@ _MICRO = 1e6
 _PRINTED = ("path", "bearings", "spectrum", "workspace")
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class Film:
-    """The data of the scripts of the page, at r instants.
+def film(run: ClearanceRun) -> dict[str, Any]:
+    """Return the data of the scripts of the page, at r instants: as many as a screen can tell apart.
 
-    Attributes:
+    Returns:
         duration: shown duration [s].
         t: (r,) instants [s].
         ground_m: points on the ground, (x, y) each.
@@ -51,62 +49,40 @@ class Film:
         energy_J: (r, 6) driven, kinetic, potential, impact loss, friction loss, not explained.
         magnification: initial magnification of the displacements.
     """
-
-    duration: float
-    t: Array
-    ground_m: Sequence[Sequence[float]]
-    rails: Sequence[Sequence[float]]
-    bodies: Sequence[Mapping[str, Any]]
-    motors: Sequence[int | Sequence[float]]
-    points_m: Array
-    shifts_um: Array
-    tip: int
-    path_m: Array
-    error_um: Array
-    pins: Sequence[Mapping[str, Any]]
-    gaps_um: Array
-    forces_N: Array
-    flies: Array
-    energy_J: Array
-    magnification: float
-
-
-def film(run: ClearanceRun) -> Film:
-    """Return what the page shows of a run, with as many rows as a screen can tell apart."""
     simulation, linkage = run.simulation, run.simulation.scenario.linkage
-    stride = max(1, -(-run.rows // _ROWS))
-    rows = np.arange(0, run.rows, stride)
-    rows = rows if rows[-1] == run.rows - 1 else np.append(rows, run.rows - 1)
-    places = [BodyPoint(body.name, point) for body in linkage.bodies for point in body.points]
+    rows = thinned(run.rows, _ROWS)
+    points = [BodyPoint(body.name, point) for body in linkage.bodies for point in body.points]
     q = simulation.q[rows]
     ideal_q = simulation.scenario.ideal.q[rows * simulation.scenario.stride]
-    with_play = np.stack([point_of(linkage, place, q) for place in places], axis=1)
-    without = np.stack([point_of(linkage, place, ideal_q) for place in places], axis=1)
+    actual = np.stack([point_of(linkage, point, q) for point in points], axis=1)
+    ideal = np.stack([point_of(linkage, point, ideal_q) for point in points], axis=1)
     energy = run.energy
     tracks = (energy.driven, energy.kinetic, energy.potential, energy.impact_loss, energy.friction_loss)
-    return Film(
-        duration=float(run.time[-1]),
-        t=run.time[rows],
-        ground_m=[[float(x) for x in point] for point in linkage.ground.points.values()],
-        rails=_rails(linkage),
-        bodies=[
-            {"name": body.name, "points": [i for i, place in enumerate(places) if place.body == body.name]}
+    return {
+        "duration": float(run.time[-1]),
+        "t": run.time[rows],
+        "ground_m": [[float(x) for x in point] for point in linkage.ground.points.values()],
+        "rails": _rails(linkage),
+        "bodies": [
+            {"name": body.name, "points": [i for i, point in enumerate(points) if point.body == body.name]}
             for body in linkage.bodies
         ],
-        motors=[_motor(linkage, drive.body, places) for drive in linkage.drives],
-        points_m=without.reshape(len(rows), -1),
-        shifts_um=(with_play - without).reshape(len(rows), -1) * _MICRO,
-        tip=places.index(linkage.tip) if linkage.tip in places else -1,
-        path_m=simulation.tip[rows] - simulation.error[rows],
-        error_um=simulation.error[rows] * _MICRO,
-        pins=_pins(run, places),
-        gaps_um=run.gaps[rows].reshape(len(rows), -1) * _MICRO,
+        "motors": [_motor(linkage, drive.body, points) for drive in linkage.drives],
+        "points_m": ideal.reshape(len(rows), -1),
+        "shifts_um": (actual - ideal).reshape(len(rows), -1) * _MICRO,
+        "tip": points.index(linkage.tip) if linkage.tip in points else -1,
+        "path_m": simulation.tip[rows] - simulation.error[rows],
+        "error_um": simulation.error[rows] * _MICRO,
+        "pins": _pins(run, points),
+        "gaps_um": run.gaps[rows].reshape(len(rows), -1) * _MICRO,
         # A blow between two rows is not lost.
-        forces_N=np.maximum.reduceat(simulation.forces[: run.rows], rows, axis=0),
-        flies=(run.depths[rows] < 0).astype(np.float64),
-        energy_J=np.stack([track[rows] for track in (*tracks, energy.imbalance)], axis=-1),
-        magnification=_magnification(without, np.concatenate([with_play - without, simulation.error[rows, None]], 1)),
-    )
+        "forces_N": np.maximum.reduceat(simulation.forces[: run.rows], rows, axis=0),
+        "flies": (run.depths[rows] < 0).astype(np.float64),
+        "energy_J": np.stack([track[rows] for track in (*tracks, energy.imbalance)], axis=-1),
+        "magnification": magnified(
+            ideal.reshape(-1, 2), np.concatenate([actual - ideal, simulation.error[rows, None]], 1), _SHOWN
+        ),
+    }
 
 
 def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: str, command: str) -> str:
@@ -129,8 +105,8 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
         facts=facts(_facts(data, command)),
         notes=shown_notes(run.notes),
         main=Template(asset("clearance_run.html")).substitute(
-            pins=table(pins.heads, pins.rows, numbers=pins.numbers),
-            targets=table(targets.heads, targets.rows, numbers=targets.numbers),
+            pins=table(pins),
+            targets=table(targets),
             totals=pairs((name, f"{value} {unit}") for name, value, unit in totals.rows),
             settings=pairs(_settings(data)),
             figures=figures(drawing for drawing in drawn if drawing.name in _PRINTED),
@@ -176,12 +152,6 @@ def _motor(linkage: Linkage, body: str, points: Sequence[BodyPoint]) -> int | li
     if isinstance(joint, Pin) and joint.on.body == GROUND:
         return [float(x) for x in linkage.point(joint.on)]
     return points.index(BodyPoint(joint.body, joint.point))
-
-
-def _magnification(points: Array, shifts: Array) -> float:
-    size = float(np.ptp(points.reshape(-1, 2), axis=0).max())
-    largest = float(np.linalg.norm(shifts, axis=-1).max())
-    return round_number(_SHOWN * size / largest) if largest > 0 else 1.0
 
 
 # ---- texts ---------------------------------------------------------------------------------------------------------

@@ -1,9 +1,10 @@
 """HTML elements of a page, in which plain texts are escaped."""
 
 import html
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable
 from itertools import chain, repeat
 
+from armwright.files.result_table import ResultTable
 from armwright.report.figures import Drawing
 
 
@@ -29,25 +30,16 @@ def pairs(named: Iterable[tuple[str, str]]) -> str:
     return f'<dl class="pairs">{items}</dl>'
 
 
-def table(
-    heads: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: Collection[int] = (), marks: Iterable[str] = ()
-) -> str:
-    """Return a table.
-
-    Args:
-        heads: names of the columns.
-        rows: texts of each row.
-        numbers: indices of columns of numbers, which are aligned right.
-        marks: marks of the rows: ``over`` or ``holds`` a limit, or empty; they may be fewer than the rows.
-    """
+def table(result: ResultTable) -> str:
+    """Return a table of results, its numbers aligned right, its rows of the class of their marks."""
 
     def cells(tag: str, texts: Iterable[str]) -> str:
-        kinds = (' class="number"' if index in numbers else "" for index in range(len(heads)))
+        kinds = (' class="number"' if index in result.numbers else "" for index in range(len(result.heads)))
         return "".join(f"<{tag}{kind}>{html.escape(text)}</{tag}>" for kind, text in zip(kinds, texts, strict=True))
 
-    classes = (f' class="{mark}"' if mark else "" for mark in chain(marks, repeat("")))
-    body = "\n".join(f"<tr{name}>{cells('td', row)}</tr>" for row, name in zip(rows, classes, strict=False))
-    head = f"<thead><tr>{cells('th', heads)}</tr></thead>"
+    classes = (f' class="{mark}"' if mark else "" for mark in chain(result.marks, repeat("")))
+    body = "\n".join(f"<tr{name}>{cells('td', row)}</tr>" for row, name in zip(result.rows, classes, strict=False))
+    head = f"<thead><tr>{cells('th', result.heads)}</tr></thead>"
     return f'<div class="scroll-x"><table>{head}\n<tbody>{body}</tbody></table></div>'
 
 

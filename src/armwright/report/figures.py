@@ -43,8 +43,17 @@ class Drawing(NamedTuple):
         return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
 
 
-def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_label: str) -> str:
-    """Draw curves over a common axis.
+def curves(
+    title: str,
+    x: Array,
+    lines: Mapping[str, Array],
+    *,
+    x_label: str,
+    y_label: str,
+    spans: Sequence[tuple[float, float]] = (),
+    fits: Mapping[str, tuple[Array, Array]] | None = None,
+) -> str:
+    """Draw curves over a common axis, with shaded intervals and fitted straight lines.
 
     Args:
         title: title of the figure.
@@ -52,17 +61,22 @@ def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_
         lines: (m,) values by the name of the curve.
         x_label: quantity and unit of ``x``.
         y_label: quantity and unit of the curves.
+        spans: bounds of the shaded intervals.
+        fits: abscissae (k,) and values (k,) of lines over the curves, by name.
 
     Returns:
         An SVG file's text.
     """
     figure = empty_figure((7, 4.2))
-    axes = figure.subplots()
+    axes = plain_axes(figure, x_label, y_label)
     for i, (name, y) in enumerate(lines.items()):
         axes.plot(x, y, _STYLES[i % len(_STYLES)], label=literal(name), linewidth=1.6)
-    axes.set(title=literal(title), xlabel=x_label, ylabel=y_label, xlim=(float(x[0]), float(x[-1])))
-    axes.grid(visible=True, alpha=0.3)
-    if len(lines) > 1:
+    for name, (abscissae, values) in (fits or {}).items():
+        axes.plot(abscissae, values, "k--", label=literal(name), linewidth=1.4)
+    for low, high in spans:
+        axes.axvspan(low, high, color="0.88", zorder=0)
+    axes.set(title=literal(title), xlim=(float(x[0]), float(x[-1])))
+    if len(axes.lines) > 1:
         axes.legend()
     return svg_text(figure)
 

@@ -33,11 +33,7 @@ def plain_page(
     Returns:
         HTML text; write it as UTF-8.
     """
-    cards = [
-        card(shown.title, table(shown.heads, shown.rows, numbers=shown.numbers, marks=shown.marks), remark=shown.remark)
-        for shown in tables
-        if shown.rows
-    ]
+    cards = [card(shown.title, table(shown), remark=shown.remark) for shown in tables if shown.rows]
     pictures = list(drawn)
     if pictures:
         cards.append(card("Figures", figures(pictures)))

@@ -63,9 +63,9 @@ def skeleton_of(arm: Arm, poses: Array) -> Array:
     return np.stack(points, axis=1)
 
 
-def thinned(count: int) -> npt.NDArray[np.intp]:
-    """Return the indices of the rows that a chart shows of this many, with the last."""
-    stride = max(1, math.ceil(count / _CHART_ROWS))
+def thinned(count: int, most: int = _CHART_ROWS) -> npt.NDArray[np.intp]:
+    """Return the indices of the rows that a chart shows of this many, at most so many and the last."""
+    stride = max(1, math.ceil(count / most))
     return np.unique(np.append(np.arange(0, count, stride), count - 1))
 
 

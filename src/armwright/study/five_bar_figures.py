@@ -10,7 +10,7 @@ from armwright.clearance.ideal import tip_of
 from armwright.clearance.paths import Path, PickAndPlace, named_path
 from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import Simulation, simulate
-from armwright.report.clearance_figures import lines_of_spectrum, marked_curves, paths, surface
+from armwright.report.clearance_figures import lines_of_spectrum, paths, surface
 from armwright.report.clearance_run_figures import clearance_run_figures
 from armwright.report.figures import curves
 from armwright.study import five_bar_clearance as study
@@ -39,21 +39,23 @@ def _curves() -> dict[str, str | bytes]:
     """Draw figures 4.10 to 4.13: error curves of paths along y and x, and their spectra."""
     files: dict[str, str | bytes] = {}
     y = {name: _half(name) for name in ("y1", "y3")}
-    files["figure4.10.svg"] = marked_curves(
+    files["figure4.10.svg"] = curves(
         "Figure 4.10: error curves along y, and the straight part that is fitted",
         y["y1"].time,
         {name: run.distance * 1e3 for name, run in y.items()},
-        labels=(_TIME, _ERROR),
+        x_label=_TIME,
+        y_label=_ERROR,
         spans=(WINDOW,),
         fits={f"fit of {name}": _fit(run) for name, run in y.items()},
     )
     x = {name: _half(name) for name in ("x2", "x5")}
     first = x["x2"]
-    files["figure4.11.svg"] = marked_curves(
+    files["figure4.11.svg"] = curves(
         "Figure 4.11: error curves along x",
         first.time,
         {name: run.distance * 1e3 for name, run in x.items()},
-        labels=(_TIME, _ERROR),
+        x_label=_TIME,
+        y_label=_ERROR,
         spans=[tuple(first.scenario.path.knots[1:3])],
     )
     spectra = {name: spectrum(run.distance) * 1e3 for name, run in x.items()}
@@ -96,11 +98,12 @@ def _arm_a() -> dict[str, str | bytes]:
             "speed of centres, as the thesis": study.run_of("A", path, study.SETTINGS),
             "speed of surfaces": study.run_of("A", path, study.SURFACE),
         }
-        files[f"figure5.{number:02d}.svg"] = marked_curves(
+        files[f"figure5.{number:02d}.svg"] = curves(
             f"Figure 5.{number}: error of arm A on path {path}",
             next(iter(both.values())).time,
             {name: run.distance * 1e3 for name, run in both.items()},
-            labels=(_TIME, _ERROR),
+            x_label=_TIME,
+            y_label=_ERROR,
             spans=(WINDOW,),
         )
     return files
