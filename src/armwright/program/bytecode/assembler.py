@@ -110,13 +110,6 @@ def assemble(text: str, name: str = "code") -> Code:
     return _Reader(name, text).code()
 
 
-@attrs.define
-class _Procedure:
-    start: int
-    parameters: list[str] = attrs.field(factory=list)
-    types: dict[str, VariableType] = attrs.field(factory=dict)
-
-
 class _Reader:
     """One pass over the lines."""
 
@@ -128,12 +121,18 @@ class _Reader:
         self._standard = Standard.RLO_2
         self._spelling: dict[str, str] = {}
         self._types: dict[str, VariableType] = {}
-        self._procedures: dict[str, _Procedure] = {}
+        self._procedures: dict[str, ProcedureCode] = {}
+        # Those of the last procedure.
+        self._own_types: dict[str, VariableType] = {}
         self._constants: list[tuple[float, ...] | float] = []
-        self._steps: list[tuple[int, Op, tuple[Operand, ...], tuple[int, int, int], bool]] = []
+        self._instructions: list[Instruction] = []
+        # Of each instruction the line in the file.
+        self._numbers: list[int] = []
+        self._text = Source("", "")
 
     def code(self) -> Code:
-        body, source = self._split()
+        body, text = self._split()
+        self._text = Source("", text)
         words: Mapping[str, Callable[[str], None]] = {
             "program": self._read_program,
             "units": self._read_units,
@@ -162,9 +161,9 @@ class _Reader:
             else:
                 self._fail(f"unknown word {word!r}", closest(word, [*words, "code"]))
         self._number = len(body) + 1
-        if not self._steps:
+        if not self._instructions:
             self._fail("expected at least one instruction")
-        return self._whole(source)
+        return self._verified()
 
     def _split(self) -> tuple[list[str], str]:
         """Return the lines in front of the source, and the source."""
@@ -211,16 +210,17 @@ class _Reader:
         name, _, start = rest.partition(" ")
         if not re.fullmatch(r"@[0-9]{1,9}", start):
             self._fail("expected the first instruction of the procedure, such as @0012")
-        self._procedures[self._name(name)] = _Procedure(int(start[1:]))
+        self._own_types = {}
+        self._procedures[self._name(name)] = ProcedureCode(start=int(start[1:]), parameters=(), types=self._own_types)
 
     def _read_own(self, rest: str) -> None:
         if not self._procedures:
             self._fail(f"expected a procedure before the {self._word}")
-        procedure = self._procedures[next(reversed(self._procedures))]
         name, _, kind = rest.partition(" ")
-        procedure.types[self._name(name)] = self._type(kind)
+        self._own_types[self._name(name)] = self._type(kind)
         if self._word == "parameter":
-            procedure.parameters.append(self._name(name))
+            procedure, last = self._procedures.popitem()
+            self._procedures[procedure] = attrs.evolve(last, parameters=(*last.parameters, self._name(name)))
 
     def _read_constant(self, rest: str) -> None:
         name, *numbers = rest.split() or [""]
@@ -233,8 +233,8 @@ class _Reader:
         match = _ROW.fullmatch(line)
         if match is None:
             self._fail("expected an instruction: its number, its location, the operation and the operands")
-        if int(match["at"][:9]) != len(self._steps):
-            self._fail(f"expected instruction {len(self._steps):04d}")
+        if int(match["at"][:9]) != len(self._instructions):
+            self._fail(f"expected instruction {len(self._instructions):04d}")
         span = _SPAN.fullmatch(match["span"])
         if span is None:
             self._fail("expected a location such as 12:5+20")
@@ -246,8 +246,21 @@ class _Reader:
         while (found := _OPERAND.search(rest)) and not rest[: found.start()].count(";"):
             operands.append(self._operand(found[0]))
             rest = rest[found.end() :]
-        numbers = (int(span["line"][:9]), int(span["column"][:9]), int(span["length"][:9]))
-        self._steps.append((self._number, Op[name], tuple(operands), numbers, bool(span["begins"])))
+        self._numbers.append(self._number)
+        self._instructions.append(
+            Instruction(op=Op[name], operands=tuple(operands), span=self._span(span), begins=bool(span["begins"]))
+        )
+
+    def _span(self, match: re.Match[str]) -> Span:
+        """Return the part of the program that a location such as 12:5+20 stands for."""
+        line, column, length = (int(match[part][:9]) for part in ("line", "column", "length"))
+        text = self._text
+        if not 1 <= line <= len(text.line_starts):
+            self._fail(f"the program text has no line {line}")
+        start = text.line_starts[line - 1] + column - 1
+        if column < 1 or start + length > len(text.text):
+            self._fail(f"the program text has fewer than {length} characters from {line}:{column} on")
+        return Span(start, start + length)
 
     def _operand(self, word: str) -> Operand:
         if _STRING.fullmatch(word):
@@ -262,38 +275,24 @@ class _Reader:
             return word.upper()
         return self._float(word)
 
-    # ---- whole and sound -------------------------------------------------------------------------------------------
+    # ---- at the end ------------------------------------------------------------------------------------------------
 
-    def _whole(self, text: str) -> Code:
-        source = Source(self._program, text)
-        instructions = []
-        for number, op, operands, (line, column, length), begins in self._steps:
-            self._number = number
-            if not 1 <= line <= len(source.line_starts):
-                self._fail(f"the program text has no line {line}")
-            start = source.line_starts[line - 1] + column - 1
-            if column < 1 or start + length > len(text):
-                self._fail(f"the program text has fewer than {length} characters from {line}:{column} on")
-            instructions.append(Instruction(op=op, operands=operands, span=Span(start, start + length), begins=begins))
-        procedures = {
-            name: ProcedureCode(start=procedure.start, parameters=tuple(procedure.parameters), types=procedure.types)
-            for name, procedure in self._procedures.items()
-        }
+    def _verified(self) -> Code:
+        """Return what has been read, once it is known that it can be interpreted."""
         code = Code(
-            instructions=tuple(instructions),
+            instructions=tuple(self._instructions),
             constants=tuple(self._constants),
             types=self._types,
-            procedures=procedures,
+            procedures=self._procedures,
             units=self._units,
             spelling=self._spelling,
             standard=self._standard,
-            source=source,
+            source=Source(self._program, self._text.text),
         )
-        numbers = [number for number, *_ in self._steps]
         try:
             verify(code)
         except CodeError as error:
-            self._number = numbers[error.instruction]
+            self._number = self._numbers[error.instruction]
             self._fail(error.fault)
         return code
 
