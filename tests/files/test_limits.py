@@ -191,7 +191,7 @@ def test_what_a_program_imports(strange: tuple[str, str], tmp_path: Path) -> Non
 
     assert f"expected a file, got {kind}" in render(compiled.diagnostics, compiled.source)
     assert f"expected a file, got {kind}" in refused(lambda: Cells().imported(tmp_path, path))
-    assert f"expected a file, got {kind}" in Cells().around(tmp_path, "", Path(path)).problem
+    assert f"expected a file, got {kind}" in refused(lambda: Cells().around(tmp_path, "", Path(path)))
 
 
 def test_the_model_of_an_arm(strange: tuple[str, str], tmp_path: Path) -> None:

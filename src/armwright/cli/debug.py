@@ -87,7 +87,7 @@ def load(launch: "Launch") -> "Loaded":
             raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
         return Loaded(code=assemble(read_program(launch.program), str(launch.program)), cell=cell, is_listed=True)
     if cell is None:
-        nearby = Cells().around(launch.program.parent, read_program(launch.program), None).file
+        nearby = Cells().around(launch.program.parent, read_program(launch.program), None)
         cell = None if nearby is None else nearby.cell
     compiled = compile_program(launch.program, cell, strict=launch.strict, std=launch.std)
     if compiled.code is None:

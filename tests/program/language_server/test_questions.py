@@ -13,8 +13,7 @@ from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.text_edits import Edit, apply_edits
 from armwright.program.language.words import VOCABULARIES, Standard
-from armwright.program.language_server.analyse import Settings, analyse
-from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.analysis import Analysis, Settings, analyse
 from armwright.program.language_server.cell_lookup import Cells
 from armwright.program.language_server.code_actions import all_fixes, quickfixes
 from armwright.program.language_server.completions import completions
@@ -229,8 +228,8 @@ SCOPES = (
     [
         ("c : SCALAR", "b", "uses the 'b' of the program"),
         ("b : SCALAR", "c", "procedure `p` has a 'c' of its own"),
-        ("a, b", "p", "the program has a name 'p' already"),
-        ("p (a :", "b", "the program has a name 'b' already"),
+        ("a, b", "p", "the program already has a name 'p'"),
+        ("p (a :", "b", "the program already has a name 'b'"),
         ("p (a :", "XYZ", "'XYZ' is a function"),
         ("a, b", "World", "'World' is a frame that is predeclared"),
         ("c : SCALAR", "Station", "'Station' is a frame that is predeclared"),

@@ -1,23 +1,42 @@
-"""All that is known of one version of a program, worked out once; and what stands around a place of a text."""
+"""All that is known of one version of a program, worked out once; and what stands around a position in a text."""
 
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 
 import attrs
 
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
-from armwright.program.api import Compilation
+from armwright.errors import FileFormatError
+from armwright.program.api import Compilation, compile as compile_program, with_imports
 from armwright.program.flow_analysis.side_effects import every
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
+from armwright.program.language_server.cell_lookup import Cells
 from armwright.program.language_server.symbol_index import Occurrence, ScopeExtents, occurrences, scope_extents
+from armwright.program.semantics.cell_symbols import Imported
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
 from armwright.program.syntax.line_numbers import without_numbers
+
+
+@attrs.frozen(kw_only=True)
+class Settings:
+    """The settings with which programs are compiled.
+
+    Attributes:
+        cell: the cell file; None to search for one beside the program.
+        std: the standard of the language.
+        strict: whether an AFFIX that is only implied is an error.
+    """
+
+    cell: Path | None = None
+    std: Standard = Standard.RLO_2
+    strict: bool = False
 
 
 @attrs.frozen(kw_only=True, slots=False, eq=False)
@@ -112,6 +131,45 @@ class Analysis:
         if occurrence.key in symbols.procedures:
             return symbols.procedures[occurrence.key].node.name
         return symbols.declared.get(occurrence.key)
+
+
+def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: Cells, settings: Settings) -> Analysis:
+    """Analyse a program with its cell and its imports; intermediate code is not generated.
+
+    Args:
+        name: the name of the program, as messages show it.
+        codec: of the text of the program.
+        folder: the folder of the program; None for a text without a file.
+        cells: the cells read so far.
+        settings: cell, standard and strictness.
+    """
+    file, problem = None, ""
+    try:
+        file = cells.around(folder, codec.text, settings.cell)
+    except FileFormatError as error:
+        problem = str(error)
+    imports: list[Path] = []
+
+    def read_import(path: str) -> Imported:
+        assert folder is not None  # noqa: S101 - imports are read only with a folder
+        imported = cells.imported(folder, path)
+        imports.append(folder / path)
+        return imported
+
+    compiled = compile_program(
+        Source(name, codec.text),
+        None if file is None else file.cell,
+        strict=settings.strict,
+        std=settings.std,
+        read_import=None if folder is None else read_import,
+        generate_code=False,
+    )
+    files = [*map(cells.read, imports), *([] if file is None else [file])]
+    lines = {name: (file.path.absolute().as_uri(), line) for file in files for name, line in file.lines.items()}
+    # Where nothing has arms, an imported file still tells where its frames are.
+    imported = (imported.cell for imported in compiled.imports)
+    cell = compiled.cell or with_imports(next(filter(None, imported), None), compiled.imports)
+    return Analysis(compiled=compiled, codec=codec, cell=cell, files=lines, problem=problem)
 
 
 @attrs.frozen(kw_only=True)

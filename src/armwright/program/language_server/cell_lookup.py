@@ -36,19 +36,6 @@ class CellFile:
     lines: Mapping[str, int]
 
 
-@attrs.frozen(kw_only=True)
-class Surroundings:
-    """What a program acts on, as far as it can be found.
-
-    Attributes:
-        file: the cell; None where there is none.
-        problem: why the cell that a setting names could not be read; empty if it could.
-    """
-
-    file: CellFile | None = None
-    problem: str = ""
-
-
 class Cells:
     """Cell files that have been read; one that has changed since is read again."""
 
@@ -79,28 +66,29 @@ class Cells:
         cell = self.read(folder / name).cell
         return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
-    def around(self, folder: Path | None, text: str, setting: Path | None) -> Surroundings:
-        """Return what a program acts on.
+    def around(self, folder: Path | None, text: str, setting: Path | None) -> CellFile | None:
+        """Return the cell that a program acts on; None where there is none.
 
         Args:
-            folder: where it lies; None where that is nowhere.
+            folder: where the program lies; None where that is nowhere.
             text: the program.
             setting: the cell file that a setting names.
+
+        Raises:
+            FileFormatError: the cell of the setting cannot be read, or has no arms.
         """
         if setting is not None:
-            try:
-                file = self.read(setting)
-            except FileFormatError as error:
-                return Surroundings(problem=str(error))
-            return Surroundings(file=file) if file.cell.arms else Surroundings(problem=f"{setting}: it has no arms")
+            file = self.read(setting)
+            if not file.cell.arms:
+                raise FileFormatError(setting, None, "", "it has no arms")
+            return file
         if folder is None:
-            return Surroundings()
-        for name in dict.fromkeys(_IMPORT.findall(text)):
-            imported = self._with_arms(folder / name)
-            if imported is not None:
-                return Surroundings(file=imported)
-        beside = [file for file in map(self._with_arms, _candidates(folder)) if file is not None]
-        return Surroundings(file=beside[0] if len(beside) == 1 else None)
+            return None
+        imported = (self._with_arms(folder / name) for name in dict.fromkeys(_IMPORT.findall(text)))
+        if (first := next(filter(None, imported), None)) is not None:
+            return first
+        beside = list(filter(None, map(self._with_arms, _candidates(folder))))
+        return beside[0] if len(beside) == 1 else None
 
     def _with_arms(self, path: Path) -> CellFile | None:
         try:

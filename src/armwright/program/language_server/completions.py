@@ -14,7 +14,7 @@ from armwright.program.language.units import DECLARABLE
 from armwright.program.language.words import CLOSING, SENSORS, VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Analysis, Before, before
 from armwright.program.language_server.hover import signature
-from armwright.program.language_server.keyword_docs import explained
+from armwright.program.language_server.keyword_docs import WORDS, Word, explained
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import open_call
 from armwright.program.semantics.builtins import AXES, FUNCTIONS
@@ -242,14 +242,13 @@ class _Maker:
         """Give words of the language and, where a statement starts, statements that begin with them."""
         for word in words:
             last = word.rpartition(" ")[2]
-            meaning = explained(last, "MOVE")
-            form, text = (meaning.form, meaning.text) if meaning else ("", "")
+            meaning = explained(last, "MOVE") or Word("", "")
             written = _GOES_ON.get(last, "")
             written = (f"WITH {written}" if word != last else written) if written else ""
             kind = Kind.TypeParameter if word in _TYPES else Kind.Keyword
-            yield self._item(self._cased(word), kind, self._cased(written or word), form, text)
+            yield self._item(self._cased(word), kind, self._cased(written or word), meaning.form, meaning.text)
             for label, snippet in _SNIPPETS.get(word, ()) if starts and self._snippets else ():
-                yield self._item(self._cased(label), Kind.Snippet, self._cased(snippet), form, text)
+                yield self._item(self._cased(label), Kind.Snippet, self._cased(snippet), meaning.form, meaning.text)
 
     def names(self, kinds: frozenset[VariableKind], *, starts: bool = False) -> Iterator[CompletionItem]:
         """Give the variables that can be seen and are of the right kind."""
@@ -263,7 +262,7 @@ class _Maker:
                 continue
             declared = self._scope.declared(key)
             name = declared.text if declared else self._cased(key)
-            where = "predeclared" if declared is None and key in PREDECLARED else "imported" if declared is None else ""
+            where = "" if declared else "predeclared" if key in PREDECLARED else "imported"
             where = f"of {local.node.name.text}" if local is not None and key in own else where
             text = f"{name}[${{1:1}}]" if kind.sizes else name
             item, detail = _KINDS.get(kind.kind, Kind.Variable), f"{kind} {where}".rstrip()
@@ -294,9 +293,8 @@ class _Maker:
     def functions(self, operand: _Operand) -> Iterator[CompletionItem]:
         """Give functions of the language, which RLO-83 has none of."""
         for name in operand.functions if self._analysis.compiled.standard is Standard.RLO_2 else ():
-            meaning = explained(name)
-            form, text = (meaning.form, meaning.text) if meaning else ("", "")
-            yield self._item(self._cased(name), Kind.Function, f"{self._cased(name)}($1)", form, text)
+            cased, meaning = self._cased(name), WORDS[name]
+            yield self._item(cased, Kind.Function, f"{cased}($1)", meaning.form, meaning.text)
 
     def procedures(self) -> Iterator[CompletionItem]:
         """Give the procedures of the program."""

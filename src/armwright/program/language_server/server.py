@@ -18,8 +18,7 @@ from armwright.errors import InvalidValueError
 from armwright.files.message_stream import MessageStream
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.words import Standard
-from armwright.program.language_server.analyse import Settings, analyse
-from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.analysis import Analysis, Settings, analyse
 from armwright.program.language_server.cell_lookup import Cells
 from armwright.program.language_server.diagnostics import diagnostics
 from armwright.program.language_server.documents import Document
