@@ -1,12 +1,13 @@
 """Runge-Kutta-Gill, SciPy's methods, and the search for events between steps."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
 
 from armwright.errors import InvalidValueError, UnknownNameError
-from armwright.simulation.integrators import Adaptive, Gill, Stepper, first_crossing, gill
+from armwright.simulation.integrators import Adaptive, Gill, Step, first_crossing, gill
 
 SWING = np.array((1.0, 0.0))
 
@@ -19,11 +20,10 @@ def _forced(t: float, y: np.ndarray) -> np.ndarray:
     return np.array((y[0] * math.cos(t),))
 
 
-def _to_the_end(stepper: Stepper, end: float) -> np.ndarray:
-    while (step := stepper.step()) is not None:
-        if step.end >= end:
-            return step.state
-    raise AssertionError("the stepper gave up")
+def _to_the_end(steps: Iterable[Step], end: float) -> np.ndarray:
+    *_, last = steps
+    assert last.end == end
+    return last.state
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def _to_the_end(stepper: Stepper, end: float) -> np.ndarray:
 def test_gill_is_of_order_four(slope: object, start: np.ndarray, exact: tuple[float, ...]) -> None:
     """Half the step leaves a sixteenth of the error, for equations with and without the time in them."""
     errors = [
-        np.abs(_to_the_end(Gill(length=length).begin(slope, 0.0, start, 2.0), 2.0) - exact).max()
+        np.abs(_to_the_end(Gill(length=length).steps(slope, 0.0, start, 2.0), 2.0) - exact).max()
         for length in (0.1, 0.05, 0.025)
     ]
 
@@ -50,9 +50,7 @@ def test_gill_is_exact_for_cubics() -> None:
 
 def test_gill_steps_end_on_the_grid() -> None:
     """From 0.25 in steps of 0.1 the ends are 0.3, 0.4 and, cut short, 0.45."""
-    stepper = Gill(length=0.1).begin(_oscillator, 0.25, SWING, 0.45)
-
-    ends = [stepper.step().end for _ in range(3)]
+    ends = [step.end for step in Gill(length=0.1).steps(_oscillator, 0.25, SWING, 0.45)]
 
     np.testing.assert_allclose(ends, (0.3, 0.4, 0.45), rtol=1e-15)
 
@@ -75,12 +73,12 @@ def test_settings_that_scipy_has_not() -> None:
 @pytest.mark.parametrize("method", ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"])
 def test_scipy_methods(method: str) -> None:
     """Every method of SciPy's swings the pendulum to where it belongs, and knows what lies between its steps."""
-    stepper = Adaptive(method=method, rtol=1e-8, atol=1e-10).begin(_oscillator, 0.0, SWING, 0.5)
+    steps = Adaptive(method=method, rtol=1e-8, atol=1e-10).steps(_oscillator, 0.0, SWING, 0.5)
 
-    done = _to_the_end(stepper, 0.5)
+    done = _to_the_end(steps, 0.5)
 
     np.testing.assert_allclose(done, (math.cos(0.5), -math.sin(0.5)), atol=1e-6)
-    first = Adaptive(method=method, rtol=1e-8, atol=1e-10).begin(_oscillator, 0.0, SWING, 0.5).step()
+    first = next(Adaptive(method=method, rtol=1e-8, atol=1e-10).steps(_oscillator, 0.0, SWING, 0.5))
     middle = (first.start + first.end) / 2
     np.testing.assert_allclose(first.between(middle), (math.cos(middle), -math.sin(middle)), atol=1e-6)
 

@@ -1,13 +1,12 @@
 """Integrators of ordinary differential equations, one step at a time, with what lies between.
 
-An integrator gives a stepper, a stepper gives steps; whoever asks for them watches for events between the ends of a
-step and begins anew behind each.
+Whoever asks for the steps watches for events between their ends and begins anew behind each.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple, Protocol, TypeAlias, get_args
 
 import attrs
@@ -41,18 +40,11 @@ class Step(NamedTuple):
     between: Callable[[float], Array]
 
 
-class Stepper(Protocol):
-    """Goes from a state to an end, step by step."""
-
-    def step(self) -> Step | None:
-        """Make the next step; None when it cannot be made as precise as asked."""
-
-
 class Integrator(Protocol):
     """A method of integration."""
 
-    def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
-        """Return a stepper from the state y at time t that stops at the time ``end``."""
+    def steps(self, slope: Slope, t: float, y: Array, end: float) -> Iterator[Step]:
+        """Give the steps from the state y at time t up to ``end``, or to where none is as precise as asked."""
 
 
 @attrs.frozen(kw_only=True)
@@ -73,28 +65,21 @@ class Gill:
         if not 0 < number(self.length, "Gill: length") < math.inf:
             raise InvalidValueError(f"Gill: expected a step length above 0 s, got {self.length}")
 
-    def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
-        """Return a stepper from the state y at time t that stops at the time ``end``."""
-        return _GillStepper(slope, t, y, end, self.length)
+    def steps(self, slope: Slope, t: float, y: Array, end: float) -> Iterator[Step]:
+        """Give the steps from the state y at time t up to ``end``."""
+        while t < end:
+            grid = self.length * (math.floor(t / self.length + _CRUMB) + 1)
+            stop = end if grid > end - _CRUMB * self.length else grid
+            between = _gill_from(slope, t, y)
+            step = Step(start=t, end=stop, state=between(stop), between=between)
+            yield step
+            t, y = stop, step.state
 
 
-class _GillStepper:
-    """Steps of Runge-Kutta-Gill."""
-
-    def __init__(self, slope: Slope, t: float, y: Array, end: float, length: float) -> None:
-        self._slope, self._t, self._y, self._end, self._length = slope, t, y, end, length
-
-    def step(self) -> Step:
-        start, y, slope = self._t, self._y, self._slope
-        grid = self._length * (math.floor(start / self._length + _CRUMB) + 1)
-        end = self._end if grid > self._end - _CRUMB * self._length else grid
-        first = slope(start, y)
-
-        def between(t: float) -> Array:
-            return gill(slope, start, y, t - start, first)
-
-        self._t, self._y = end, between(end)
-        return Step(start=start, end=end, state=self._y, between=between)
+def _gill_from(slope: Slope, start: float, y: Array) -> Callable[[float], Array]:
+    """Return the state at any time after a start by one step of Runge-Kutta-Gill."""
+    first = slope(start, y)
+    return lambda t: gill(slope, start, y, t - start, first)
 
 
 def gill(slope: Slope, t: float, y: Array, h: float, first: Array) -> Array:
@@ -143,40 +128,32 @@ class Adaptive:
             if not number(getattr(self, name), f"Adaptive: {name}") > 0:
                 raise InvalidValueError(f"Adaptive: {name} must be above 0, got {getattr(self, name)}")
 
-    def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
-        """Return a stepper from the state y at time t that stops at the time ``end``."""
-        return _AdaptiveStepper(self, slope, t, y, end)
-
-
-class _AdaptiveStepper:
-    """Steps of SciPy."""
-
-    def __init__(self, how: Adaptive, slope: Slope, t: float, y: Array, end: float) -> None:
+    def steps(self, slope: Slope, t: float, y: Array, end: float) -> Iterator[Step]:
+        """Give the steps from the state y at time t up to ``end``, or to where none is as precise as asked."""
         from scipy import integrate  # noqa: PLC0415 - SciPy takes longer to import than all else
 
-        self._lost = False
+        lost = False
 
         def watched(t: float, y: Array) -> Array:
+            nonlocal lost
             derivative = slope(t, y)
-            self._lost |= not np.isfinite(derivative).all()
+            lost |= not np.isfinite(derivative).all()
             return derivative
 
-        solver = getattr(integrate, how.method)
-        self._solver = solver(watched, t, y, end, rtol=how.rtol, atol=how.atol, max_step=how.longest)
-
-    def step(self) -> Step | None:
-        solver = self._solver
-        start = float(solver.t)
-        try:
-            failed = solver.step() is not None or solver.status == "failed"
-        except ValueError:
-            # The implicit methods stumble over a slope that is no number.
-            if not self._lost:
-                raise
-            failed = True
-        if failed:
-            return None
-        return Step(start=start, end=float(solver.t), state=solver.y.copy(), between=solver.dense_output())
+        method = getattr(integrate, self.method)
+        solver = method(watched, t, y, end, rtol=self.rtol, atol=self.atol, max_step=self.longest)
+        while solver.status == "running":
+            start = float(solver.t)
+            try:
+                message = solver.step()
+            except ValueError:
+                # The implicit methods stumble over a slope that is no number.
+                if not lost:
+                    raise
+                return
+            if message is not None or solver.status == "failed":
+                return
+            yield Step(start=start, end=float(solver.t), state=solver.y.copy(), between=solver.dense_output())
 
 
 def first_crossing(value: Callable[[float], float], start: float, end: float) -> float:

@@ -110,7 +110,7 @@ def _check_kinds(controller: Controller | None, integrator: Integrator, brakes: 
     """Refuse what cannot steer, integrate or hold."""
     if controller is not None and not callable(controller):
         raise KindError(f"controller: expected a function of t, q and qd that returns efforts, got {shown(controller)}")
-    if isinstance(integrator, type) or not callable(getattr(integrator, "begin", None)):
+    if isinstance(integrator, type) or not callable(getattr(integrator, "steps", None)):
         raise KindError(f"integrator: expected one such as Gill() or Adaptive(), got {shown(integrator)}")
     if not isinstance(brakes, Sequence) or not all(isinstance(brake, Brake) for brake in brakes):
         raise KindError(f"brakes: expected a list of Brake, got {shown(brakes)}")
@@ -214,11 +214,7 @@ class _Run:
 
     def _phase(self, t: float, y: Array, phase: Phase, end: float) -> tuple[float, Array] | Status:
         """Integrate one phase to its end or to the first event."""
-        stepper = self._integrator.begin(self._slope(phase), t, y, end)
-        while t < end:
-            step = stepper.step()
-            if step is None:
-                return Status.IMPRECISE
+        for step in self._integrator.steps(self._slope(phase), t, y, end):
             if not np.abs(step.state[: 2 * self._plant.arm.n]).max() < _LOST or not np.isfinite(step.state).all():
                 return Status.DIVERGED
             if self._watch(phase, step.end, step.state) < 0:
@@ -227,7 +223,7 @@ class _Run:
                 return crossing, step.between(crossing)
             self._record(step, y, step.end, phase)
             t, y = step.end, step.state
-        return t, y
+        return (t, y) if t >= end else Status.IMPRECISE
 
     def _slope(self, phase: Phase) -> Slope:
         plant, n = self._plant, self._plant.arm.n
