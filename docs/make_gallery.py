@@ -24,8 +24,9 @@ OUT = ROOT / "out" / "gallery"
 HEAD = """\
 # Gallery
 
-What commands write, as they write it. The folder after `-o` holds the picture and more: figures, tables, and where \
-there is a page, `report.html`, which opens from the disk. `make gallery` makes this page.
+Figures and pages that the commands write, unchanged. The folder after `-o` contains the picture and further files: \
+figures, tables and, for some commands, the page `report.html`, which needs no network. `make gallery` generates this \
+page.
 """
 # Of a page: how much of it is shown [px], and how many colours are enough.
 WINDOW = {"width": 1280, "height": 860}
@@ -39,14 +40,14 @@ class Exhibit:
     """One picture and what makes it.
 
     Attributes:
-        name: of the picture, and of the folder that the command writes.
-        title: heading.
-        says: one sentence or two on what is to be seen.
-        command: behind ``armwright``; ``-o`` is added. Empty where Python lines make the picture.
+        name: name of the picture and of the folder that the command writes.
+        title: heading on the page.
+        says: one or two sentences that describe the picture.
+        command: arguments of ``armwright`` without ``-o``; empty if Python lines write the picture.
         python: lines that write the picture into the folder in which they run; with a command, what it needs.
         shown: the file among the results; ``report.html`` is photographed.
-        moment: of a page with a clock, when it is photographed, as a part of its time.
-        alt: what the picture shows, in words.
+        moment: time of the screenshot of an animated page, as a fraction of its duration.
+        alt: description of the picture for readers who cannot see it.
     """
 
     name: str
@@ -92,17 +93,17 @@ EXHIBITS = (
     Exhibit(
         name="gearbox",
         title="A program in the robot language",
-        says="A PUMA finds a shaft with its camera and brings it into a gearbox. The page shows the arm moving, the "
-        "line of the program that runs, every stage, and position, speed, acceleration and effort of all joints "
-        "against their limits.",
-        alt="The page of a run: an arm above a table with a shaft in its hand, the program beside it, charts below",
+        says="A PUMA locates a shaft with its camera and inserts it into a gearbox. The page shows the animated arm, "
+        "the current line of the program, every motion stage, and position, velocity, acceleration and effort of all "
+        "joints with their limits.",
+        alt="The page of a run: an arm above a table with a shaft in its gripper, the program beside it, charts below",
         command="run examples/gearbox.rlo --cell examples/puma_cell.toml",
         moment=0.62,
     ),
     Exhibit(
         name="hand-over",
         title="Two arms on one clock",
-        says="Two Stanford arms hand a part over: two processes of one program, which wait for each other.",
+        says="Two Stanford arms hand over a part. Two processes of one program control them and wait for each other.",
         alt="The page of a run with two arms face to face, and the program with two branches",
         command="run examples/hand_over.rlo --cell examples/two_arms.toml",
         moment=0.45,
@@ -110,61 +111,60 @@ EXHIBITS = (
     Exhibit(
         name="joint-move",
         title="A joint move",
-        says="Every joint moves linearly from configuration to configuration, blended at the middle pose; the tool "
-        "swings out.",
-        alt="A film of a PUMA that moves through three poses, with the path of its hand",
+        says="Every joint moves linearly from configuration to configuration, with a blend at the middle pose; the "
+        "tool deviates from the straight line.",
+        alt="A film of a PUMA that moves through three poses, with the path of its tool",
         command="move joint puma560-seed examples/puma_poses.toml",
         shown="move.gif",
     ),
     Exhibit(
         name="round-the-post",
         title="A Cartesian move",
-        says="The tool moves on straight lines from pose to pose and points at a post all the time; the path "
-        "comes with a bound of the deviation of the tool between two samples.",
+        says="The tool moves along straight lines from pose to pose and always points at a post. The certificate of "
+        "the motion bounds the path deviation of the tool, also between samples.",
         alt="A path in space of straight segments, blended at two poses, and approach vectors that point to one line",
         command="move cartesian puma560 examples/round_the_post.toml",
         shown="path.svg",
     ),
     Exhibit(
         name="fastest",
-        title="The fastest run along a path",
-        says="At every moment some joint is at its limit of speed, acceleration or effort; the path stays the same.",
-        alt="Curves of the part of the limits that is used over time: at every moment one of two accelerations is at 1",
+        title="Time-optimal motion along a path",
+        says="At every time one joint is at its limit of velocity, acceleration or effort. The path is unchanged.",
+        alt="Curves of the used share of the limits over time: at every time one of two accelerations is at 1",
         python=FASTEST,
         shown="fastest.svg",
     ),
     Exhibit(
         name="stanford-torque",
-        title="The torques of 1983",
+        title="Joint torques of the Stanford arm",
         says="Figure 7 of report TR-83-008, computed again: the effort of joint 2 in a fast move, by Newton-Euler, by "
-        "Bejczy's model, and with the largest load. The study prints a verdict on every constant of the report.",
+        "Bejczy's model, and with the largest load. The study assesses every constant that the report prints.",
         alt="Three curves of the effort of joint 2 over one second",
         command="study stanford-torque",
         shown="figure07.svg",
     ),
     Exhibit(
         name="puma-moves",
-        title="A move that nobody asked the joints about",
-        says="Figure 23 of a project on the PUMA, computed again: the tool moves from A by B to C on straight "
-        "lines. The "
-        "study then asks what the joints have to do, and finds that they cannot.",
+        title="A Cartesian move beyond the joint limits",
+        says="Figure 23 of a project on the PUMA, computed again: the tool moves from A by B to C along straight "
+        "lines. The study then computes the joint motion, and finds that it exceeds the joint limits.",
         alt="Position, speed and acceleration of the tool over a second, and its path in space",
         command="study puma-moves",
         shown="figure23.svg",
     ),
     Exhibit(
         name="rattling",
-        title="Play in three pins",
-        says="Journals half a millimetre smaller than their bearings: they lie at the walls while the arm speeds up "
-        "and rattle when it slows down. The page shows the linkage and its bearings moving, errors, forces and the "
-        "energy account.",
+        title="Clearance in three pins",
+        says="The radii of the journals are half a millimetre smaller than those of their bearings. The journals stay "
+        "in contact while the arm accelerates, and bounce when it decelerates. The page animates the linkage and its "
+        "bearings, and shows errors, forces and the energy balance.",
         alt="The page of a simulated five-bar: the linkage, its three bearings with the paths of the journals, charts",
         command="clearance simulate five-bar --path y1",
         moment=0.9,
     ),
     Exhibit(
         name="corrected",
-        title="Moving right in spite of play",
+        title="Compensation of joint clearance",
         says="The commanded path of a pick-and-place move corrected, so that the tip reaches its targets.",
         alt="A path with three targets, and the corrected one beside it",
         command="clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483",
@@ -173,47 +173,48 @@ EXHIBITS = (
     Exhibit(
         name="five-bar-study",
         title="729 linkages",
-        says="Figure 4.18 of a thesis on play, computed again from 2187 simulations: what one feature of the error "
-        "curve says of the play in two pins. The study goes on to two arms told apart and a path corrected.",
-        alt="A surface of the intercept over the play of two pins, rising towards both",
+        says="Figure 4.18 of a thesis on joint clearance, computed again from 2187 simulations: one feature of the "
+        "error curve as a function of the clearances of two pins. The study also estimates the clearances of two arms "
+        "and corrects a path.",
+        alt="A surface of the intercept over the clearances of two pins, which increases with both",
         command="study five-bar-clearance",
         shown="figure4.18.svg",
     ),
     Exhibit(
         name="calibration",
-        title="A better arm from measured points",
-        says="Points that a laser tracker would measure of a PUMA: a millimetre of error as drawn, half a millimetre "
-        "with "
-        "its geometry calibrated, and within its repeatability with joint compliance under gravity, which "
-        "held-out points confirm. Errors that are not identifiable from the points are named.",
-        alt="How many of the readings are nearer than a distance: before, calibrated, and with joint compliance",
+        title="Calibration from measured points",
+        says="Simulated laser-tracker measurements of a PUMA: the residuals are about one millimetre with the nominal "
+        "geometry, half a millimetre with the calibrated geometry, and at the level of the repeatability with joint "
+        "compliance under gravity, which held-out points confirm. Unidentifiable errors are listed.",
+        alt="Cumulative share of the readings over the residual: nominal, calibrated, and with joint compliance",
         command="calibrate puma560-seed examples/puma_points.csv --beyond",
         shown="distances.svg",
     ),
     Exhibit(
         name="board",
-        title="An arm calibrated on a board",
-        says="Errors at six positions before, after the fit of a thesis, and after a fit of all identifiable errors.",
+        title="Calibration by a board",
+        says="Position errors at six points: nominal, after the calibration of a thesis, and after a calibration of "
+        "all identifiable errors.",
         alt="Groups of bars at six positions on a logarithmic scale, the last a hundred times lower than the first",
         command="study dh-calibration",
         shown="verification.svg",
     ),
     Exhibit(
         name="iso9283",
-        title="Accuracy by ISO 9283",
-        says="Measured poses and paths in, accuracy and repeatability out, every measure with its number of cycles; "
-        "here the clouds that two of them come from.",
-        alt="A cloud of thirty poses beside the commanded one, seen twice, with the circle of the repeatability",
+        title="Accuracy according to ISO 9283",
+        says="The command computes accuracy and repeatability from measured poses and paths, each characteristic with "
+        "its number of cycles. The figure shows the attained poses of one test.",
+        alt="Thirty attained poses beside the commanded pose, in two projections, with the circle of the repeatability",
         command="iso9283 examples/measured_poses.csv examples/measured_paths.csv",
         shown="01-pose.svg",
     ),
 )
 # Drawn by docs/pictures/make.py for the pages on physics.
 ALSO = {
-    "pictures/postures.svg": "[All joint configurations of a PUMA for one pose](physics/kinematics.md)",
-    "pictures/released.svg": "[Where the energy of a released arm goes](physics/dynamics.md)",
+    "pictures/postures.svg": "[All IK solutions of a PUMA for one pose](physics/kinematics.md)",
+    "pictures/released.svg": "[Energy balance of the free response of an arm](physics/dynamics.md)",
     "pictures/two_moves.svg": "[A joint move and a Cartesian move](physics/motion.md)",
-    "pictures/rattling.svg": "[Journals in their bearings](physics/clearance.md)",
+    "pictures/rattling.svg": "[Journals in bearings with clearance](physics/clearance.md)",
 }
 
 
@@ -318,7 +319,7 @@ def lines() -> Iterator[str]:
         if exhibit.command:
             yield f"    armwright {exhibit.command} -o out/{exhibit.name}\n"
             yield f"<!-- page {exhibit.name} -->\n"
-    yield "## And\n"
+    yield "## Further figures\n"
     for picture, link in ALSO.items():
         yield f"- {link}: [picture]({picture})"
 
