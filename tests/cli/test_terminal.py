@@ -8,6 +8,7 @@ import subprocess
 import sys
 import unicodedata
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -151,7 +152,7 @@ def test_every_character() -> None:
 def test_streams() -> None:
     """What is printed is cleaned, what Rich writes to it has been; both come out in their order."""
     kept = io.BytesIO()
-    stream = CleanStream(kept, encoding="utf-8")
+    stream: Any = CleanStream(io.TextIOWrapper(kept, encoding="utf-8"))
     print("a\x1b[1m", file=stream)
     console(file=stream, highlight=False, force_terminal=True, color_system="standard").print("b\x1b[2m", style="red")
     print("c", file=stream, flush=True)

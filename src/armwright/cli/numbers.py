@@ -20,11 +20,12 @@ def numbers(text: str, count: int, option: str) -> list[float]:
     from armwright.arrays import LARGEST
 
     words = text.replace(",", " ").split()
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        wrong = next(word for word in words if not _is_number(word))
-        raise typer.BadParameter(f"expected {count} numbers, got '{wrong}'", param_hint=option) from None
+    values = []
+    for word in words:
+        try:
+            values.append(float(word))
+        except ValueError:
+            raise typer.BadParameter(f"expected {count} numbers, got '{word}'", param_hint=option) from None
     if len(values) != count:
         raise typer.BadParameter(f"expected {count} finite numbers, got {len(values)}: {text}", param_hint=option)
     for value, word in zip(values, words, strict=True):
@@ -94,11 +95,3 @@ def within(value: float, bounds: tuple[float, float], option: str) -> float:
     if not lower <= value <= upper:
         raise typer.BadParameter(f"expected {lower:g} to {upper:g}, got {value:g}", param_hint=option)
     return value
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

@@ -41,58 +41,49 @@ def _escaped(match: re.Match[str]) -> str:
     return "".join(f"\\u{units[i]:02x}{units[i + 1]:02x}" for i in range(0, len(units), 2))
 
 
-class CleanStream(io.TextIOWrapper):
-    """The output of a command; all text that is written to it is cleaned."""
+class CleanStream:
+    """An output of a command; all text that is written to it is cleaned.
+
+    Attributes:
+        raw: the stream itself.
+    """
+
+    def __init__(self, raw: Any) -> None:
+        """Write to a stream."""
+        self.raw = raw
 
     def write(self, text: str) -> int:
         """Write a text, cleaned."""
-        super().write(cleaned(text))
+        self.raw.write(cleaned(text))
         return len(text)
 
-    def verbatim(self, text: str) -> int:
-        """Write a text as it is."""
-        return super().write(text)
+    def writelines(self, lines: "Iterable[str]") -> None:
+        """Write texts, cleaned."""
+        self.write("".join(lines))
 
     @property
-    def rich_proxied_file(self) -> "_Verbatim":
+    def rich_proxied_file(self) -> Any:
         """The stream for Rich, which adds colours to text that ``console`` has cleaned."""
-        return _Verbatim(self)
-
-
-class CleanProxy:
-    """A wrapper that cleans the text written to a stream which replaces the output, such as one that captures it."""
-
-    def __init__(self, stream: Any) -> None:
-        """Wrap a stream."""
-        self._stream = stream
-
-    def write(self, text: str) -> int:
-        """Write a text, cleaned."""
-        self._stream.write(cleaned(text))
-        return len(text)
-
-    def verbatim(self, text: str) -> int:
-        """Write a text as it is."""
-        self._stream.write(text)
-        return len(text)
-
-    @property
-    def rich_proxied_file(self) -> "_Verbatim":
-        """The stream for Rich, which adds colours to text that ``console`` has cleaned."""
-        return _Verbatim(self)
+        return self.raw
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
+        return getattr(self.raw, name)
 
 
-class _Verbatim:
-    """A clean stream with its method ``verbatim`` as ``write``, for Rich."""
+class _TolerantStream:
+    """The error output of a command; failures to write it are ignored, so that they change no status or results."""
 
-    def __init__(self, stream: CleanStream | CleanProxy) -> None:
+    def __init__(self, stream: Any) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        return self._stream.verbatim(text)
+        with contextlib.suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with contextlib.suppress(OSError):
+            self._stream.flush()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -106,25 +97,6 @@ def bound_widths() -> None:
             del os.environ[name]
 
 
-class ErrorStream(CleanStream):
-    """The error output of a command; failures to write it are ignored, so that they change no status or results."""
-
-    def write(self, text: str) -> int:
-        """Write a text, cleaned."""
-        return self.verbatim(cleaned(text))
-
-    def verbatim(self, text: str) -> int:
-        """Write a text as it is."""
-        with contextlib.suppress(OSError):
-            super().verbatim(text)
-        return len(text)
-
-    def flush(self) -> None:
-        """Flush the buffer."""
-        with contextlib.suppress(OSError):
-            super().flush()
-
-
 def prepare_streams() -> None:
     """Replace standard and error output by clean streams; output to a closed stream is discarded.
 
@@ -132,28 +104,23 @@ def prepare_streams() -> None:
     """
     if sys.stdin is None:
         sys.stdin = Path(os.devnull).open(encoding="utf-8")  # noqa: SIM115 - open until the process ends
-    sys.stdout, sys.stderr = _clean(sys.stdout, CleanStream), _clean(sys.stderr, ErrorStream)
-
-
-def _clean(stream: Any, kind: type[CleanStream]) -> Any:
-    if stream is None:
-        # Otherwise errors would be printed among the results.
-        stream = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - open until the process ends
-    if isinstance(stream, CleanStream | CleanProxy):
-        return stream
-    if stream not in (sys.__stdout__, sys.__stderr__) or not isinstance(stream, io.TextIOWrapper):
-        return CleanProxy(stream)
-    settings = {name: getattr(stream, name) for name in ("encoding", "line_buffering", "write_through")}
-    # A terminal whose encoding has no degree sign gets an escape, not a traceback.
-    return kind(stream.detach(), errors="backslashreplace", **settings)
+    for name in ("stdout", "stderr"):
+        stream: Any = getattr(sys, name)
+        if isinstance(stream, CleanStream):
+            continue
+        if stream is None:
+            # Otherwise errors would be printed among the results.
+            stream = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - open until the process ends
+        if stream in (sys.__stdout__, sys.__stderr__) and isinstance(stream, io.TextIOWrapper):
+            # A terminal whose encoding has no degree sign gets an escape, not a traceback.
+            stream.reconfigure(errors="backslashreplace")
+        setattr(sys, name, CleanStream(_TolerantStream(stream) if name == "stderr" else stream))
 
 
 def print_verbatim(text: str) -> None:
     """Print a text for other programs, such as a formatted program, unchanged; on a terminal it is cleaned."""
-    if isinstance(sys.stdout, CleanStream | CleanProxy) and not sys.stdout.isatty():
-        sys.stdout.verbatim(text)
-    else:
-        print(cleaned(text) if sys.stdout.isatty() else text, end="")
+    stream = sys.stdout.raw if isinstance(sys.stdout, CleanStream) else sys.stdout
+    stream.write(cleaned(text) if stream.isatty() else text)
 
 
 def console(*, stderr: bool = False, **settings: Any) -> "Console":
