@@ -1,12 +1,13 @@
 """``armwright repl``: enter statements interactively in a simulated cell."""
 
 import contextlib
+import functools
 import io
 import json
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +20,6 @@ from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from armwright.cli.repl_commands import Commands
-    from armwright.cli.repl_lines import Lines
     from armwright.program.repl.session import Answer, Session
     from armwright.program.vm.recording import Effect
 
@@ -46,7 +46,7 @@ def repl(
     """
     from armwright.cli.programs import read_cell_option
     from armwright.cli.repl_commands import COMMANDS, Commands
-    from armwright.cli.repl_lines import Script, Terminal, editing
+    from armwright.cli.repl_lines import Script, editing, typed_line
     from armwright.program.api import import_reader
     from armwright.program.repl.session import Session
 
@@ -60,13 +60,14 @@ def repl(
     if program is not None:
         printer.answer(commands.load_file(program))
     if not interactive:
-        _converse(session, commands, Script(), printer)
+        _converse(session, commands, Script().line, printer)
         if printer.status:
             raise typer.Exit(printer.status)
         return
     _greet(session)
     with _interruptible(), editing(session, COMMANDS):
-        _converse(session, commands, Terminal(colour=_colour()), printer)
+        colour = not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") != "dumb"
+        _converse(session, commands, functools.partial(typed_line, colour=colour), printer)
 
 
 @contextlib.contextmanager
@@ -77,10 +78,6 @@ def _interruptible() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _colour() -> bool:
-    return not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") != "dumb"
 
 
 def _greet(session: "Session") -> None:
@@ -94,15 +91,17 @@ def _greet(session: "Session") -> None:
 # ---- the conversation ----------------------------------------------------------------------------------------------
 
 
-def _converse(session: "Session", commands: "Commands", lines: "Lines", printer: "_Printer") -> None:
-    """Read and execute lines until the input ends."""
+def _converse(
+    session: "Session", commands: "Commands", next_line: Callable[[str], str | None], printer: "_Printer"
+) -> None:
+    """Read and execute lines until the input ends; ``next_line`` takes a prompt, and returns None at the end."""
     from armwright.cli.repl_commands import EndOfSessionError
 
     begun = ""
     while True:
         number = session.line + begun.count("\n")
         try:
-            line = lines.line(f"... {number}> " if begun else f"rlo {number}> ")
+            line = next_line(f"... {number}> " if begun else f"rlo {number}> ")
         except KeyboardInterrupt:
             print()
             # Abandoned lines keep their numbers.
@@ -232,14 +231,7 @@ def _as_data(answer: "Answer") -> dict[str, Any]:
         "exit_status": answer.status,
         "printed": list(answer.printed),
         "effects": [
-            {
-                "t0": effect.t0,
-                "t1": effect.t1,
-                "kind": effect.kind,
-                "arm": effect.arm,
-                "text": effect.text,
-                **effect.data,
-            }
+            {**{name: getattr(effect, name) for name in ("t0", "t1", "kind", "arm", "text")}, **effect.data}
             for effect in answer.effects
         ],
         "diagnostics": [to_json(diagnostic, answer.source) for diagnostic in answer.diagnostics],

@@ -4,7 +4,7 @@ import contextlib
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from armwright.errors import FileFormatError
 from armwright.files.limits import MEGABYTE, beyond, limit
@@ -21,13 +21,6 @@ _PROMPT = "\001\033[1;34m\002{}\001\033[0m\002"
 WITH_PATH = ("load", "save", "save!", "report")
 
 
-class Lines(Protocol):
-    """A source of the lines of a session."""
-
-    def line(self, prompt: str) -> str | None:
-        """Return the next line without its line break; None at the end of the input."""
-
-
 class Script:
     """Lines of a standard input that is not a terminal: no prompts, no history."""
 
@@ -36,7 +29,7 @@ class Script:
         self._encoding = "utf-8-sig"
 
     def line(self, prompt: str) -> str | None:  # noqa: ARG002 - a script has no prompts
-        """Return the next line; bytes that are not UTF-8 become replacement characters.
+        """Return the next line, None at the end; bytes that are not UTF-8 become replacement characters.
 
         Raises:
             FileFormatError: the line is longer than a program may be.
@@ -49,24 +42,17 @@ class Script:
         return text.rstrip("\r\n") if line else None
 
 
-class Terminal:
-    """Lines that are typed on a terminal."""
+def typed_line(prompt: str, *, colour: bool) -> str | None:
+    """Return the line that is typed on a terminal after a prompt, which may be in colour; None at the end of the input.
 
-    def __init__(self, *, colour: bool) -> None:
-        """Set whether prompts are printed in colour."""
-        self._colour = colour
-
-    def line(self, prompt: str) -> str | None:
-        """Return the line that is typed after a prompt.
-
-        Raises:
-            KeyboardInterrupt: the line was abandoned.
-        """
-        try:
-            return input(_PROMPT.format(prompt) if self._colour else prompt)
-        except EOFError:
-            print()
-            return None
+    Raises:
+        KeyboardInterrupt: the line was abandoned.
+    """
+    try:
+        return input(_PROMPT.format(prompt) if colour else prompt)
+    except EOFError:
+        print()
+        return None
 
 
 @contextlib.contextmanager

@@ -22,7 +22,7 @@ def frames(session: Session) -> list[str]:
     rows = [["frame", "x", "y", "z", units.length.lower(), "z", "y", "x", "deg"]]
     for name, depth in hierarchy(machine.state.tree):
         rigid = name != WORLD and machine.state.tree.nodes[name].rigid
-        shown = "  " * depth + session.spelled(name) + (" (rigidly)" if rigid else "")
+        shown = "  " * depth + machine.spelled(name) + (" (rigidly)" if rigid else "")
         if not machine.has_place(name):
             rows.append([shown, "no value yet"])
             continue
@@ -53,9 +53,9 @@ def arms(session: Session) -> list[str]:
             for joint, value in zip(arm.arm.joints, q.tolist(), strict=True)
         ]
         hand = machine.state.hands[name]
-        location = f"at {session.spelled(hand.at)}" if hand.at else "at no frame"
-        holds = f", closed on {session.spelled(hand.holds)}" if hand.holds else ""
-        hanging = [session.spelled(frame) for frame, node in machine.state.tree.nodes.items() if node.parent == name]
+        location = f"at {machine.spelled(hand.at)}" if hand.at else "at no frame"
+        holds = f", closed on {machine.spelled(hand.holds)}" if hand.holds else ""
+        hanging = [machine.spelled(frame) for frame, node in machine.state.tree.nodes.items() if node.parent == name]
         carries = f", carries {', '.join(hanging)}" if hanging else ""
         lines += [f"{name}  {arm.arm.name}", f"  joints  {', '.join(shown)}", f"  hand    {location}{holds}{carries}"]
     return lines or ["no arms: begin with `--cell`, or with an IMPORT of a cell"]
@@ -64,7 +64,7 @@ def arms(session: Session) -> list[str]:
 def names(session: Session) -> list[str]:
     """Return the names that an input can use, as they are spelled: variables, frames, procedures, arms."""
     symbols, machine = session.state.symbols, session.state.machine
-    return [*map(session.spelled, (*symbols.types, *symbols.procedures)), *machine.cell.arms]
+    return [*map(machine.spelled, (*symbols.types, *symbols.procedures)), *machine.cell.arms]
 
 
 def _degrees(angle: float) -> str:

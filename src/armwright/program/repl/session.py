@@ -109,33 +109,27 @@ class Answer:
 
 @attrs.frozen(eq=False)
 class _Checked:
-    """An input that can be done, with what the translator has to know."""
+    """An input that can be done.
+
+    Attributes:
+        source: all that was entered so far.
+        entry: the input.
+        heading: its declarations together with those before.
+        flow: the arms of its statements.
+        state: that its declarations lead to, with the machine of the state before.
+    """
 
     source: Source
     entry: Entry
     heading: Heading
-    cell: Cell
-    symbols: Symbols
     flow: Flow
-    spelling: Mapping[str, str]
+    state: State
 
     def code(self, *statements: tree.Statement) -> Code:
         """Return the code of some statements, with all procedures."""
-        end = _end(self.source)
-        program = tree.Program(end, self.heading.headers, statements, end)
-        return generate(self.source, program, self.symbols, self.flow, self.spelling)
-
-    def state(self, machine: Machine, statements: tuple[tree.Statement, ...], text: str) -> State:
-        """Return the state that a part of the input leads to."""
-        return State(
-            headers=self.heading.headers,
-            statements=statements,
-            spelling=self.spelling,
-            symbols=self.symbols,
-            cell=self.cell,
-            machine=machine,
-            text=text,
-        )
+        end, state = _end(self.source), self.state
+        program = tree.Program(end, state.headers, statements, end)
+        return generate(self.source, program, state.symbols, self.flow, state.spelling)
 
 
 class Session:
@@ -197,11 +191,6 @@ class Session:
         headers, statements = self.state.headers, self.state.statements
         return program_text(self.source, headers, statements, self.std, remark=remark, path_of=path_of)
 
-    def spelled(self, name: str) -> str:
-        """Return a name as the session writes it; of an element too."""
-        base, bracket, indices = name.partition("[")
-        return f"{self.state.spelling.get(base, base)}{bracket}{indices}"
-
     # ---- back and forth --------------------------------------------------------------------------------------------
 
     def undo(self, count: int = 1) -> tuple[str, ...]:
@@ -229,32 +218,15 @@ class Session:
         """Count lines that say nothing to the cell, so that messages name the lines that people have seen."""
         self._text += text if text.endswith("\n") or not text else f"{text}\n"
 
-    def enter(self, text: str, *, complete: bool = False) -> Answer:
+    def enter(self, text: str, path_of: PathOf = str, *, complete: bool = False, is_file: bool = False) -> Answer:
         """Take declarations, statements, or an expression whose value is to be shown.
 
         Args:
             text: an input; or its beginning, which is then given again with the next line behind it.
+            path_of: how the session shall name a file that the input imports.
             complete: whether nothing more comes, so that what is missing is an error.
+            is_file: whether it is the text of a file; elsewhere a number that begins a line may begin an expression.
         """
-        return self._enter(text, complete=complete)
-
-    def load(self, file: Source, path_of: PathOf = str) -> Answer:
-        """Take the text of a file, such as a whole program; messages about it name its own lines.
-
-        Args:
-            file: its name and text.
-            path_of: how the session shall name a file that this one imports.
-        """
-        start = len(self._text)
-        answer = self._enter(file.text, path_of, complete=True, is_file=True)
-        spans = [label.span for diagnostic in answer.diagnostics for label in diagnostic.secondary]
-        spans += [diagnostic.span for diagnostic in answer.diagnostics]
-        if any(span.start < start for span in spans):
-            return answer
-        own = tuple(moved(diagnostic, -start) for diagnostic in answer.diagnostics)
-        return attrs.evolve(answer, source=file, diagnostics=own)
-
-    def _enter(self, text: str, path_of: PathOf = str, *, complete: bool, is_file: bool = False) -> Answer:
         start, symbols = len(self._text), self.state.symbols
         source = Source(self.name, self._text + (text if text.endswith("\n") else f"{text}\n"))
         entry = read(source, start, self.std, names=symbols.types, procedures=symbols.procedures, is_file=is_file)
@@ -271,6 +243,22 @@ class Session:
         answer = self._do(checked)
         remarks = (*checked.heading.remarks, *answer.remarks)
         return attrs.evolve(answer, diagnostics=(*reported, *answer.diagnostics), remarks=remarks)
+
+    def load(self, file: Source, path_of: PathOf = str) -> Answer:
+        """Take the text of a file, such as a whole program; messages about it name its own lines.
+
+        Args:
+            file: its name and text.
+            path_of: how the session shall name a file that this one imports.
+        """
+        start = len(self._text)
+        answer = self.enter(file.text, path_of, complete=True, is_file=True)
+        spans = [label.span for diagnostic in answer.diagnostics for label in diagnostic.secondary]
+        spans += [diagnostic.span for diagnostic in answer.diagnostics]
+        if any(span.start < start for span in spans):
+            return answer
+        own = tuple(moved(diagnostic, -start) for diagnostic in answer.diagnostics)
+        return attrs.evolve(answer, source=file, diagnostics=own)
 
     # ---- checking --------------------------------------------------------------------------------------------------
 
@@ -302,7 +290,9 @@ class Session:
         reported = in_order(new)
         if flow is None or any(diagnostic.is_error for diagnostic in reported):
             return None, reported
-        return _Checked(source, entry, heading, cell, symbols, flow, spelling), reported
+        state = attrs.evolve(before, headers=heading.headers, statements=heading.statements)
+        state = attrs.evolve(state, spelling=spelling, symbols=symbols, cell=cell)
+        return _Checked(source, entry, heading, flow, state), reported
 
     def _check_names(self, program: tree.Program) -> tuple[Cell, Symbols, list[Diagnostic]]:
         """Check names and types; where nothing was done yet, the arms of an imported cell are those of the session."""
@@ -326,7 +316,7 @@ class Session:
     def _do(self, checked: _Checked) -> Answer:
         """Declare what an input declares and run its statements, one after the other, up to one that fails."""
         source, entry = checked.source, checked.entry
-        if checked.heading.headers != self.state.headers:
+        if checked.state.headers != self.state.headers:
             self._declare(checked)
         answer = Answer(source=source)
         effects: list[Effect] = []
@@ -334,7 +324,7 @@ class Session:
         for number, statement in enumerate(entry.statements):
             before, shown = self.state, statement.span.start in entry.shown
             if before.machine.state.over and not shown:
-                remark = "the program has come to a HALT; `:undo` goes back to before it"
+                remark = "the program has executed HALT; `:undo` restores the state before it"
                 answer = Answer(source=source, remarks=(remark,), refused=True)
                 break
             machine = with_code(before.machine, checked.code(statement), self.limits)
@@ -350,13 +340,14 @@ class Session:
             diagnostics += new_warnings(before.machine, machine)
             if not shown:
                 text = " ".join(source.slice(statement.span).split())
-                self._go_on(checked.state(machine, (*before.statements, statement), text))
+                done = (*before.statements, statement)
+                self._go_on(attrs.evolve(checked.state, machine=machine, statements=done, text=text))
         return attrs.evolve(answer, effects=tuple(effects), diagnostics=tuple(diagnostics))
 
     def _declare(self, checked: _Checked) -> None:
         before, heading, source = self.state, checked.heading, checked.source
-        changed = checked.cell is not before.cell
-        machine = fresh(checked.cell, source, self.limits) if changed else before.machine.copy()
+        cell = checked.state.cell
+        machine = before.machine.copy() if cell is before.cell else fresh(cell, source, self.limits)
         rename(machine, heading.renamed)
         forget(machine, heading.dropped)
         for header in heading.imports:
@@ -365,7 +356,7 @@ class Session:
                 bring(machine, brought.cell.frames, header.span)
         machine = with_code(machine, checked.code(), self.limits)
         text = "; ".join(title(source, header) for header in checked.entry.headers)
-        self._go_on(checked.state(machine, heading.statements, text))
+        self._go_on(attrs.evolve(checked.state, machine=machine, text=text))
 
 
 def _end(source: Source) -> Span:
@@ -375,4 +366,4 @@ def _end(source: Source) -> Span:
 def _left(count: int) -> list[str]:
     if not count:
         return []
-    return [f"not done: the {count} statements behind it" if count > 1 else "not done: the statement behind it"]
+    return [f"not executed: the {count} statements after it" if count > 1 else "not executed: the statement after it"]
