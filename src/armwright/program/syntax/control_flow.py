@@ -216,8 +216,7 @@ def _counter(tokens: Tokens) -> tree.Name | tree.Poison:
     token = tokens.now
     tokens.want("the name of a SCALAR", "after FOR")
     if token.kind is TokenKind.NAME and tokens.ahead().key != "[":
-        tokens.take()
-        return tree.Name(token.span, token.text, token.key)
+        return tokens.take_name()
     if token.kind in (TokenKind.NAME, TokenKind.ARM):
         body = mobile(tokens, "a name", "after FOR")
         text = "FOR counts with a variable of its own" if token.kind is TokenKind.NAME else "FOR counts with a SCALAR"
@@ -409,6 +408,6 @@ def halt(tokens: Tokens) -> tree.Halt:
 # name "(" [ expr { "," expr } ] ")"
 def call(tokens: Tokens) -> tree.Call:
     """Read the call of a procedure."""
-    token = tokens.take()
-    arguments = values(tokens, "a value", f"after {token.text}", empty=True)
-    return tree.Call(tokens.since(token), tree.Name(token.span, token.text, token.key), arguments)
+    name = tokens.take_name()
+    arguments = values(tokens, "a value", f"after {name.text}", empty=True)
+    return tree.Call(tokens.since(name.span), name, arguments)

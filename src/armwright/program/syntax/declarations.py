@@ -10,17 +10,18 @@ from armwright.program.syntax.lexer import TokenKind
 from armwright.program.syntax.token_stream import LostError, Tokens, shown
 
 
-def passed_over(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
+def passed_over(tokens: Tokens, names: list[tree.Name]) -> tree.Declaration:
     """Pass over the rest of a declaration; return what was perhaps declared, of no known type."""
     start = tokens.now
     stops = ("BEGIN", *tokens.words.headers, *tokens.words.statements)
     while not tokens.done and not tokens.sees(";", "END", *stops):
-        token = tokens.take()
-        if token.kind is TokenKind.NAME:
-            names.append(tree.Name(token.span, token.text, token.key))
+        if tokens.now.kind is TokenKind.NAME:
+            names.append(tokens.take_name())
+        else:
+            tokens.take()
     tokens.accept(";")
     span = tokens.since(start)
-    return tree.Declaration(span, tuple(name for name in names if name), tree.TypeName(span, "", None))
+    return tree.Declaration(span, tuple(names), tree.TypeName(span, "", None))
 
 
 # var_part = "VAR" decl { decl } ;
@@ -45,19 +46,19 @@ def _reserved(tokens: Tokens) -> bool:
 
 def declarations(tokens: Tokens) -> list[tree.Declaration]:
     """Read declarations, as many as there are."""
-    names_ = []
+    read = []
     depth = tokens.depth
     while _goes_on(tokens):
         index = tokens.at
-        names: list[tree.Name | None] = []
+        names: list[tree.Name] = []
         try:
-            names_.append(_declaration(tokens, names))
+            read.append(_declaration(tokens, names))
         except LostError:
             tokens.depth = depth
-            names_.append(passed_over(tokens, names))
+            read.append(passed_over(tokens, names))
         if tokens.at == index:
             tokens.take()
-    return names_
+    return read
 
 
 def _goes_on(tokens: Tokens) -> bool:
@@ -73,34 +74,34 @@ def _goes_on(tokens: Tokens) -> bool:
 
 
 # decl = name { "," name } ":" type ";" ;
-def _declaration(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
+def _declaration(tokens: Tokens, names: list[tree.Name]) -> tree.Declaration:
     """Read one declaration; put its names also where they are safe if the rest makes no sense."""
     start = tokens.now
     names_of(tokens, names)
     kind = type_name(tokens)
     span = tokens.since(start)
     _close(tokens)
-    return tree.Declaration(span, tuple(name for name in names if name), kind)
+    return tree.Declaration(span, tuple(names), kind)
 
 
 # name { "," name } ":"
-def names_of(tokens: Tokens, names: list[tree.Name | None]) -> None:
+def names_of(tokens: Tokens, names: list[tree.Name]) -> None:
     """Read what is declared, up to the type.
 
     Raises:
         LostError: there is no type.
     """
-    names.append(_declared(tokens))
+    _declared(tokens, names)
     while True:
         if tokens.accept(","):
             if tokens.sees(":"):
                 tokens.report("E111", "expected a name after `,`", tokens.now.span, "found `:`")
                 break
-            names.append(_declared(tokens))
+            _declared(tokens, names)
         elif tokens.now.kind is TokenKind.NAME and tokens.ahead().key in (",", ":"):
             gap = tokens.gap()
             tokens.report("E112", "missing `,` between two names", gap, "expected `,` here", fixes=(Fix(gap, ","),))
-            names.append(_declared(tokens))
+            _declared(tokens, names)
         else:
             break
     if not tokens.accept(":"):
@@ -110,26 +111,24 @@ def names_of(tokens: Tokens, names: list[tree.Name | None]) -> None:
             raise LostError
 
 
-def _declared(tokens: Tokens) -> tree.Name | None:
-    """Read one name; None for a word that cannot be one."""
+def _declared(tokens: Tokens, names: list[tree.Name]) -> None:
+    """Read one name; a word that cannot be one is passed over."""
     token = tokens.now
     if token.kind is TokenKind.NAME:
-        tokens.take()
-        name = tree.Name(token.span, token.text, token.key)
+        name = tokens.take_name()
         tokens.check_length(name)
         tokens.declared.add(name.key)
-        return name
-    if token.kind is TokenKind.ARM:
+        names.append(name)
+    elif token.kind is TokenKind.ARM:
         if not token.damaged:
             tokens.report("E107", f"`{token.text}` is an arm and needs no declaration", token.span, "leave it out")
         tokens.take()
-        return None
-    if _reserved(tokens):
+    elif _reserved(tokens):
         # It was meant as a name: a procedure has one parameter less without it, and calls would be wrong too.
         tokens.refuse_reserved()
-        tokens.take()
-        return tree.Name(token.span, token.text, token.key)
-    return tokens.lost("expected a name", f"found {shown(token)}")
+        names.append(tokens.take_name())
+    else:
+        tokens.lost("expected a name", f"found {shown(token)}")
 
 
 # type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;

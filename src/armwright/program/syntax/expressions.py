@@ -154,20 +154,24 @@ def number(tokens: Tokens) -> tree.Number:
 
 # prim = number | arm | lvalue | name "(" expr { "," expr } ")" | "(" expr { "," expr } ")" ;
 def _named(tokens: Tokens) -> tree.Expression:
-    token = tokens.take()
     tokens.height = 1
-    if token.kind is _ARM:
-        return tree.ArmName(Span(token.start, token.end), token.text, token.key)
-    name = tree.Name(Span(token.start, token.end), token.text, token.key)
+    if tokens.now.kind is _ARM:
+        return _arm(tokens)
+    name = tokens.take_name()
     behind = tokens.now.key
     if behind == "[":
         return _index(tokens, name)
     if behind == "(":
-        arguments = values(tokens, "a value", f"after {token.text}")
+        arguments = values(tokens, "a value", f"after {name.text}")
         tokens.height += 1
-        span = tokens.since(token)
+        span = tokens.since(name.span)
         return tree.Function(span, name, arguments) if arguments else tree.Poison(span)
     return name
+
+
+def _arm(tokens: Tokens) -> tree.ArmName:
+    token = tokens.take()
+    return tree.ArmName(token.span, token.text, token.key)
 
 
 def _index(tokens: Tokens, name: tree.Name) -> tree.Index | tree.Poison:
@@ -194,21 +198,15 @@ def mobile(tokens: Tokens, wants: str, where: str) -> tree.Mobile:
     Raises:
         LostError: there is none.
     """
-    token = tokens.now
-    if token.kind is _ARM:
-        tokens.take()
-        return tree.ArmName(Span(token.start, token.end), token.text, token.key)
-    return _lvalue(tokens, wants, where)
+    return _arm(tokens) if tokens.now.kind is _ARM else _lvalue(tokens, wants, where)
 
 
 # lvalue = name [ "[" expr { "," expr } "]" ] ;
 def _lvalue(tokens: Tokens, wants: str, where: str) -> tree.Variable:
-    token = tokens.now
-    if token.kind is not _NAME:
+    if tokens.now.kind is not _NAME:
         tokens.want(wants, where)
         return _no_value(tokens, wants, where)
-    tokens.take()
-    name = tree.Name(Span(token.start, token.end), token.text, token.key)
+    name = tokens.take_name()
     return _index(tokens, name) if tokens.now.key == "[" else name
 
 

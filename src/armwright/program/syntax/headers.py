@@ -1,6 +1,6 @@
 """Parsing what stands in front of the statements: VAR parts, IMPORT, UNITS, procedures, and BEGIN itself."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, Label, did_you_mean
@@ -8,7 +8,7 @@ from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import block
 from armwright.program.syntax.declarations import declarations, names_of, passed_over, type_name, var_part
-from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.lexer import TokenKind
 from armwright.program.syntax.token_stream import LostError, Tokens, shown
 
 # What other languages call a procedure.
@@ -42,17 +42,16 @@ def head(tokens: Tokens) -> list[tree.Header]:
     return headers_
 
 
-def header(tokens: Tokens) -> list[tree.Header]:
+def header(tokens: Tokens) -> Sequence[tree.Header]:
     """Read one part of what stands in front of BEGIN; what makes no sense is passed over."""
     index, level, depth = tokens.at, len(tokens.waiting), tokens.depth
-    names: list[tree.Name | None] = []
     try:
         tokens.deep = -1
         return _HEADERS[tokens.now.key](tokens)
     except LostError:
         del tokens.waiting[level:]
         tokens.depth = depth
-        passed_over(tokens, names)
+        passed_over(tokens, [])
     if tokens.at == index:
         tokens.take()
     return []
@@ -89,9 +88,7 @@ def _nonsense(tokens: Tokens) -> tree.Declaration:
     start = tokens.take()
     if not start.damaged:
         tokens.report("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
-    names: list[tree.Name | None] = []
-    if start.kind is TokenKind.NAME:
-        names.append(tree.Name(start.span, start.text, start.key))
+    names = [tree.Name(start.span, start.text, start.key)] if start.kind is TokenKind.NAME else []
     return passed_over(tokens, names)
 
 
@@ -105,11 +102,6 @@ def _begin(tokens: Tokens) -> None:
     gap = Span(tokens.now.start, tokens.now.start)
     fix = Fix(gap, "BEGIN ")
     tokens.say_once("E115", "missing `BEGIN` before the first statement", gap, "expected `BEGIN` here", fixes=(fix,))
-
-
-# var_part = "VAR" decl { decl } ;
-def _variables(tokens: Tokens) -> list[tree.Header]:
-    return [*var_part(tokens)]
 
 
 # import = "IMPORT" string ";" ;
@@ -146,8 +138,7 @@ def _unit(tokens: Tokens) -> tree.Name:
     if token.kind is not TokenKind.NAME:
         advice = "write `UNITS MM, DEG ;`"
         tokens.lost(f"expected a unit after `{tokens.before.text}`", f"found {shown(token)}", advice=advice)
-    tokens.take()
-    return tree.Name(token.span, token.text, token.key)
+    return tokens.take_name()
 
 
 # procedure = "PROCEDURE" name [ "(" param { "," param } ")" ] ";" [ var_part ] block ";" ;
@@ -168,7 +159,7 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
         own += var_part(tokens)
     tokens.offer("BEGIN", starts=True)
     body = _body(tokens, above, name)
-    headers_ = tree.Procedure(tokens.since(start), above, name, tuple(parameters), tuple(own), body)
+    procedure = tree.Procedure(tokens.since(start), above, name, tuple(parameters), tuple(own), body)
     if tokens.sees("END") and tokens.ahead().key != ".":
         tokens.say_once("E127", "`END` without BEGIN", tokens.now.span, "the procedure has ended before")
         tokens.take()
@@ -178,7 +169,7 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
         tokens.take()
     else:
         _semicolon(tokens, "after the procedure")
-    return [headers_]
+    return [procedure]
 
 
 def _own_name(tokens: Tokens) -> tree.Name:
@@ -191,8 +182,7 @@ def _own_name(tokens: Tokens) -> tree.Name:
         return tree.Name(gap, "", "")
     elif token.kind is not TokenKind.NAME:
         tokens.lost("expected the name of the procedure", f"found {shown(token)}")
-    tokens.take()
-    name = tree.Name(token.span, token.text, token.key)
+    name = tokens.take_name()
     tokens.check_length(name)
     return name
 
@@ -200,20 +190,20 @@ def _own_name(tokens: Tokens) -> tree.Name:
 # param = name { "," name } ":" type ;
 def _parameters(tokens: Tokens) -> list[tree.Declaration]:
     opening, depth = tokens.take(), tokens.depth
-    headers_: list[tree.Declaration] = []
+    parameters: list[tree.Declaration] = []
     if tokens.sees(")"):
         fix = Fix(opening.span.to(tokens.now.span), "")
         text = "a procedure without parameters is declared without `( )`"
         tokens.say_once("E111", text, tokens.now.span, "there is nothing in between", fixes=(fix,))
         tokens.take()
-        return headers_
+        return parameters
     while True:
         start = tokens.now
         if tokens.sees("VAR"):
             text = "a parameter has no VAR in front"
             tokens.say_once("E117", text, start.span, "leave it out", note=_BY_REFERENCE)
             tokens.take()
-        names: list[tree.Name | None] = []
+        names: list[tree.Name] = []
         try:
             names_of(tokens, names)
             kind = type_name(tokens)
@@ -222,12 +212,12 @@ def _parameters(tokens: Tokens) -> list[tree.Declaration]:
             while not tokens.done and not tokens.sees(")", ";", "BEGIN", *tokens.words.headers):
                 tokens.take()
             kind = tree.TypeName(tokens.since(start), "", None)
-        headers_.append(tree.Declaration(tokens.since(start), tuple(name for name in names if name), kind))
+        parameters.append(tree.Declaration(tokens.since(start), tuple(names), kind))
         if not _another(tokens):
             break
     if not tokens.accept(")"):
         tokens.insert(")", "after the parameters")
-    return headers_
+    return parameters
 
 
 def _no_result(tokens: Tokens) -> None:
@@ -269,9 +259,9 @@ def _body(tokens: Tokens, above: Span, name: tree.Name) -> tree.Block:
         if not fixes:
             return tree.Block(gap, (), gap)
     tokens.in_procedure = name.key or "?"
-    headers_ = block(tokens)
+    body = block(tokens)
     tokens.in_procedure = ""
-    return _without_main(tokens, above, headers_)
+    return _without_main(tokens, above, body)
 
 
 def _without_main(tokens: Tokens, above: Span, body: tree.Block) -> tree.Block:
@@ -299,7 +289,7 @@ def _semicolon(tokens: Tokens, where: str) -> None:
 
 def late(tokens: Tokens) -> tree.Statement:
     """Read a part that belongs in front of BEGIN, and keep what it declares."""
-    word: Token = tokens.now
+    word = tokens.now
     what = "declarations belong" if word.key == "VAR" else "it belongs"
     tokens.report("E118", f"{word.text} after BEGIN", word.span, f"{what} before BEGIN")
     tokens.late += header(tokens)
@@ -308,8 +298,8 @@ def late(tokens: Tokens) -> tree.Statement:
     return tree.Poison(word.span)
 
 
-_HEADERS: Mapping[str, Callable[[Tokens], list[tree.Header]]] = {
-    "VAR": _variables,
+_HEADERS: Mapping[str, Callable[[Tokens], Sequence[tree.Header]]] = {
+    "VAR": var_part,
     "IMPORT": _import,
     "UNITS": _units,
     "PROCEDURE": _procedure,

@@ -2,7 +2,7 @@
 
 import re
 
-from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Severity
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList
 from armwright.program.language.source import Source, Span
 
 _NUMBER = re.compile(r"[ \t]*([0-9]+)(?=[ \t\r\n]|\Z)")
@@ -30,33 +30,16 @@ def without_numbers(source: Source) -> tuple[str, list[Diagnostic]]:
             span = Span(*match.span(1))
             number = int(match[1][-18:])
             if number <= last:
-                odd.append(_backwards(span, text, text[last_span.start : last_span.end]))
+                message = f"line number {source.slice(span)} comes after {source.slice(last_span)}"
+                note = "line numbers have no meaning in RLO; statements run in the order of the text"
+                odd.report("W101", message, span, "expected a larger number", note=note)
             last, last_span = number, span
             pieces += [text[done : span.start], " " * (span.end - span.start)]
             done, numbered = span.end, True
         elif content := _CONTENT.match(text, start):
             # One word on a run of lines is enough.
-            odd += [_unnumbered(Span(content.start(1), content.start(1)))] if numbered else []
+            if numbered:
+                here = Span(content.start(1), content.start(1))
+                odd.report("W101", "this line has no line number, but the others have", here, "expected a number here")
             numbered = False
     return "".join((*pieces, text[done:])), odd
-
-
-def _backwards(span: Span, text: str, last: str) -> Diagnostic:
-    return Diagnostic(
-        code="W101",
-        severity=Severity.WARNING,
-        message=f"line number {text[span.start : span.end]} comes after {last}",
-        span=span,
-        label="expected a larger number",
-        notes=("line numbers have no meaning in RLO; statements run in the order of the text",),
-    )
-
-
-def _unnumbered(span: Span) -> Diagnostic:
-    return Diagnostic(
-        code="W101",
-        severity=Severity.WARNING,
-        message="this line has no line number, but the others have",
-        span=span,
-        label="expected a number here",
-    )

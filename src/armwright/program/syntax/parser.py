@@ -66,30 +66,34 @@ def parse(
         declared: names of variables that were declared before this text.
         procedures: names of procedures that were.
     """
-    tokens, torn = joined(source, tokens, declared)
-    if standard is Standard.RLO_83:
-        tokens = rlo83.reserve(tokens, {*declared, *declared_names(tokens)})
-    cursor = Tokens(source, tokens, _RULES, standard)
-    cursor.declared.update(declared)
+    cursor, torn = _cursor(source, tokens, standard, declared)
     cursor.procedures.update(procedures)
-    statements_, slips = program(cursor), cursor.diagnostics
+    tree_, slips = program(cursor), cursor.diagnostics
     if standard is Standard.RLO_83:
-        statements_, slips = rlo83.conform(statements_, slips, source, cursor.tokens)
-    return statements_, [*torn, *slips]
+        tree_, slips = rlo83.conform(tree_, slips, source, cursor.tokens)
+    return tree_, [*torn, *slips]
 
 
 def expected(
     source: Source, tokens: Sequence[Token], standard: Standard = Standard.RLO_2, *, declared: Collection[str] = ()
 ) -> Expected:
     """Return what may stand behind the last token of a text; the arguments are those of ``parse``."""
-    tokens, _ = joined(source, tokens, declared)
+    cursor, _ = _cursor(source, tokens, standard, declared)
+    cursor.expected = Expected()
+    program(cursor)
+    return cursor.expected
+
+
+def _cursor(
+    source: Source, tokens: Sequence[Token], standard: Standard, declared: Collection[str]
+) -> tuple[Tokens, list[Diagnostic]]:
+    """Stand in front of the first token; return what is wrong with names that blanks tear apart, too."""
+    tokens, torn = joined(source, tokens, declared)
     if standard is Standard.RLO_83:
         tokens = rlo83.reserve(tokens, {*declared, *declared_names(tokens)})
     cursor = Tokens(source, tokens, _RULES, standard)
-    cursor.expected = Expected()
     cursor.declared.update(declared)
-    program(cursor)
-    return cursor.expected
+    return cursor, torn
 
 
 # program = { header } block "." ;
@@ -98,11 +102,11 @@ def program(tokens: Tokens) -> tree.Program:
     """Read a whole program."""
     start = tokens.now
     headers = head(tokens)
-    statements_: list[tree.Statement] = []
+    read: list[tree.Statement] = []
     if not tokens.done:
-        statements_ += _statements(tokens)
+        read += _statements(tokens)
         while not tokens.done and not _ends(tokens):
-            statements_ += _statements(tokens)
+            read += _statements(tokens)
     elif not tokens.silent:
         begun = tokens.before.key == "BEGIN"
         if begun:
@@ -111,15 +115,15 @@ def program(tokens: Tokens) -> tree.Program:
         text = "the program has no statements" if headers else "there is no program here"
         text, expected = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
         tokens.report("E115", text, span, f"expected `{expected}`")
-    return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(statements_), tokens.before.span)
+    return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(read), tokens.before.span)
 
 
 def _statements(tokens: Tokens) -> tuple[tree.Statement, ...]:
     """Read statements up to END, which stays."""
-    statements_ = statements(tokens, "END")
+    read = statements(tokens, "END")
     if tokens.done:
         tokens.say_once("E115", "the program has no END", tokens.gap(), "expected `END.` here")
-    return statements_
+    return read
 
 
 def _ends(tokens: Tokens) -> bool:

@@ -54,7 +54,15 @@ def joined(
         text = f"{first.text}{number.text}"
         kept += [*tokens[done : pair - 1], Token(_NAME, text, key, first.start, number.end)]
         done = pair + 1
-        findings.append(_torn(source, Span(first.start, number.end), text, certain=declared_here or torn or device))
+        span = Span(first.start, number.end)
+        findings.report(
+            "E106",
+            f"`{' '.join(source.slice(span).split())}` is not one name",
+            span,
+            "no blanks in a name",
+            advice=f"write `{text}`",
+            fixes=(Fix(span, text),) if declared_here or torn or device else (),
+        )
     return [*kept, *tokens[done:]], findings
 
 
@@ -90,14 +98,3 @@ def _declarations(tokens: Sequence[Token], pairs: frozenset[int]) -> tuple[set[i
             elif tokens[index - 1].kind is _NAME:
                 names.add(tokens[index - 1].key)
     return inside, names
-
-
-def _torn(source: Source, span: Span, text: str, *, certain: bool) -> Diagnostic:
-    return Diagnostic(
-        code="E106",
-        message=f"`{' '.join(source.slice(span).split())}` is not one name",
-        span=span,
-        label="no blanks in a name",
-        helps=(f"write `{text}`",),
-        fixes=(Fix(span, text),) if certain else (),
-    )

@@ -131,9 +131,9 @@ def statement(tokens: Tokens) -> tree.Statement:
         tokens.statement_depth = tokens.depth
         if tokens.depth > MAX_DEPTH:
             tokens.too_deep()
-        statements_ = tokens.rules[token.key](tokens)
+        read = tokens.rules[token.key](tokens)
         tokens.depth -= 1
-        return statements_
+        return read
     after = tokens.ahead()
     if token.kind is _ARM and after.key in ASSIGNING:
         return tokens.rules["="](tokens)
@@ -167,11 +167,11 @@ def _named(tokens: Tokens, after: Token) -> tree.Statement:
 def _reserved(tokens: Tokens) -> tree.Statement:
     """Read an assignment to a reserved word."""
     tokens.refuse_reserved()
-    token = tokens.now
-    tokens.replace_by_name()
-    statements_ = tokens.rules["="](tokens)
-    assert isinstance(statements_, tree.Assign)  # noqa: S101 - that is what the rule reads
-    return tree.Assign(statements_.span, tree.Poison(token.span, frozenset((token.key,))), statements_.value)
+    word = tokens.now
+    tokens.replace(word.key, _NAME)
+    read = tokens.rules["="](tokens)
+    assert isinstance(read, tree.Assign)  # noqa: S101 - that is what the rule reads
+    return tree.Assign(read.span, tree.Poison(word.span, frozenset((word.key,))), read.value)
 
 
 def _no_statement(tokens: Tokens) -> tree.Statement:
@@ -184,9 +184,9 @@ def _no_statement(tokens: Tokens) -> tree.Statement:
     else:
         text, label = f"{shown(token)} does not start a statement", "expected a statement"
     if token.key in tokens.procedures:
-        tokens.take()
+        name = tokens.take_name()
         tokens.insert("()", "after the name of a procedure")
-        return tree.Call(token.span, tree.Name(token.span, token.text, token.key), ())
+        return tree.Call(name.span, name, ())
     if _is_known(tokens, token):
         _value_missing(tokens)
     if token.key in ELSEWHERE:
@@ -209,7 +209,7 @@ def _value_missing(tokens: Tokens) -> NoReturn:
     """
     name, sign = tokens.now.text, tokens.ahead().key
     advice = f"write `{name} = {name} {sign} ...`" if sign in ("+", "-", "*", "/") else ""
-    tokens.lost(f"`{name}` needs `=` and a value", "a name alone is no statement", code="E109", advice=advice)
+    tokens.lost(f"`{name}` needs `=` and a value", "a name alone is not a statement", code="E109", advice=advice)
 
 
 def nested(tokens: Tokens, behind: str, *words: str) -> tree.Statement:
@@ -227,8 +227,7 @@ def nested(tokens: Tokens, behind: str, *words: str) -> tree.Statement:
         tokens.say_once("E111", f"expected a statement after {behind}", gap, "expected a statement here")
         tokens.hush()
         return tree.Poison(gap)
-    statements_ = salvaged(tokens, statement)
-    return tree.Poison(tokens.since(token)) if statements_ is None else statements_
+    return salvaged(tokens, statement) or tree.Poison(tokens.since(token))
 
 
 def salvaged(tokens: Tokens, read: Callable[[Tokens], _Read]) -> _Read | None:

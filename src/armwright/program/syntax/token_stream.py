@@ -120,6 +120,11 @@ class Tokens:
                 self._wrong_before = len(self.diagnostics)
         return token
 
+    def take_name(self) -> tree.Name:
+        """Read one token as a name."""
+        token = self.take()
+        return tree.Name(token.span, token.text, token.key)
+
     def back(self, index: int) -> None:
         """Return to where ``at`` tokens had been read."""
         self.at = index
@@ -179,17 +184,10 @@ class Tokens:
         self.expected.recovering = self.recovering > 0
         return True
 
-    def replace(self, key: str) -> None:
-        """Put the keyword that was meant in the pose of the next token, which has been reported."""
+    def replace(self, key: str, kind: TokenKind = _KEYWORD) -> None:
+        """Put the word that was meant, a keyword or name, in the place of the next token, which has been reported."""
         token = self.now
-        self.now = Token(_KEYWORD, token.text, key, token.start, token.end, damaged=True)
-        self.tokens[self.at] = self.now
-
-    def replace_by_name(self) -> None:
-        """Take the next token, which has been reported, for a name."""
-        token = self.now
-        self.now = Token(_NAME, token.text, token.key, token.start, token.end, damaged=True)
-        self.tokens[self.at] = self.now
+        self.now = self.tokens[self.at] = Token(kind, token.text, key, token.start, token.end, damaged=True)
 
     def begin(self) -> int:
         """Return where the next BEGIN stands; -1 if there is none."""
