@@ -27,7 +27,7 @@ CalledOff: TypeAlias = npt.NDArray[np.int64]
 _ROWS_PER_THREAD = 4096
 
 # The function that is called with arrays, with the inputs and outputs of the kernel by name: a closure over ``*inputs``
-# takes a fifth to a third longer (docs/decisions/0012-the-house.md). Arrays that are not as expected go to ``careful``.
+# takes a fifth to a third longer (docs/decisions/0012-structure.md). Arrays that are not as expected go to ``careful``.
 # The inputs are names that ``emit`` has checked.
 _CALL = """
 def call({inputs}, *, threads=None, out=None):
