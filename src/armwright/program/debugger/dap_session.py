@@ -18,7 +18,7 @@ from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Variable
 from armwright.program.diagnostics.render import render
 from armwright.program.language.diagnostic import Diagnostic
-from armwright.program.language.position_codec import UTF_16, PositionCodec, columns
+from armwright.program.language.position_codec import UTF_16, PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
 from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more, one_line
@@ -104,6 +104,7 @@ class EditorSession:
         debugger: None until a program is launched.
         launch: what was asked for.
         loaded: what became of it.
+        codec: counts the columns of its text as editors do, in UTF-16 as JavaScript.
         configured: whether breakpoints have been set, so that the program may begin.
         begun: whether it has.
         ended: whether its end has been reported.
@@ -122,6 +123,7 @@ class EditorSession:
         self.debugger: Debugger | None = None
         self.launch: Launch | None = None
         self.loaded: Loaded | None = None
+        self.codec = PositionCodec("", UTF_16)
         self.configured = self.begun = self.ended = False
         self.first_line = self.first_column = 1
         self.breakpoints: list[tuple[int, Arguments]] = []
@@ -149,6 +151,7 @@ class EditorSession:
             self.write(error.page, "stderr")
             raise
         self.launch, self.loaded = launch, loaded
+        self.codec = PositionCodec(loaded.code.source.text, UTF_16)
         self.debugger = Debugger(loaded.code, loaded.cell)
         self.begun = self.ended = False
         self.forget_references()
@@ -258,19 +261,11 @@ class EditorSession:
 
     def _report_effects(self, debugger: Debugger) -> None:
         effects = [effect for effect in debugger.new_effects() if effect.kind in {"PRINT", "ERROR"}]
-        shown = excerpt(effects, ON_A_TERMINAL)
-        for effect in (*shown.first, *shown.last):
-            if shown.left_out and effect is shown.last[0]:
-                self.write(f"{more(shown.left_out, _ALL_OF_IT)}\n", "console")
-            self._report_effect(effect)
+        shown = excerpt(effects, ON_A_TERMINAL).mapped(_output)
+        for text, category, span in shown.joined((f"{more(shown.left_out, _ALL_OF_IT)}\n", "console", None)):
+            self.write(text, category, span)
         for text, breakpoint_ in debugger.log_messages():
             self.write(f"{text}\n", "console", breakpoint_.start.span if breakpoint_.start else None)
-
-    def _report_effect(self, effect: Effect) -> None:
-        if effect.kind == "PRINT":
-            self.write(f"{one_line(effect.data['printed'], _ALL_OF_IT)}\n", "stdout", effect.span)
-        else:
-            self.write(f"recovered: {effect.text}\n", "stderr", effect.span)
 
     def _report_threads(self, debugger: Debugger) -> None:
         alive = {self.thread(process.path) for process in debugger.processes}
@@ -311,17 +306,10 @@ class EditorSession:
 
     def location(self, span: Span, *, full: bool = True) -> dict[str, int]:
         """Return where a stretch of the text is, in the numbers of the editor."""
-        assert self.loaded is not None  # noqa: S101 - asked for only with a program
-        source = self.loaded.code.source
-
-        def position(offset: int) -> tuple[int, int]:
-            line = source.line(offset)
-            # Editors count halves of words, as JavaScript does.
-            before = columns(source.text[source.line_starts[line - 1] : offset], UTF_16)
-            return line - 1 + self.first_line, before + self.first_column
-
-        start = dict(zip(("line", "column"), position(span.start), strict=True))
-        return start | dict(zip(("endLine", "endColumn"), position(span.end), strict=True)) if full else start
+        (line, column), (end_line, end_column) = map(self.codec.place, span)
+        start = {"line": line + self.first_line, "column": column + self.first_column}
+        end = {"endLine": end_line + self.first_line, "endColumn": end_column + self.first_column}
+        return start | end if full else start
 
     def frame(self, arguments: Arguments) -> tuple[ProcessPath, int]:
         """Return the process and the level of the stack frame of a request; without one those of the program.
@@ -373,9 +361,8 @@ class EditorSession:
             return {"id": number, "verified": False, "message": "no program has been launched"}
         line, column = request.get(int, "line") - self.first_line + 1, None
         if "column" in request:
-            source = self.debugger.code.source
-            text = source.line_text(line) if 0 < line <= len(source.line_starts) else ""
-            column = PositionCodec(text, UTF_16).offset(0, request.get(int, "column") - self.first_column) + 1
+            offset = self.codec.offset(line - 1, request.get(int, "column") - self.first_column)
+            column = self.debugger.code.source.column(offset)
         breakpoint_: Breakpoint = self.debugger.break_at(
             line,
             column,
@@ -387,3 +374,10 @@ class EditorSession:
         if breakpoint_.start is None:
             return {"id": number, "verified": False, "message": breakpoint_.message}
         return {"id": number, "verified": True, "source": self.source(), **self.location(breakpoint_.start.span)}
+
+
+def _output(effect: Effect) -> tuple[str, str, Span | None]:
+    """Return what an editor shows of a PRINT or an error, its category, and where it comes from."""
+    if effect.kind == "PRINT":
+        return f"{one_line(effect.data['printed'], _ALL_OF_IT)}\n", "stdout", effect.span
+    return f"recovered: {effect.text}\n", "stderr", effect.span
