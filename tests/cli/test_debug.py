@@ -79,7 +79,7 @@ def test_slips_of_the_user() -> None:
     assert status == 0
     assert "unknown command `jump`; `help` lists the commands" in said
     assert "expected an integer, got `soon`" in said
-    assert "no statement begins here or further down" in said
+    assert "no statement begins on this line or below" in said
     assert any(line.startswith("`nobody` is not declared") for line in said)
     assert "there is no breakpoint 7" in said
     assert "cannot assign to `1`" in said

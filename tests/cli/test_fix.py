@@ -33,10 +33,10 @@ def test_cures_and_what_is_left(wrong: Path) -> None:
     assert result.returncode == 1
     assert wrong.read_text() == CURED
     assert result.stdout == (
-        f"{wrong}:1:14: missing `;` after the declaration (E104): put in `;`\n"
-        f"{wrong}:5:8: `ARM - 1` is not the name of an arm (E106): wrote `ARM_1` for `ARM - 1`\n"
-        f"{wrong}:7:4: the program does not end with `.` (E110): put in `.`\n"
-        f"{wrong}:5:13: missing `;` between two statements (E104): put in `;`\n"
+        f"{wrong}:1:14: missing `;` after the declaration (E104): inserted `;`\n"
+        f"{wrong}:5:8: `ARM - 1` is not the name of an arm (E106): replaced `ARM - 1` by `ARM_1`\n"
+        f"{wrong}:7:4: the program does not end with `.` (E110): inserted `.`\n"
+        f"{wrong}:5:13: missing `;` between two statements (E104): inserted `;`\n"
         f"{wrong}: 4 mistakes corrected\n"
         "error[E105]: unknown statement `MVOE`\n"
         f"  --> {wrong}:4:3\n"
@@ -106,8 +106,8 @@ def test_json(wrong: Path) -> None:
 
     assert row["program"] == str(wrong)
     assert [(one["code"], one["done"]) for one in row["cures"]][1:3] == [
-        ("E106", "wrote `ARM_1` for `ARM - 1`"),
-        ("E110", "put in `.`"),
+        ("E106", "replaced `ARM - 1` by `ARM_1`"),
+        ("E110", "inserted `.`"),
     ]
     assert [one["code"] for one in row["diagnostics"]] == ["E105"]
 
@@ -128,7 +128,7 @@ def test_what_is_typed_or_piped_in(name: str, tmp_path: Path) -> None:
     data = fed_to("fix", name, tmp_path, "--json", **fed)
 
     assert result.stdout == CURED
-    assert "(E110): put in `.`" in result.stderr
+    assert "(E110): inserted `.`" in result.stderr
     assert "MVOE" in result.stderr
     assert json.loads(data.stdout)[0]["text"] == CURED
     assert (result.returncode, data.returncode) == (1, 1)

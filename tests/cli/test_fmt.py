@@ -142,7 +142,7 @@ def test_wrong_program(written: Path) -> None:
 
     assert result.returncode == 4
     first, second = result.stderr.splitlines()
-    assert first == f"armwright: {wrong}:2:6: cannot be laid out: missing `;` between two statements (E104)"
+    assert first == f"armwright: {wrong}:2:6: cannot be formatted: missing `;` between two statements (E104)"
     assert second.startswith(f"armwright: {missing}: no such file")
     assert wrong.read_text() == "begin\ngrasp grasp\nend."
     assert written.read_text() == LAID_OUT

@@ -242,7 +242,7 @@ def test_a_way_round(tmp_path: Path) -> None:
     done = armwright("run", EXAMPLES / "around.rlo", "--cell", PUMA, "--around", "damped", "-o", tmp_path / "out")
 
     assert done.returncode == 0, done
-    assert "warning[W402]: ARM_1 leaves the straight line to `bottom`, by damped rates: " in done.stdout
+    assert "warning[W402]: ARM_1 leaves the straight line to `bottom`, by damped least squares: " in done.stdout
     assert "around.rlo:12:3" in done.stdout
     run = json.loads((tmp_path / "out" / "run.json").read_text())
     assert run["options"]["around"] == "damped"
@@ -255,7 +255,7 @@ def test_a_way_round(tmp_path: Path) -> None:
     assert line["deviation"] == detour["position_deviation"]
     assert f"{detour['position_deviation'] * 1e3:.1f} mm off the line" in done.stdout
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "the straight line is stopped 50 % of the path" in page
+    assert "the straight line is infeasible at 50 % of the path" in page
 
 
 def test_a_cell_that_goes_round(tmp_path: Path) -> None:

@@ -97,9 +97,9 @@ def test_the_warning(by: Around) -> None:
     assert SEAM[warning.span.start : warning.span.end] == "MOVE ARM_1 TO bottom STRAIGHTLY"
     assert "the straight line to `bottom`" in warning.message
     assert stops(SEAM, cell()).notes[0] in warning.notes[0]
-    assert ("via pose" if by == "via" else "damped rates") in warning.notes[1]
+    assert ("via pose" if by == "via" else "damped least squares") in warning.notes[1]
     assert re.search(r"[\d.]+ mm off the line, [\d.]+ mrad, \+[\d.]+ s$", warning.message)
-    assert "the straight line is stopped 50 % of the path" in note_of(the_line(recording))
+    assert "the straight line is infeasible at 50 % of the path" in note_of(the_line(recording))
 
 
 @pytest.mark.parametrize("by", ["via", "damped"])

@@ -407,7 +407,7 @@ def test_code_that_was_written_out(client: Client, tmp_path: Path) -> None:
 
 
 ODD_REQUESTS: list[tuple[str, dict[str, Any], str]] = [
-    ("fly", {}, "knows no request `fly`"),
+    ("fly", {}, "does not support the request `fly`"),
     ("stackTrace", {}, "threadId: missing"),
     ("stackTrace", {"threadId": "one"}, "expected a whole number"),
     ("stackTrace", {"threadId": 77}, "there is no thread 77"),

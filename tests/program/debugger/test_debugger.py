@@ -244,7 +244,7 @@ def test_back_after_the_end() -> None:
     """A program that is over can be taken back, and goes on from there to the same end."""
     debugger = load(LOOP)
     assert run(debugger, "continue").reason == "end"
-    with pytest.raises(DebuggerError, match="over"):
+    with pytest.raises(DebuggerError, match="has ended"):
         run(debugger, "next")
 
     assert lines(debugger, "back", 2) == [7, 6]
@@ -278,7 +278,7 @@ def test_breakpoint_moves_to_a_statement() -> None:
     assert first.start is not None
     assert first.start.line == 10
     assert last.start is None
-    assert last.message == "no statement begins here or further down"
+    assert last.message == "no statement begins on this line or below"
     assert inner.start is not None
     assert inner.start.line == 4
 
@@ -681,7 +681,7 @@ def test_values_that_cannot_be_given() -> None:
     for kept, text, message in (
         ("OBJ1", "3", "expected a FRAME"),
         ("T1", "obj1", "expected a TRANS"),
-        ("ARM_1", "obj1", "`ARM_1` cannot be given a value"),
+        ("ARM_1", "obj1", "`ARM_1` cannot be assigned a value"),
     ):
         with pytest.raises(ExpressionError, match=message):
             debugger.assign(kept, text)

@@ -90,7 +90,7 @@ def test_rounds() -> None:
     result = cure(text)
 
     assert result.text == "VAR f : FRAME ; BEGIN READ VISIONS (f);\n MOVE ARM_1 TO f END."
-    assert [one.what for one in result.cures] == ["put in `)`", "put in `;`"]
+    assert [one.what for one in result.cures] == ["inserted `)`", "inserted `;`"]
     assert fixed(Source("t.rlo", text), translate, rounds=1).text == text.replace("(f\n", "(f)\n")
 
 
@@ -99,10 +99,10 @@ def test_words_for_cures() -> None:
     result = cure("VAR f : FRAME ; n : SCALAR ; BEGIN n := +5 ; f = ARM - 1 ; MOVE ARM_1 TO f WITH SPEED n END.")
 
     assert [one.what for one in result.cures] == [
-        "wrote `=` for `:=`",
-        "left out `+`",
-        "wrote `ARM_1` for `ARM - 1`",
-        "put in `=`",
+        "replaced `:=` by `=`",
+        "removed `+`",
+        "replaced `ARM - 1` by `ARM_1`",
+        "inserted `=`",
     ]
     assert result.text == "VAR f : FRAME ; n : SCALAR ; BEGIN n = 5 ; f = ARM_1 ; MOVE ARM_1 TO f WITH SPEED = n END."
 
@@ -113,7 +113,7 @@ def test_matrix_row_by_row() -> None:
 
     assert "f = (0,1,0, -1,0,0, 0,0,1, 0.5,0.1,0.2) ;" in result.text
     assert not result.compilation.diagnostics
-    assert result.cures[0].what.startswith("wrote `(0,1,0, -1,0,0, 0,0,1, 0.5,0.")
+    assert "by `(0,1,0, -1,0,0, 0,0,1, 0.5,0." in result.cures[0].what
 
 
 def complaining(*fixes: Fix, code: str = "E101", message: str = "wrong") -> Diagnostic:

@@ -486,7 +486,7 @@ def test_numbers_and_comments() -> None:
 
 def test_wrong_programs() -> None:
     """A program with a slip of syntax is not laid out; the message tells the first slip and its place."""
-    with pytest.raises(UnformattableError, match=r"t\.rlo:2:1: cannot be laid out: unknown statement `MVOE` \(E105\)"):
+    with pytest.raises(UnformattableError, match=r"t\.rlo:2:1: cannot be formatted: unknown statement `MVOE` \(E105\)"):
         layout("BEGIN\nMVOE ARM_1 TO f ; GRASP GRASP\nEND")
     with pytest.raises(UnformattableError, match="E214"):
         layout("BEGIN FOR i = 1 TO 2 DO HALT END.", Standard.RLO_83)

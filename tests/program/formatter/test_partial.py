@@ -42,7 +42,7 @@ def test_program_without_mistakes() -> None:
 @pytest.mark.parametrize("text", ["", "BEGIN OPEN ; n = 1 ; END.", "100 BEGIN\n200 OPEN ;\n300 PAUSE  1 ;\n400 END."])
 def test_nothing_to_lay_out(text: str) -> None:
     """Where no line holds right statements alone, or lines are numbered, the first mistake is told."""
-    with pytest.raises(UnformattableError, match="cannot be laid out"):
+    with pytest.raises(UnformattableError, match="cannot be formatted"):
         around(text)
 
 

@@ -308,10 +308,10 @@ PIECES = (
 @pytest.mark.parametrize(
     ("line", "title"),
     [
-        ("MVOE ARM_1 TO part", "write `MOVE` instead of `MVOE`"),
-        ("MOVE ARM_1 TO pratt", "write `part` instead of `pratt`"),
-        ("MOVE ARM_1 TO part WITH SPED = 5", "write `SPEED` instead of `SPED`"),
-        ("MOVE ARM_1 TO fedeer", "write `FEEDER` instead of `fedeer`"),
+        ("MVOE ARM_1 TO part", "replace `MVOE` by `MOVE`"),
+        ("MOVE ARM_1 TO pratt", "replace `pratt` by `part`"),
+        ("MOVE ARM_1 TO part WITH SPED = 5", "replace `SPED` by `SPEED`"),
+        ("MOVE ARM_1 TO fedeer", "replace `fedeer` by `FEEDER`"),
     ],
 )
 def test_words_that_were_meant(line: str, title: str) -> None:

@@ -249,8 +249,8 @@ async def test_hover(editor: Editor) -> None:
     cup = await editor.hover("cup")
     assert "cup : FRAME" in cup
     assert "declared in line 2" in cup
-    assert "hangs on STATION in bench" in cup
-    assert "seen from STATION: `(1,0,0, 0,1,0, 0,0,1, 0,100,0)` mm" in cup
+    assert "attached to STATION in bench" in cup
+    assert "relative to STATION: `(1,0,0, 0,1,0, 0,0,1, 0,100,0)` mm" in cup
     assert "in the world: `(1,0,0, 0,1,0, 0,0,1, 450,100,0)` mm" in cup
     assert "parameter of `put`" in await editor.hover("thing STR")
     assert "stanford in bench" in await editor.hover("ARM_1")
@@ -353,16 +353,16 @@ async def test_rename(editor: Editor) -> None:
 
     refused = {
         ("above", "while"): "'while' is a reserved word of RLO-2",
-        ("above", "CUP"): "the program has a name 'CUP' already",
+        ("above", "CUP"): "the program already has a name 'CUP'",
         ("above", "a b"): "'a b' is no name",
         ("above", "x" * 32): "names have at most 31 characters in RLO-2",
         ("above", "arm_2"): "'arm_2' is the name of an arm",
         ("above", "thing"): "",
         ("ARM_1", "x"): "`ARM_1` is an arm",
-        ("cup", "x"): "`cup` gets its place from bench by this name",
+        ("cup", "x"): "`cup` gets its pose from bench by this name",
         ("XYZ", "x"): "`XYZ` is a function of the language",
         ("MOVE", "x"): "`MOVE` is no name",
-        ("thing", "pace"): "procedure `put` has a name 'pace' already",
+        ("thing", "pace"): "procedure `put` already has a name 'pace'",
     }
     for (word, new), message in refused.items():
         if not message:
@@ -426,7 +426,7 @@ async def test_code_actions(editor: Editor) -> None:
 
     here = lsp.Range(lsp.Position(3, 8), lsp.Position(3, 8))
     [action] = await editor.actions(here, "quickfix")
-    assert action.title == "write `ARM_1` instead of `ARM - 1`"
+    assert action.title == "replace `ARM - 1` by `ARM_1`"
     assert action.is_preferred
     assert [one.code for one in action.diagnostics or ()] == ["E106"]
     assert action.edit is not None

@@ -320,8 +320,8 @@ def test_an_error_tells_what_it_takes_back() -> None:
     answer = talk.enter("BEGIN OPEN ARM_1 ; MOVE ARM_1 TO a ; part = a ; MOVE ARM_1 TO c END")
 
     assert answer.remarks == (
-        "before that it had done: ARM_1 OPEN; ARM_1 MOVE: PTP a @100",
-        "put back: ARM_1, frame part, the clock to 0.000 s",
+        "effects before that were undone: ARM_1 OPEN; ARM_1 MOVE: PTP a @100",
+        "restored: ARM_1, frame part, the clock to 0.000 s",
     )
 
 
@@ -342,7 +342,7 @@ def test_statements_before_an_error_stay() -> None:
     answer = talk.enter("n = 1 ; OPEN ARM_1 ; MOVE ARM_1 TO c ; n = 2 ; n = 3")
 
     assert answer.trace == ("ARM_1 OPEN",)
-    assert answer.remarks == ("not done: the 2 statements behind it",)
+    assert answer.remarks == ("not executed: the 2 statements after it",)
     assert talk.enter("n").printed == ("1",)
 
 
@@ -492,7 +492,7 @@ def test_a_name_declared_anew() -> None:
     answer = talk.enter("VAR f : SCALAR")
     talk.enter("f = 3")
 
-    assert answer.remarks == ("`f` is declared anew; what it was before is now called `f_1`",)
+    assert answer.remarks == ("`f` is declared again; the previous one is now called `f_1`",)
     assert talk.enter("f").printed == ("3",)
     assert talk.enter("DIST(f_1, part)").printed == ("0",)
     assert talk.state.machine.state.tree.parent("PART") == "F_1"

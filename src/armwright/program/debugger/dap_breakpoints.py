@@ -61,7 +61,7 @@ def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[s
     except ArmwrightError as error:
         return {"dataId": None, "description": str(error)}
     if slot is None or debugger.machine.type_of(slot).sizes:
-        return {"dataId": None, "description": f"{name} is no frame and no variable"}
+        return {"dataId": None, "description": f"{name} is neither a frame nor a variable"}
     spelled = debugger.code.spelled(slot)
     return {"dataId": slot, "description": spelled, "accessTypes": ["write"], "canPersist": "'" not in slot}
 

@@ -83,7 +83,7 @@ def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     else:
         slot = debugger.evaluate(assignment[1], path, level).slot
         if slot is None:
-            raise RequestError(f"`{assignment[1]}` cannot be given a value; for a comparison write `({text})`")
+            raise RequestError(f"`{assignment[1]}` cannot be assigned a value; for a comparison write `({text})`")
         variable = debugger.assign(slot, assignment[2], path, level)
     answer = _variable(session, variable, path, level)
     return {"result": answer.pop("value"), **answer}
@@ -95,7 +95,7 @@ def set_variable(session: EditorSession, arguments: Arguments) -> dict[str, Any]
     group, path, level = session.variables(arguments)
     slot = next((variable.slot for variable in group if variable.name == name), None)
     if slot is None:
-        raise RequestError(f"{name} cannot be given a value")
+        raise RequestError(f"{name} cannot be assigned a value")
     return _variable(session, debugger.assign(slot, arguments.get(str, "value"), path, level), path, level)
 
 
@@ -105,7 +105,7 @@ def set_expression(session: EditorSession, arguments: Arguments) -> dict[str, An
     path, level = session.frame(arguments)
     slot = debugger.evaluate(arguments.get(str, "expression"), path, level).slot
     if slot is None:
-        raise RequestError("only variables, frames and elements can be given a value")
+        raise RequestError("only variables, frames and elements can be assigned a value")
     return _variable(session, debugger.assign(slot, arguments.get(str, "value"), path, level), path, level)
 
 

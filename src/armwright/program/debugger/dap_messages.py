@@ -51,15 +51,15 @@ def messages(stream: BinaryIO) -> Iterator[dict[str, Any] | Noise]:
                 return
             yield _message(body)
         elif header:
-            yield Noise("a header without a Content-Length that makes sense")
+            yield Noise("a header without a valid Content-Length")
 
 
 def _message(body: bytes) -> dict[str, Any] | Noise:
     try:
         message = json.loads(body.decode())
     except (ValueError, RecursionError):
-        return Noise("a message that is no JSON")
-    return message if isinstance(message, dict) else Noise("a message that is no object")
+        return Noise("a message that is not JSON")
+    return message if isinstance(message, dict) else Noise("a message that is not a JSON object")
 
 
 def framed(message: Mapping[str, Any]) -> bytes:

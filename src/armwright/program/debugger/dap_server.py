@@ -142,7 +142,7 @@ class Adapter:
             "disconnect": self._disconnect,
         }
         if command not in own:
-            raise RequestError(f"this debugger knows no request `{command}`")
+            raise RequestError(f"this debugger does not support the request `{command}`")
         return own[command](Arguments(arguments))
 
     def _initialize(self, arguments: Arguments) -> Mapping[str, Any]:

@@ -90,7 +90,7 @@ class Debugger:
         """
         self._standing()
         if self.over and command not in _BACK:
-            raise DebuggerError("the program is over")
+            raise DebuggerError("the program has ended")
         execution = self.execution
         self._origin = execution.position if command in _BACK else None
         match command:
@@ -178,7 +178,7 @@ class Debugger:
         Returns:
             The breakpoint; one without a ``start`` stops nothing, and its ``message`` says why.
         """
-        start, message = self.execution.statements.find(line, column), "no statement begins here or further down"
+        start, message = self.execution.statements.find(line, column), "no statement begins on this line or below"
         if start is not None:
             try:
                 self._check(condition, hits, self.execution.statements.procedure(start.index))
@@ -205,7 +205,7 @@ class Debugger:
         kind = self.machine.type_of(slot)
         known = slot.partition("[")[0] in {*self.machine.state.types, *self.machine.state.tree}
         if kind.sizes or not known:
-            raise ExpressionError(f"`{slot}` cannot be watched: it is no frame, variable or element")
+            raise ExpressionError(f"`{slot}` cannot be watched: it is not a frame, a variable or an element")
         self._check(condition, hits, None)
         result = Watch(number=next(self._numbers), slot=slot, condition=condition, hits=hits)
         self.execution.watches.append(result)
@@ -305,10 +305,10 @@ class Debugger:
         frame, view = self._frame(path, level), self.view
         kind = view.type_of(slot)
         if kind.sizes or kind.kind is VariableKind.EVENT or self.over:
-            raise ExpressionError(f"`{view.spelled(slot)}` cannot be given a value here")
+            raise ExpressionError(f"`{view.spelled(slot)}` cannot be assigned a value here")
         moving = mover(view, slot) if kind.kind is VariableKind.FRAME else None
         if moving is not None and not is_arm(slot):
-            raise ExpressionError(f"`{view.spelled(slot)}` is being moved; it can be placed when the MOVE is over")
+            raise ExpressionError(f"`{view.spelled(slot)}` is being moved; it can be assigned a pose after the MOVE")
         value = expressions.value_for(view, frame, text, kind.kind)
 
         def change(machine: Machine) -> None:

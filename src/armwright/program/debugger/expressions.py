@@ -78,8 +78,8 @@ def parse(text: str, machine: Machine, procedure: str | None) -> Parsed:
     if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
         return Parsed(source=source, node=node, sort=None)
     names = Names(None)
-    names.main.types = dict(types)
-    names.units = machine.code.units
+    names.symbols.types = dict(types)
+    names.symbols.units = machine.code.units
     sort = type_check.sort(names, node)
     _refuse(names.diagnostics)
     if sort is None:
@@ -146,7 +146,7 @@ def condition(text: str, machine: Machine, procedure: str | None) -> Parsed:
     """
     parsed = parse(text, machine, procedure)
     if parsed.sort not in (ExpressionType.CONDITION, ExpressionType.SCALAR):
-        raise ExpressionError(f"expected a condition, such as `n > 0`, but `{text}` is none")
+        raise ExpressionError(f"expected a condition, such as `n > 0`, but `{text}` is not one")
     return parsed
 
 

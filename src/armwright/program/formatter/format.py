@@ -33,7 +33,7 @@ class UnformattableError(InvalidValueError):
         """Say what is wrong first, and where."""
         self.source, self.first = source, first
         line, column = source.line(first.span.start), source.column(first.span.start)
-        super().__init__(f"{source.name}:{line}:{column}: cannot be laid out: {first.message} ({first.code})")
+        super().__init__(f"{source.name}:{line}:{column}: cannot be formatted: {first.message} ({first.code})")
 
 
 def formatted(source: Source, *, std: Standard = Standard.RLO_2, numbers: int | None = None, width: int = WIDTH) -> str:

@@ -131,10 +131,10 @@ class DiagnosticList(list[Diagnostic]):
         if count < MAX_PER_CODE:
             super().append(one)
         elif count == MAX_PER_CODE:
-            text = f"{MAX_PER_CODE:,} messages have the code {one.code}; those behind this place are not told"
+            text = f"{MAX_PER_CODE:,} messages have the code {one.code}; later ones are not reported"
             super().append(
                 attrs.evolve(
-                    one, message=text, label="this one, and perhaps more", secondary=(), notes=(), helps=(), fixes=()
+                    one, message=text, label="this one, and possibly more", secondary=(), notes=(), helps=(), fixes=()
                 )
             )
 

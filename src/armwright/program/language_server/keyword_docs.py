@@ -85,9 +85,12 @@ WORDS: Mapping[str, Word] = {
     "SPEED": Word(
         "WITH SPEED = number",
         f"From {LOWEST_SPEED:g} to {HIGHEST_SPEED:g}: {NORMAL_SPEED:g} is the normal speed, "
-        f"{HIGHEST_SPEED:g} the largest the arm allows.",
+        f"{HIGHEST_SPEED:g} the maximum of the arm.",
     ),
-    "BLEND": Word("WITH BLEND = distance", "Moves in straight lines between via points and rounds the corners within this distance."),
+    "BLEND": Word(
+        "WITH BLEND = distance",
+        "Moves in straight lines between via points and rounds the corners within this distance.",
+    ),
     "DURATION": Word("WITH DURATION = seconds", "The duration of the motion, instead of a speed."),
     # control
     "IF": Word(_IF, "Chooses between two statements."),
@@ -110,12 +113,12 @@ WORDS: Mapping[str, Word] = {
     # processes
     "COBEGIN": Word(_COBEGIN, "Runs blocks side by side and waits for all of them; an arm belongs to one of them."),
     "COEND": Word(_COBEGIN, "Closes COBEGIN."),
-    "PRIORITY": Word(_COBEGIN, "Of branches that run at the same time, the one with the larger number is served first."),
+    "PRIORITY": Word(
+        _COBEGIN, "Of branches that run at the same time, the one with the larger number is served first."
+    ),
     "SIGNAL": Word("SIGNAL event", "Adds one to an event."),
     "WAIT": Word("WAIT event", "Waits until an event has been signalled, and takes one from it."),
-    "LOCK": Word(
-        "LOCK (variables) DO statement", "Other LOCKs of these variables wait until the statement has ended."
-    ),
+    "LOCK": Word("LOCK (variables) DO statement", "Other LOCKs of these variables wait until the statement has ended."),
     # recovery
     "TRY": Word(_TRY, "Runs statements; when one of them fails, those after RECOVER run instead of the rest."),
     "RECOVER": Word(_TRY, "Precedes the statements that run when a statement after TRY fails."),

@@ -117,22 +117,24 @@ def _spelling(changed: Redeclared) -> dict[str, str]:
 def _messages(changed: Redeclared, old: Mapping[str, tree.Name], again: Collection[str]) -> list[str]:
     now = _spelling(changed)
     called = {key: f"`{old[key].text}`" for key in {*again, *changed.renamed}}
-    messages = {key: f"{called[key]} is declared anew" for key in sorted(again)}
+    messages = {key: f"{called[key]} is declared again" for key in sorted(again)}
     for key, name in sorted(changed.renamed.items()):
         if key in again:
-            messages[key] += f"; what it was before is now called `{now[name]}`"
+            messages[key] += f"; the previous one is now called `{now[name]}`"
         else:
-            messages[key] = f"{called[key]} means the new one; what it did before is now called `{now[name]}`"
+            messages[key] = (
+                f"{called[key]} uses the new declarations; the previous procedure is now called `{now[name]}`"
+            )
     return [*messages.values()]
 
 
 def _known_to_the_cell(name: tree.Name) -> Diagnostic:
     return Diagnostic(
         code="E203",
-        message=f"`{name.text}` cannot be declared anew: it was used, and the cell knows it by this name",
+        message=f"`{name.text}` cannot be declared again: it is a name of the cell, and it has been used",
         span=name.span,
         label="declared again here",
-        helps=("take another name, or go back with `:undo` to where it was declared",),
+        helps=("choose another name, or go back with `:undo` to its declaration",),
     )
 
 
@@ -157,10 +159,10 @@ def _with_units(
         raise NotNowError(
             Diagnostic(
                 code="E224",
-                message="UNITS comes too late: the numbers before it were read in other units",
+                message="UNITS must precede all statements: the numbers before it were read in other units",
                 span=new.span,
-                label="units are settled before the first statement",
-                helps=(f"write the unit behind a number, such as `25{changes[0].text.lower()}`",),
+                label="units can be changed only before the first statement",
+                helps=(f"write the unit after a number, such as `25{changes[0].text.lower()}`",),
             )
         )
     replaced = {dimension(unit.key) for unit in new.units if unit.key in UNITS}

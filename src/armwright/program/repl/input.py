@@ -109,7 +109,7 @@ def _advised(diagnostic: Diagnostic) -> Diagnostic:
     """Return a diagnostic with the advice that it needs where a program comes line by line."""
     if diagnostic.code != "E127" or not diagnostic.message.upper().startswith("`ELSE`"):
         return diagnostic
-    help_ = "an IF ends with its line: let that line end with ELSE, or write `BEGIN ... END` around the whole"
+    help_ = "an IF ends with its line: end that line with ELSE, or write `BEGIN ... END` around the entire statement"
     return attrs.evolve(diagnostic, helps=(*diagnostic.helps, help_))
 
 

@@ -24,13 +24,13 @@ def taken_back(before: Machine, after: Machine) -> list[str]:
     done = [effect.text for effect in after.state.effects[len(before.state.effects) :] if effect.kind not in SILENT]
     count = len(done) - _MAX_LISTED
     done = [*done[:_MAX_LISTED], f"{count} more"] if count > 1 else done
-    sentences = [f"before that it had done: {'; '.join(done)}"] if done else []
+    sentences = [f"effects before that were undone: {'; '.join(done)}"] if done else []
     back = _arms(before, after)
     if frames := [after.spelled(name) for name in _frames(before, after)]:
         back.append(f"{'frames' if len(frames) > 1 else 'frame'} {', '.join(frames)}")
     if after.state.ticks > before.state.ticks:
         back.append(f"the clock to {before.now:.3f} s")
-    return [*sentences, *([f"put back: {', '.join(back)}"] if back else [])]
+    return [*sentences, *([f"restored: {', '.join(back)}"] if back else [])]
 
 
 def _arms(before: Machine, after: Machine) -> list[str]:

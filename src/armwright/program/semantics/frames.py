@@ -30,7 +30,7 @@ def assign(context: Context, node: tree.Assign) -> None:
     if isinstance(target, tree.ArmName):
         help_ = f"move it, or write `READ SYSTEM ({target.key})`"
         names.report(
-            "E218", f"`{target.text}` is an arm and cannot be given a value", target.span, "an arm", advice=help_
+            "E218", f"`{target.text}` is an arm and cannot be assigned a value", target.span, "an arm", advice=help_
         )
     elif is_world(target):
         refuse_world(names, target)
@@ -49,7 +49,7 @@ def _misfit(names: Names, node: tree.Assign, takes: ExpressionType, actual: Expr
         return
     if not names.first("E217", *plain_keys(target)):
         return
-    if names.std is Standard.RLO_83:
+    if names.symbols.std is Standard.RLO_83:
         what = "one number" if takes is ExpressionType.SCALAR else "twelve numbers in `( )`"
         message, label = "", "a matrix" if actual is ExpressionType.MATRIX else "one number"
     else:
@@ -97,7 +97,7 @@ def affix(context: Context, node: tree.Affix) -> None:
     where, is_arm = written(node.at), isinstance(node.at, tree.ArmName)
 
     def advice(actual: ExpressionType) -> str:
-        is_place = actual is ExpressionType.FRAME and not (is_arm and names.std is Standard.RLO_83)
+        is_place = actual is ExpressionType.FRAME and not (is_arm and names.symbols.std is Standard.RLO_83)
         return f"for the transformation from {whence} to {where} write `AT INV({whence}) * {where}`" if is_place else ""
 
     need(

@@ -35,7 +35,7 @@ _NOT_ASKED: dict[type, str] = {
     tree.Departure: "allows no departure point",
     tree.Blend: "has no corners",
 }
-SPEED_NOTE = "100 is the normal speed and 120 the largest the arm allows"
+SPEED_NOTE = "100 is the normal speed and 120 the maximum of the arm"
 
 
 def move(context: Context, node: tree.Move) -> None:

@@ -49,8 +49,8 @@ def is_world(node: tree.Expression) -> bool:
 
 
 def refuse_world(names: Names, node: tree.Expression) -> None:
-    """Say that the root of all frames cannot be given a value."""
-    names.report("E218", f"{called(node)} cannot be given a value", node.span, "the root of all frames")
+    """Say that the root of all frames cannot be assigned a value."""
+    names.report("E218", f"{called(node)} cannot be assigned a value", node.span, "the root of all frames")
 
 
 def need(
@@ -214,9 +214,9 @@ def _binary(names: Names, node: tree.Binary) -> ExpressionType | None:
 
 
 def _matrix(names: Names, node: tree.Matrix) -> ExpressionType | None:
-    fault = pose_literals.check(node, names.units)
+    fault = pose_literals.check(node, names.symbols.units)
     if fault is not None:
-        if len(node.items) == 3 and names.std is Standard.RLO_2:
+        if len(node.items) == 3 and names.symbols.std is Standard.RLO_2:
             fault = attrs.evolve(fault, helps=(f"for a translation write `XYZ{written(node)}`",))
         names.diagnostics.append(fault)
     for position, item in enumerate(node.items):

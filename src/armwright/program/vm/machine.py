@@ -218,7 +218,7 @@ class Machine:
         self.look(process, name)
         leader = self.state.tree.leader(name)
         if is_arm(name) or name == WORLD:
-            text = f"`{self.spelled(name)}` cannot be given a value"
+            text = f"`{self.spelled(name)}` cannot be assigned a value"
             raise self.error(process, "E218", text, span, "an arm" if is_arm(name) else "the root of all frames")
         if leader != name and (is_arm(leader) or leader == WORLD):
             text = (

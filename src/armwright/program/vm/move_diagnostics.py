@@ -23,7 +23,7 @@ _ON_THE_PATH = {
 # Farther away nobody counts tenths [mm].
 _FAR = 1e6
 _THROUGH_FRAMES = ("SPLINE", "BLEND")
-_METHODS = {"via": "by a via pose", "damped": "by damped rates"}
+_METHODS = {"via": "by a via pose", "damped": "by damped least squares"}
 
 
 def stopped(obstacle: Obstacle, goal: str, name: str, arm: Arm) -> str:
@@ -42,14 +42,14 @@ def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) ->
         to: the frames it goes to, as the program spells them.
         arm: name of the arm.
     """
-    position = f"at {_position(obstacle.place)} mm from the base of {arm}"
+    position = f"{_position(obstacle.place)} mm from the base of {arm}"
     if obstacle.along is None or obstacle.length is None or obstacle.certain:
-        return f"{position}: {obstacle.reason}"
+        return f"at {position}: {obstacle.reason}"
     part = f"{obstacle.fraction * 100:.0f} % of the path"
     if kind in _THROUGH_FRAMES:
         before = "the start" if obstacle.pose == 0 else f"`{to[obstacle.pose - 1]}`"
         part += f" from {before} (segment {obstacle.pose + 1} of {len(to)})"
-    return f"{part}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, {position}: {obstacle.reason}"
+    return f"{part}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, at {position}: {obstacle.reason}"
 
 
 def detour_advice(obstacle: Obstacle, kind: str, around: str | None) -> tuple[str, ...]:
@@ -64,17 +64,17 @@ def detour_advice(obstacle: Obstacle, kind: str, around: str | None) -> tuple[st
         return ()
     if kind in _THROUGH_FRAMES:
         advice = "another VIA, or straight moves from frame to frame"
-        return (f"a path through several frames has no detour by `--around`; {advice} may do",)
+        return (f"`--around` has no detours for a path through several frames; try {advice}",)
     if around is None:
         return ("`armwright run --around via` searches for a detour",)
-    other = "`--around via` searches farther" if around == "damped" else "a VIA of the program may lead around it"
-    return (f"no detour {_METHODS[around]} was found on which the whole MOVE could be made; {other}",)
+    other = "`--around via` searches a wider region" if around == "damped" else "try a VIA in the program"
+    return (f"no detour {_METHODS[around]} was found on which the whole MOVE is feasible; {other}",)
 
 
 def _lead(detour: Detour, arm: str) -> str:
     """Return the course of a detour."""
     if detour.via is None:
-        return "the tool follows the line by damped rates, and leaves it where the arm is nearly singular"
+        return "the tool follows the line by damped least squares, and deviates where the arm is nearly singular"
     return f"the tool stops at a via pose at {_position(detour.via[:3, 3])} mm from the base of {arm}"
 
 
@@ -89,9 +89,15 @@ def note_of(run: RunStage) -> str:
         )
     if stage.obstacle is not None and stage.detour is not None:
         why = where_and_why(stage.obstacle, stage.kind, run.to, run.arm)
-        notes = [f"the straight line is stopped {why}", f"{_lead(stage.detour, run.arm)}: {stage.detour.price}", *notes]
+        notes = [
+            f"the straight line is infeasible at {why}",
+            f"{_lead(stage.detour, run.arm)}: {stage.detour.price}",
+            *notes,
+        ]
     elif stage.obstacle is not None:
-        notes.append(f"without stops it is stopped {where_and_why(stage.obstacle, stage.kind, run.to, run.arm)}")
+        notes.append(
+            f"without stops the path is infeasible at {where_and_why(stage.obstacle, stage.kind, run.to, run.arm)}"
+        )
     if stage.certificate is not None:
         notes.append(stage.certificate.summary)
     return "; ".join(notes)
@@ -107,8 +113,11 @@ def detour_warning(run: RunStage) -> Diagnostic | None:
         severity=Severity.WARNING,
         message=f"{run.arm} leaves the straight line to `{run.to[-1]}`, {_METHODS[detour.method]}: {detour.price}",
         span=run.span,
-        label=f"stopped {obstacle.fraction * 100:.0f} % of the path; begun at {run.t0:.3f} s",
-        notes=(f"it is stopped {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}", _lead(detour, run.arm)),
+        label=f"infeasible at {obstacle.fraction * 100:.0f} % of the path; begun at {run.t0:.3f} s",
+        notes=(
+            f"the line is infeasible at {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",
+            _lead(detour, run.arm),
+        ),
     )
 
 
@@ -120,11 +129,11 @@ def stops_warning(run: RunStage) -> Diagnostic | None:
     return Diagnostic(
         code="W403",
         severity=Severity.WARNING,
-        message=f"{run.arm} stops at every frame on its path to `{run.to[-1]}`: rounded corners cannot be followed",
+        message=f"{run.arm} stops at every frame on its path to `{run.to[-1]}`: it cannot follow rounded corners",
         span=run.span,
         label=f"begun at {run.t0:.3f} s",
-        notes=(f"without stops it is stopped {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",),
-        helps=("a frame farther from that position, or another configuration at the start, may do without stops",),
+        notes=(f"without stops the path is infeasible at {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",),
+        helps=("a frame farther from that position, or another initial configuration, may need no stops",),
     )
 
 
