@@ -9,8 +9,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.motion.tolerance import Tolerance
 from armwright.notebook import html_lines
+from armwright.spatial.poses import position_text
 
 LimitName: TypeAlias = Literal["speed", "acceleration", "effort"]
 LIMITS: tuple[LimitName, ...] = ("speed", "acceleration", "effort")
@@ -42,40 +42,26 @@ class Certificate:
 
     arm: Arm
     deviation_tolerance: float
-    deviation: float
-    deviation_sampled: float
+    deviation: float = 0.0
+    deviation_sampled: float = 0.0
     rotation_tolerance: float
-    rotation: float
-    rotation_sampled: float | None
-    worst_time: float
+    rotation: float = 0.0
+    rotation_sampled: float | None = 0.0
+    worst_time: float = 0.0
     worst_position: Array
-    knots: int
-    samples: int
+    knots: int = 1
+    samples: int = 0
     peaks: dict[LimitName, Array]
-    factor: float
-    because: tuple[LimitName, int] | None
+    factor: float = 1.0
+    because: tuple[LimitName, int] | None = None
     backward: float | None = None
 
-    @classmethod
-    def trivial(cls, arm: Arm, position: Array, tolerance: Tolerance) -> Certificate:
-        """Return that of an arm which stands still with its tool at a position (3,) [m]."""
-        still = np.zeros(arm.n)
-        return cls(
-            arm=arm,
-            deviation_tolerance=tolerance.position,
-            deviation=0.0,
-            deviation_sampled=0.0,
-            rotation_tolerance=tolerance.orientation,
-            rotation=0.0,
-            rotation_sampled=0.0,
-            worst_time=0.0,
-            worst_position=position,
-            knots=1,
-            samples=0,
-            peaks={"speed": still, "acceleration": still, "effort": still},
-            factor=1.0,
-            because=None,
-            backward=0.0,
+    def run_slower(
+        self, factor: float, peaks: dict[LimitName, Array], because: tuple[LimitName, int] | None
+    ) -> Certificate:
+        """Return that of the same motion run ``factor`` times slower for a limit, with the peaks that it has then."""
+        return attrs.evolve(
+            self, worst_time=self.worst_time * factor, peaks=peaks, factor=self.factor * factor, because=because
         )
 
     def retimed(self, stretch: float) -> Certificate:
@@ -90,10 +76,9 @@ class Certificate:
     @property
     def summary(self) -> str:
         """What it says, in one line."""
-        parts = [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
-        uses = "".join(f", {part:.0%} of the {name} of {self.arm.called(joint)}" for name, joint, part in parts)
+        uses = "".join(f", {part:.0%} of the {name} of {self.arm.called(joint)}" for name, joint, part in self._uses)
         return (
-            f"certificate {'holds' if self.holds else 'DOES NOT HOLD'}: within {self.deviation * 1e3:.3f} of "
+            f"certificate {self._verdict}: within {self.deviation * 1e3:.3f} of "
             f"{self.deviation_tolerance * 1e3:g} mm, {self.rotation * 1e3:.3f} of "
             f"{self.rotation_tolerance * 1e3:g} mrad{uses}"
         )
@@ -113,6 +98,15 @@ class Certificate:
             and all(self.use(name)[1] <= 1 + 1e-9 for name in LIMITS)
         )
 
+    @property
+    def _verdict(self) -> str:
+        return "holds" if self.holds else "DOES NOT HOLD"
+
+    @property
+    def _uses(self) -> list[tuple[LimitName, int, float]]:
+        """Of each limit that some joint has: its name, the joint nearest to it, and which part of it that uses."""
+        return [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
+
     def use(self, name: LimitName) -> tuple[int, float]:
         """Return the joint, from 0, that comes nearest to a limit, and which part of the limit it uses."""
         parts = self.peaks[name] / self.arm.limit(name)
@@ -121,7 +115,6 @@ class Certificate:
 
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data in SI units, as JSON can carry it."""
-        limits = {name: self.use(name) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()}
         return {
             "holds": self.holds,
             "deviation_tolerance": self.deviation_tolerance,
@@ -134,28 +127,25 @@ class Certificate:
             "worst_position": self.worst_position.tolist(),
             "knots": self.knots,
             "samples": self.samples,
-            "of_limits": {name: {"joint": joint + 1, "part": part} for name, (joint, part) in limits.items()},
+            "of_limits": {name: {"joint": joint + 1, "part": part} for name, joint, part in self._uses},
             "slower": self.factor,
             "because": None if self.because is None else {"limit": self.because[0], "joint": self.because[1] + 1},
         }
 
     def __str__(self) -> str:
         """Say it in a few lines."""
-        x, y, z = self.worst_position * 1e3
-        verdict = "holds" if self.holds else "DOES NOT HOLD"
         within = (
-            f"{verdict}: tool within {self.deviation * 1e3:.4f} mm of the path (asked "
+            f"{self._verdict}: tool within {self.deviation * 1e3:.4f} mm of the path (asked "
             f"{self.deviation_tolerance * 1e3:g} mm), within {self.rotation * 1e3:.3f} mrad of its orientation (asked "
             f"{self.rotation_tolerance * 1e3:g} mrad)"
         )
         sampled = (
             f"largest distance sampled {self.deviation_sampled * 1e3:.4f} mm, at {self.worst_time:.3f} s, "
-            f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base; {self.knots} knots, {self.samples} samples"
+            f"{position_text(self.worst_position)}; {self.knots} knots, {self.samples} samples"
         )
         lines = [within, sampled]
-        uses = [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
-        if uses:
-            lines.append("; ".join(f"{self.arm.called(j)} uses {part:.0%} of its {name}" for name, j, part in uses))
+        if uses := [f"{self.arm.called(joint)} uses {part:.0%} of its {name}" for name, joint, part in self._uses]:
+            lines.append("; ".join(uses))
         if self.because is not None:
             lines.append(slower(self.arm, self.factor, self.because, " than the tool speed has it"))
         return "\n".join(lines)

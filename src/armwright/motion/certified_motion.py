@@ -38,17 +38,9 @@ class CertifiedMotion:
 
     def slowed(self, arm: AnyArm, factor: float, because: tuple[LimitName, int]) -> CertifiedMotion:
         """Return the same motion run ``factor`` times slower, for a limit of a joint, from 0."""
-        trajectory, certificate = self.trajectory.slowed(factor), self.certificate
-        return CertifiedMotion(
-            trajectory=trajectory,
-            certificate=attrs.evolve(
-                certificate,
-                worst_time=certificate.worst_time * factor,
-                peaks=limit_peaks(arm, trajectory),
-                factor=certificate.factor * factor,
-                because=because,
-            ),
-        )
+        trajectory = self.trajectory.slowed(factor)
+        certificate = self.certificate.run_slower(factor, limit_peaks(arm, trajectory), because)
+        return CertifiedMotion(trajectory=trajectory, certificate=certificate)
 
     def on_ticks(self, period: float) -> CertifiedMotion:
         """Return the same motion slowed by less than a servo period [s], to end on a whole number of them."""
@@ -102,7 +94,7 @@ def certificate_of(
         peaks: of speeds, accelerations and efforts, where they are known.
     """
     solver = solver_of(arm)
-    time = float(error.times[error.sampled_position.argmax()]) if time is None else time
+    time = error.worst_time if time is None else time
     return Certificate(
         arm=solver.arm,
         deviation_tolerance=allowed.position,
@@ -116,8 +108,6 @@ def certificate_of(
         knots=len(error.position) + 1,
         samples=error.samples * len(error.position),
         peaks=limit_peaks(arm, trajectory) if peaks is None else peaks,
-        factor=1.0,
-        because=None,
         backward=error.backward,
     )
 
@@ -148,7 +138,7 @@ def fastest(
     """
     path, error = tracking.trajectory, tracking.error
     run = timed(solver_of(arm).arm, path, np.ones(len(path.times) - 1))
-    time = run.when(float(error.times[error.sampled_position.argmax()]))
+    time = run.when(error.worst_time)
     trajectory, efforts, slower = _inside_efforts(arm, run.trajectory, weak=weak)
     stretch, factor = trajectory.duration / run.trajectory.duration, trajectory.duration / nominal
     peaks: dict[LimitName, Array] = {
@@ -171,16 +161,21 @@ def slowed_alike(arm: AnyArm, tracking: Tracking, allowed: Tolerance) -> Certifi
     factor, because = slowing(model, {"speed": planned.peaks(1), "acceleration": planned.peaks(2)})
     trajectory, _, slower = _inside_efforts(arm, planned.slowed(factor), weak=True)
     factor = trajectory.duration / planned.duration
-    error = tracking.error
-    time = float(error.times[error.sampled_position.argmax()]) * factor
-    certificate = certificate_of(arm, trajectory, error, allowed, time=time)
+    certificate = certificate_of(arm, trajectory, tracking.error, allowed, time=tracking.error.worst_time * factor)
     because = because if slower is None else ("effort", slower)
     return CertifiedMotion(trajectory=trajectory, certificate=attrs.evolve(certificate, factor=factor, because=because))
 
 
 def standstill(solver: Solver, q: Array, allowed: Tolerance) -> CertifiedMotion:
     """Return the motion to where the arm is."""
-    certificate = Certificate.trivial(solver.arm, solver.forward(q)[:3, 3], allowed)
+    certificate = Certificate(
+        arm=solver.arm,
+        deviation_tolerance=allowed.position,
+        rotation_tolerance=allowed.orientation,
+        worst_position=solver.forward(q)[:3, 3],
+        peaks=dict.fromkeys(LIMITS, np.zeros(solver.arm.n)),
+        backward=0.0,
+    )
     return CertifiedMotion(trajectory=hold(q, 0.0), certificate=certificate)
 
 

@@ -28,6 +28,7 @@ from armwright.motion.straight_path import StraightPath
 from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
 from armwright.motion.trajectory import Trajectory, join
 from armwright.motion.xspline_path import xspline
+from armwright.spatial.poses import position_text
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
 DetourMethod: TypeAlias = Literal["via", "damped"]
@@ -98,10 +99,10 @@ class Detour:
 
     trajectory: Trajectory
     method: Literal["line", "via", "damped"]
-    obstacle: PathError | None
-    via: Array | None
+    obstacle: PathError | None = None
+    via: Array | None = None
     price: Price
-    legs: tuple[CertifiedMotion, ...]
+    legs: tuple[CertifiedMotion, ...] = ()
 
 
 def line_or_detour(
@@ -149,7 +150,9 @@ def line_or_detour(
     else:
         slower = 0.0 if requested is None else line.trajectory.duration - requested.duration
         crawls = requested is not None and slower > max((_CRAWL - 1) * requested.duration, _WAIT)
-        straight = _straight(line, slower if crawls else 0.0)
+        certificate = line.certificate
+        price = Price(distance=certificate.deviation, rotation=certificate.rotation, time=slower if crawls else 0.0)
+        straight = Detour(trajectory=line.trajectory, method="line", price=price, legs=(line,))
         if requested is None or not crawls:
             return straight
         obstacle = _crawl(requested, line)
@@ -165,12 +168,6 @@ def line_or_detour(
     return detour
 
 
-def _straight(line: CertifiedMotion, slower: float) -> Detour:
-    """Return the line itself."""
-    price = Price(distance=line.certificate.deviation, rotation=line.certificate.rotation, time=slower)
-    return Detour(trajectory=line.trajectory, method="line", obstacle=None, via=None, price=price, legs=(line,))
-
-
 def _crawl(requested: StraightPath, line: CertifiedMotion) -> PathError:
     """Return what makes a line a crawl: the joint for which it is slowed most, and where that is."""
     factor, because = line.certificate.factor, line.certificate.because
@@ -179,10 +176,9 @@ def _crawl(requested: StraightPath, line: CertifiedMotion) -> PathError:
     worst = int(line.trajectory.segment_peaks(order)[:, because[1]].argmax())
     arm = line.certificate.arm
     s = _nearest(requested, forward(arm, line.trajectory(line.trajectory.times[worst])))
-    x, y, z = requested.at(0, np.array([s]))[0, :3, 3] * 1e3
     joint = arm.called(because[1])
     reason = f"for the {because[0]} of {joint} the line would have to be run {factor:.0f} times slower"
-    message = f"near ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base {reason}"
+    message = f"near {position_text(requested.at(0, np.array([s]))[0, :3, 3])} {reason}"
     return PathError("singular", 0, s, message, joint=because[1] + 1, reason=reason)
 
 
@@ -314,7 +310,7 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
         rotation=float(error.orientation.max()),
         time=trajectory.duration - line.duration,
     )
-    return Detour(trajectory=trajectory, method="damped", obstacle=obstacle, via=None, price=price, legs=())
+    return Detour(trajectory=trajectory, method="damped", obstacle=obstacle, price=price)
 
 
 def _easing(arm: Arm, trajectory: Trajectory) -> Array:

@@ -91,6 +91,11 @@ class TrackingError(NamedTuple):
     samples: int
     backward: float | None = None
 
+    @property
+    def worst_time(self) -> float:
+        """When the largest distance of all was sampled [s]."""
+        return float(self.times[self.sampled_position.argmax()])
+
 
 class HandMotion(Protocol):
     """A motion of the tool that the joints are to follow."""

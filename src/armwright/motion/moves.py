@@ -17,7 +17,7 @@ from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, 
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
 from armwright.motion.branch_selection import configurations_at, configurations_through
-from armwright.motion.certificate import Certificate
+from armwright.motion.certificate import Certificate, LimitName
 from armwright.motion.certified_motion import certificate_of, limit_peaks
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
 from armwright.motion.limit_utilization import slowing_for_limits
@@ -26,7 +26,7 @@ from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.tolerance import Tolerance, tolerance
 from armwright.motion.tool_path import Orientation, ToolPath, tool_path
-from armwright.motion.tracking import Task, Tracking, path_error, track
+from armwright.motion.tracking import Task, Tracking, track
 from armwright.motion.trajectory import Trajectory, join
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation
@@ -68,17 +68,12 @@ class Move:
     certificate: Certificate | None = None
     detours: tuple[Detour, ...] = ()
 
-    def slowed(self, factor: float) -> Move:
-        """Return the same move run ``factor`` times slower."""
+    def slowed(self, factor: float, because: tuple[LimitName, int] | None = None) -> Move:
+        """Return the same move run ``factor`` times slower, for a limit of a joint, from 0, if for any."""
         slow = self.trajectory.slowed(factor)
         certificate = self.certificate
         if certificate is not None:
-            certificate = attrs.evolve(
-                certificate,
-                worst_time=certificate.worst_time * factor,
-                peaks=limit_peaks(self.arm, slow),
-                factor=certificate.factor * factor,
-            )
+            certificate = certificate.run_slower(factor, limit_peaks(self.arm, slow), because or certificate.because)
         return attrs.evolve(
             self,
             times=self.times * factor,
@@ -324,14 +319,7 @@ def _refuse_blend(blend: ArrayLike | None) -> None:
 def _inside_limits(arm: AnyArm, move: Move) -> Move:
     """Return a move slowed as much as its limits ask for."""
     factor, because = slowing_for_limits(arm, move.trajectory)
-    if factor == 1:
-        return move
-    slow = move.slowed(factor)
-    return (
-        slow
-        if slow.certificate is None
-        else attrs.evolve(slow, certificate=attrs.evolve(slow.certificate, because=because))
-    )
+    return move if factor == 1 else move.slowed(factor, because)
 
 
 def _followed(
@@ -352,15 +340,14 @@ def _followed(
     knots = hand.first_knots(_STEP, _MIN_KNOTS)
     errors: dict[str, PathError] = {}
     for branch in sorted(solution.allowed, key=lambda branch: joint_distance(arm, near, branch.q)):
-        task = Task(solver, hand, branch.q, allowed, allowed, rest=from_rest, whole_turns=True, most_knots=_MAX_KNOTS)
-        tracked = track(task, knots)
-        if isinstance(tracked, Tracking):
-            return branch.label, tracked
-        errors[branch.label] = path_error(hand, tracked)
-    first = next(iter(errors.values()))
+        task = Task(solver, hand, branch.q, allowed, allowed, rest=from_rest, whole_turns=True, max_knots=_MAX_KNOTS)
+        try:
+            return branch.label, track(task, knots)
+        except PathError as error:
+            errors[branch.label] = error
+    nearest = next(iter(errors.values()))
     reasons = "; ".join(f"{label}: {error}" for label, error in errors.items())
-    message = f"no branch carries the tool to its last pose. {reasons}"
-    raise PathError(first.cause, first.segment, first.fraction, message, joint=first.joint, reason=first.reason)
+    raise nearest.restated(nearest.segment, f"no branch carries the tool to its last pose. {reasons}")
 
 
 def _legs(arm: AnyArm, q: Array, X: Array, *, method: DetourMethod, deviation: float, speed: float) -> list[Detour]:
@@ -370,8 +357,7 @@ def _legs(arm: AnyArm, q: Array, X: Array, *, method: DetourMethod, deviation: f
         try:
             legs.append(line_or_detour(arm, q, goal, method=method, deviation=deviation, speed=speed))
         except PathError as error:
-            message = f"from pose {i + 1} to pose {i + 2}: {error}"
-            raise PathError(error.cause, i, error.fraction, message, joint=error.joint, reason=error.reason) from error
+            raise error.restated(i, f"from pose {i + 1} to pose {i + 2}: {error}") from error
         q = legs[-1].trajectory(legs[-1].trajectory.duration)
     return legs
 

@@ -58,6 +58,10 @@ class PathError(ArmwrightError, ValueError):
         self.reason = message if reason is None else reason
         super().__init__(message)
 
+    def restated(self, segment: int, message: str) -> PathError:
+        """Return the same error by another number of its segment, and in other words."""
+        return PathError(self.cause, segment, self.fraction, message, joint=self.joint, reason=self.reason)
+
 
 class Obstruction(NamedTuple):
     """What stops the arm.

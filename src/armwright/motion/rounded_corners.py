@@ -11,7 +11,7 @@ it one.
 from __future__ import annotations
 
 import contextlib
-from functools import cached_property
+from functools import cache, partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -28,14 +28,14 @@ from armwright.motion.chain import chain
 from armwright.motion.efforts import slowing_for_efforts
 from armwright.motion.ends import check_ends
 from armwright.motion.leg_distance import farthest_from_legs
-from armwright.motion.obstruction import MAX_SLOWDOWN, Obstruction, PathError
+from armwright.motion.obstruction import MAX_SLOWDOWN, PathError
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import COARSE, coarse_line
 from armwright.motion.timing_law import Timed, timed
 from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
 from armwright.motion.tool_path import tool_path
-from armwright.motion.tracking import Task, Tracking, path_error, track
+from armwright.motion.tracking import Task, Tracking, track
 from armwright.motion.trapezoidal_profile import shortest_trapezoid
 from armwright.spatial.rotations import rotation_vector
 
@@ -203,23 +203,24 @@ def _never_slower(task: _Task) -> RoundedMotion:
 
     Beside a singularity a joint may be too fast: the timing slows the tool there, no further than stops would.
     """
-    stops = _Stops(task)
+    with_stops = cache(partial(_with_stops, task))  # worked out where it matters
     try:
         motion, ratio = _tightened(task, np.inf)
     except PathError as error:
-        if stops.run is None:
+        if (stopping := with_stops()) is None:
             raise
         return RoundedMotion(
-            motion=stops.run, stops=_WITH_STOPS.format("the arm cannot follow rounded corners"), stopped_by=error
+            motion=stopping, stops=_WITH_STOPS.format("the arm cannot follow rounded corners"), stopped_by=error
         )
-    if ratio > MAX_SLOWDOWN and stops.run is None:
+    if ratio > MAX_SLOWDOWN and with_stops() is None:
         return _without_stop(task)
     # Where weight alone is too much for a motor the legs with stops fare no better.
     with contextlib.suppress(IncapableArmError):
         motion = _inside_efforts(task, motion)
     duration = motion.trajectory.duration
-    if duration > stops.least and stops.run is not None and stops.run.trajectory.duration < duration:
-        return RoundedMotion(motion=stops.run, stops=_WITH_STOPS.format("rounded corners would take longer"))
+    stopping = with_stops() if duration > _shortest_with_stops(task) else None
+    if stopping is not None and stopping.trajectory.duration < duration:
+        return RoundedMotion(motion=stopping, stops=_WITH_STOPS.format("rounded corners would take longer"))
     return RoundedMotion(motion=motion)
 
 
@@ -318,14 +319,11 @@ def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, Timed]:
     blends = np.concatenate([[_NO_BLEND], widths / top, [_NO_BLEND]])
     hand = tool_path(legs.poses, times, blends, ends="running", orientation="geodesic")
     close, wide = tolerance(task.closer), tolerance(_CLOSER * task.closer)
-    tracked = track(
-        Task(solver, hand, task.q_start, close, wide, rest=False, max_slowdown=most),
-        hand.first_knots(_STEP, _MIN_KNOTS),
-    )
-    if isinstance(tracked, Obstruction):
-        error = path_error(hand, tracked)
-        segment = legs.numbers[error.segment + 1] - 1
-        raise PathError(error.cause, segment, error.fraction, str(error), joint=error.joint, reason=error.reason)
+    following = Task(solver, hand, task.q_start, close, wide, rest=False, max_slowdown=most)
+    try:
+        tracked = track(following, hand.first_knots(_STEP, _MIN_KNOTS))
+    except PathError as error:
+        raise error.restated(legs.numbers[error.segment + 1] - 1, str(error)) from None
     caps = _caps(tracked.trajectory.times, times, widths / top, legs.speeds / top)
     return tracked, timed(solver.arm, tracked.trajectory, caps)
 
@@ -355,44 +353,35 @@ def _inside_efforts(task: _Task, motion: CertifiedMotion) -> CertifiedMotion:
     return motion.slowed(task.arm, slowdown.factor, ("effort", slowdown.joint))
 
 
-class _Stops:
-    """The same legs as straight lines one by one, worked out where it matters."""
+def _shortest_with_stops(task: _Task) -> float:
+    """Return a time that no run with a stop at every pose is shorter than [s]; 0 where it is not known."""
+    solver = solver_of(task.arm)
+    limits = solver.arm.limit("speed"), solver.arm.limit("acceleration")
+    q, failed = chain(solver, task.legs.poses, task.q_start)
+    if failed is not None or not np.isfinite(limits[1]).all():
+        return 0.0
+    by_joints = [shortest_trapezoid(way, *limits) for way in np.diff(q, axis=0)]
+    return float(np.maximum(task.legs.lengths / task.legs.speeds, by_joints).sum())
 
-    def __init__(self, task: _Task) -> None:
-        """Remember the legs."""
-        self._task = task
 
-    @cached_property
-    def least(self) -> float:
-        """A time that no run with a stop at every pose is shorter than [s]; 0 where it is not known."""
-        task = self._task
-        arm = solver_of(task.arm).arm
-        limits = arm.limit("speed"), arm.limit("acceleration")
-        q, failed = chain(solver_of(task.arm), task.legs.poses, task.q_start)
-        if failed is not None or not np.isfinite(limits[1]).all():
-            return 0.0
-        by_joints = [shortest_trapezoid(way, *limits) for way in np.diff(q, axis=0)]
-        return float(np.maximum(task.legs.lengths / task.legs.speeds, by_joints).sum())
-
-    @cached_property
-    def run(self) -> CertifiedMotion | None:
-        """The lines, with a stop at every pose; None where they cannot be run."""
-        task, q = self._task, self._task.q_start
-        lines: list[CertifiedMotion] = []
-        for i in task.legs.numbers[1:]:
-            try:
-                lines.append(coarse_line(task.arm, q, task.path.poses[i], deviation=task.deviation, speed=task.speed))
-            except PathError:
-                return None
-            q = lines[-1].trajectory(lines[-1].trajectory.duration)
-        run = joined(lines)
-        certificate = attrs.evolve(
-            run.certificate,
-            deviation_tolerance=task.allowed.position,
-            # Poses that are passed with others are as near to them.
-            deviation=run.certificate.deviation + task.off - task.closer,
-            rotation_tolerance=task.allowed.orientation,
-            rotation=run.certificate.rotation + ROTATION_PER_METRE * (task.off - task.closer),
-            backward=None,
-        )
-        return attrs.evolve(run, certificate=certificate)
+def _with_stops(task: _Task) -> CertifiedMotion | None:
+    """Return the legs as straight lines one by one, with a stop at every pose; None where they cannot be run."""
+    q = task.q_start
+    lines: list[CertifiedMotion] = []
+    for i in task.legs.numbers[1:]:
+        try:
+            lines.append(coarse_line(task.arm, q, task.path.poses[i], deviation=task.deviation, speed=task.speed))
+        except PathError:
+            return None
+        q = lines[-1].trajectory(lines[-1].trajectory.duration)
+    run = joined(lines)
+    certificate = attrs.evolve(
+        run.certificate,
+        deviation_tolerance=task.allowed.position,
+        # Poses that are passed with others are as near to them.
+        deviation=run.certificate.deviation + task.off - task.closer,
+        rotation_tolerance=task.allowed.orientation,
+        rotation=run.certificate.rotation + ROTATION_PER_METRE * (task.off - task.closer),
+        backward=None,
+    )
+    return attrs.evolve(run, certificate=certificate)

@@ -13,13 +13,13 @@ from armwright.arrays import Array, ArrayLike
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.certified_motion import CertifiedMotion, fastest, standstill
-from armwright.motion.obstruction import Obstruction, PathError
+from armwright.motion.obstruction import PathError
 from armwright.motion.path import NEGLIGIBLE, Path, check_reach, report_speed, report_step
 from armwright.motion.quintic_polynomials import check_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight_path import StraightPath, line
 from armwright.motion.tolerance import Tolerance, tolerance
-from armwright.motion.tracking import Task, check_velocities, path_error, track
+from armwright.motion.tracking import Task, check_velocities, track
 
 # Part of the time in which the tool gathers speed, and again in which it loses it, by the speed that is asked for.
 _RAMP = 0.25
@@ -105,8 +105,6 @@ def certified_line(
     motion = line(A, B, even, near=allowed.position)
     task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(_requested_time, even))
     tracked = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
-    if isinstance(tracked, Obstruction):
-        raise path_error(motion, tracked)
     check_velocities(task, tracked)
     nominal = even / (1 - _RAMP)
     return fastest(arm, tracked, allowed, nominal=nominal, period=period, weak=weak)

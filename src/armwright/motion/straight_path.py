@@ -25,6 +25,7 @@ from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.s_curve import s_curve
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
+from armwright.spatial.poses import position_text
 from armwright.spatial.rotations import rotation_vector
 
 SegmentNumbers: TypeAlias = npt.NDArray[np.intp]
@@ -91,12 +92,8 @@ class StraightPath:
     def where(self, t: float) -> tuple[int, float, str]:
         """Return on which segment a time is, at which fraction of it, and that in words."""
         way, fraction = (each[0] for each in self._along(np.array([t])))
-        return self.numbers[way], float(np.clip(fraction, 0.0, 1.0)), f"on the line near {self.position_text(t)}"
-
-    def position_text(self, t: float) -> str:
-        """Return where the tool is at a time, in words, seen from the base of the arm."""
-        x, y, z = self(np.array([t]))[0, :3, 3] * 1e3
-        return f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
+        text = f"on the line near {position_text(self(np.array([t]))[0, :3, 3])}"
+        return self.numbers[way], float(np.clip(fraction, 0.0, 1.0)), text
 
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
         """Return bounds of the error on the intervals between times: the distance from a straight segment is convex."""

@@ -9,7 +9,7 @@ from armwright.arrays import Array, ArrayLike
 from armwright.motion.certified_motion import CertifiedMotion, slowed_alike, standstill
 from armwright.motion.ends import check_ends
 from armwright.motion.moves import exact_poses
-from armwright.motion.obstruction import Obstruction, PathError
+from armwright.motion.obstruction import PathError
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import coarse_deviations
@@ -88,10 +88,8 @@ def _through(arm: AnyArm, path: Path, q_start: Array, *, deviation: float, speed
     solver, allowed = solver_of(arm), tolerance(_CORNERS * deviation)
     for halvings in range(_HALVINGS + 1):
         motion = report_path(solver.arm, path, deviation=deviation, speed=speed, finer=2**halvings)
-        task = Task(solver, motion, q_start, allowed, allowed, smooth=False, refine=False, clock=np.asarray)
+        task = Task(solver, motion, q_start, allowed, allowed, report_spline=True, clock=np.asarray)
         tracking = track(task, motion.progress.times)
-        if isinstance(tracking, Obstruction):
-            raise path_error(motion, tracking)
         if excess(tracking.error, allowed).max() <= 1:
             check_velocities(task, tracking)
             return slowed_alike(arm, tracking, allowed)

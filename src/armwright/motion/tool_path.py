@@ -22,7 +22,7 @@ from armwright.motion.deviation import (
 from armwright.motion.knots import divided
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
-from armwright.spatial.poses import homogeneous
+from armwright.spatial.poses import homogeneous, position_text
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
 # Knots to begin with in each blend and on each straight segment, at most.
@@ -89,11 +89,10 @@ class ToolPath:
 
     def where(self, t: float) -> tuple[int, float, str]:
         """Return on which segment between poses a time is, at which fraction of it, and that in words."""
-        x, y, z = self(t)[:3, 3] * 1e3
         i = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2))
         fraction = float(np.clip((t - self.times[i]) / (self.times[i + 1] - self.times[i]), 0.0, 1.0))
         between = f"at {t:.3f} s, between poses {i + 1} and {i + 2}"
-        return i, fraction, f"{between}, ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base,"
+        return i, fraction, f"{between}, {position_text(self(t)[:3, 3])},"
 
     def acceleration(self) -> Array:
         """Return upper bounds (m,) of the acceleration of the position on each interval between ``knots`` [m/s²]."""

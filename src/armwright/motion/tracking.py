@@ -62,14 +62,14 @@ class Task(NamedTuple):
         tolerance: how far the tool may be from it.
         diagnosis: how far it may be off where it is searched for what stops the arm.
         rest: whether the joints rest at both ends; otherwise they run on as the motion does.
-        smooth: whether their acceleration is continuous; otherwise the spline is the report's.
+        report_spline: whether the spline is the report's, through the given knots alone, whose error may pass the
+            tolerance: ``excess`` says by how much. Otherwise its acceleration is continuous, and knots are added where
+            the tool is too far from its path.
         whole_turns: whether joints may start revolutions away, to be inside their limits later.
         clock: when times of the motion are passed at the speed that is asked for [s], where a motion is timed later;
             None where limits and speeds do not stop the arm when it is searched for what does.
         max_slowdown: how many times as fast as it may a joint may have to be, before more knots are put for it.
-        most_knots: that are put.
-        refine: whether knots are added where the tool is too far from its path; otherwise the error may pass the
-            tolerance, and ``excess`` says by how much.
+        max_knots: that are put.
     """
 
     solver: Solver
@@ -78,12 +78,11 @@ class Task(NamedTuple):
     tolerance: Tolerance
     diagnosis: Tolerance
     rest: bool = True
-    smooth: bool = True
+    report_spline: bool = False
     whole_turns: bool = False
     clock: Callable[[Array], Array] | None = None
     max_slowdown: float = MAX_SLOWDOWN
-    most_knots: int = 4000
-    refine: bool = True
+    max_knots: int = 4000
 
 
 class Tracking(NamedTuple):
@@ -100,27 +99,24 @@ class Tracking(NamedTuple):
     speed: Array
 
 
-def track(task: Task, knots: Array, *, diagnose: bool = True) -> Tracking | Obstruction:
+def track(task: Task, knots: Array, *, diagnose: bool = True) -> Tracking:
     """Follow a motion of the tool with the joints.
 
     Args:
         task: what is to be followed.
         knots: (k,) times to begin with, those at which the motion changes its form among them [s].
         diagnose: whether it is searched for what really stops the arm; not needed where no reason is asked for.
+
+    Raises:
+        PathError: the arm cannot follow it: what stops it, and where.
     """
-    refined = _refined(task, knots, None)
+    tracked = _refined(task, knots, None)
     # A pose that is out of reach is so for every configuration.
-    if isinstance(refined, Tracking) or refined.cause == "reach" or not diagnose:
-        return refined
-    diagnosis = diagnose_obstruction(
-        task.solver, task.motion(knots), knots, task.q_start, task.diagnosis, clock=task.clock
-    )
-    if diagnosis is None:
-        return refined
-    obstruction = _diagnosed(task, diagnosis)
-    if obstruction is None:
-        return _refined(task, knots, diagnosis)
-    return refined if obstruction.agrees(refined, float(knots[-1])) else obstruction
+    if isinstance(tracked, Obstruction) and tracked.cause != "reach" and diagnose:
+        tracked = _diagnosed(task, knots, tracked)
+    if isinstance(tracked, Obstruction):
+        raise path_error(task.motion, tracked)
+    return tracked
 
 
 def excess(error: TrackingError, allowed: Tolerance) -> Array:
@@ -180,6 +176,22 @@ def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
     return np.asarray(speed / slower / task.solver.arm.limit("speed"))
 
 
+def _diagnosed(task: Task, knots: Array, obstruction: Obstruction) -> Tracking | Obstruction:
+    """Follow the path in small steps: return what stops the arm there, or follow it once more where nothing does."""
+    diagnosis = diagnose_obstruction(
+        task.solver, task.motion(knots), knots, task.q_start, task.diagnosis, clock=task.clock
+    )
+    if diagnosis is None:
+        return obstruction
+    arm = task.solver.arm
+    q = _within_limits_by_revolutions(arm, diagnosis.q, None) if task.whole_turns else diagnosis.q
+    beyond = beyond_limits(arm, q, diagnosis.times) if task.clock is None else None
+    precise = beyond or diagnosis.obstruction
+    if precise is None:
+        return _refined(task, knots, diagnosis)
+    return obstruction if precise.agrees(obstruction, float(knots[-1])) else precise
+
+
 def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Obstruction:
     """Put knots until the tool stays within the tolerance everywhere, near the configurations of a diagnosis if any."""
     arm, configurations = task.solver.arm, None if guide is None else guide.guide
@@ -190,7 +202,7 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
             if configurations is None
             else beside(task.solver, X, configurations(knots))
         )
-        q = _whole_turns(arm, q, failed) if task.whole_turns else q
+        q = _within_limits_by_revolutions(arm, q, failed) if task.whole_turns else q
         obstruction = beyond_limits(arm, q[:failed], knots)
         if obstruction is None and failed is not None:
             obstruction = unmet(arm, X[failed], q[failed - 1], float(knots[failed]), float(knots[failed]))
@@ -205,14 +217,14 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
             return _between_knots(arm, trajectory) or tracking
-        if not task.refine:
+        if task.report_spline:
             return tracking
         ratio = np.where((h < knots[-1] / _SHORT)[:, None], _velocity_ratios(task, trajectory, speed), 0.0)
         if ratio.max() > task.max_slowdown:
             worst = int(ratio.max(axis=1).argmax())
             return singular(arm, q[worst : worst + 2], knots[worst : worst + 2], ratio[worst])
         parts = np.where(ratios > 1, np.clip(np.ceil(_CLOSER * ratios**0.25), 2, _PARTS), 1).astype(np.intp)
-        if parts.sum() > task.most_knots:
+        if parts.sum() > task.max_knots:
             break
         knots = divided(knots, parts)
         if task.solver.inverse_branches is None:  # from where they nearly are already they are found at once
@@ -224,7 +236,7 @@ def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
     """Return the spline through configurations (k, n) at knots (k,)."""
     still = np.zeros(q.shape[1])
     rates = (still, still) if task.rest else (_rate(knots, q), _rate(knots[::-1], q[::-1]))
-    return xspline(knots, q, *rates, b=smooth_weight(knots) if task.smooth else None)
+    return xspline(knots, q, *rates, b=None if task.report_spline else smooth_weight(knots))
 
 
 def _rate(t: Array, q: Array) -> Array:
@@ -232,14 +244,7 @@ def _rate(t: Array, q: Array) -> Array:
     return np.asarray(np.linalg.solve(np.vander(t[:4] - t[0], increasing=True), q[:4])[1])
 
 
-def _diagnosed(task: Task, diagnosis: Diagnosis) -> Obstruction | None:
-    """Return what stops the arm on the path that a diagnosis found, revolutions allowed for."""
-    q = _whole_turns(task.solver.arm, diagnosis.q, None) if task.whole_turns else diagnosis.q
-    beyond = beyond_limits(task.solver.arm, q, diagnosis.times) if task.clock is None else None
-    return beyond or diagnosis.obstruction
-
-
-def _whole_turns(arm: Arm, q: Array, failed: int | None) -> Array:
+def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Array:
     """Rotate joints by as few revolutions as bring all of their path inside the limits, where any do."""
     lowest, highest = q[:failed].min(axis=0), q[:failed].max(axis=0)
     least, most = (arm.limit("lower") - lowest) / _TURN, (arm.limit("upper") - highest) / _TURN

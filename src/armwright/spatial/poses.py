@@ -43,6 +43,12 @@ def inverse(X_AB: ArrayLike) -> Array:
     return homogeneous(R_BA, -(R_BA @ X_AB[..., :3, 3:])[..., 0])
 
 
+def position_text(p: Array) -> str:
+    """Return a position (3,) seen from the base of an arm in words, in millimetres."""
+    x, y, z = p * 1e3
+    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
+
+
 def inverse_pose(X_AB: Array) -> Array:
     """Return the inverse (4, 4) of one pose that is known to be one: nothing is checked."""
     X_BA = np.eye(4)

@@ -12,6 +12,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, array_key, joint_array, read_only, reduce_by_fields
 from armwright.errors import ArmwrightError
 from armwright.notebook import html_table
+from armwright.spatial.poses import position_text
 
 # A position this close to its limit, relative to the range of the joint, is at the limit and not beyond it.
 _AT_LIMIT = 1e-9
@@ -141,11 +142,10 @@ class InverseSolution:
     def explain(self) -> str:
         """Say in one sentence why no configuration can be taken."""
         if self.outcome is Outcome.OUT_OF_REACH:
-            x, y, z = self.nearest_pose[:3, 3] * 1e3
             turned = f" and {math.degrees(self.rotation_error):.2f} deg" if self.rotation_error > _SHOWN_TURN else ""
             return (
                 f"the pose is {self.distance * 1e3:.1f} mm{turned} out of reach of '{self.arm.name}'; "
-                f"the nearest in reach has its origin at ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
+                f"the nearest in reach has its origin at {position_text(self.nearest_pose[:3, 3])}"
             )
         least = min(self.branches, key=_worst_violation)
         faults = "; ".join(str(violation) for violation in least.violations)
