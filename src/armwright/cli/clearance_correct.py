@@ -18,16 +18,22 @@ _DRAWS = 32
 def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     path: Annotated[
-        str, typer.Option(help="pick-and-place, or a test path x1 to x10, y1 to y14.", autocompletion=paths)
+        str,
+        typer.Option(
+            help="Path to correct: pick-and-place, or a test path x1 to x10, y1 to y14.", autocompletion=paths
+        ),
     ] = "pick-and-place",
     clearance: Annotated[
-        list[str] | None, typer.Option(help="Clearance of one pin in mm, as estimated: J2=0.34; may be repeated.")
+        list[str] | None,
+        typer.Option(help="Estimated radial clearance of a pin in mm, as in J2=0.34; may be repeated."),
     ] = None,
     estimate: Annotated[
         Path | None, typer.Option(help="Output of `clearance estimate --json`: its mean error is corrected.")
     ] = None,
-    knots: Annotated[int, typer.Option(help="Points at which an entire path is moved, at most 1000.")] = 20,
-    rounds: Annotated[int, typer.Option(help="How often the path is moved, at most 100 times.")] = 3,
+    knots: Annotated[
+        int, typer.Option(help="Number of points at which an entire path is corrected, at most 1000.")
+    ] = 20,
+    rounds: Annotated[int, typer.Option(help="Number of iterations of the correction, at most 100.")] = 3,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     output: OutputFolder = None,

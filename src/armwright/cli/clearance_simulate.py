@@ -36,10 +36,10 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     speed_rpm: Annotated[float | None, typer.Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
     revolutions: Annotated[float, typer.Option(help="Number of revolutions of the drive.")] = 3.0,
     clearance: Annotated[
-        list[str] | None, typer.Option(help="Clearance of a pin in mm, as in J2=0.5; may be repeated.")
+        list[str] | None, typer.Option(help="Radial clearance of a pin in mm, as in J2=0.5; may be repeated.")
     ] = None,
     clearance_mm: Annotated[
-        float | None, typer.Option(help="Clearance of all pins; the default is that of the linkage.")
+        float | None, typer.Option(help="Radial clearance of all pins in mm; the default is that of the linkage.")
     ] = None,
     friction: Annotated[
         float | None, typer.Option(help="Coefficient of friction; the default is that of the linkage.")
@@ -61,7 +61,8 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = "rk4",
     step: Annotated[float, typer.Option(help="Step of the integrator, in s.")] = 1e-5,
     locate: Annotated[
-        bool, typer.Option("--locate", help="Divide a step at the time at which a journal reaches its bearing.")
+        bool,
+        typer.Option("--locate", help="Locate the contact events: divide a step where a journal reaches its bearing."),
     ] = False,
     sample: Annotated[
         float | None, typer.Option(help="Time between samples, in s; the default is 1e-4 or less.")
@@ -69,7 +70,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     control: Annotated[
         str,
         typer.Option(
-            help="effort (open loop) or pd+ff (feedback controller with feedforward).",
+            help="Control of the drives: effort (open loop) or pd+ff (feedback with feedforward).",
             autocompletion=setting("CONTROLS"),
         ),
     ] = "effort",

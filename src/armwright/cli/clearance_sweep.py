@@ -27,8 +27,8 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
             autocompletion=one_of("factorial", "lhs", "sobol"),
         ),
     ] = "sobol",
-    from_mm: Annotated[float, typer.Option(help="Smallest clearance.")] = 0.1,
-    to_mm: Annotated[float, typer.Option(help="Largest clearance.")] = 0.5,
+    from_mm: Annotated[float, typer.Option(help="Smallest radial clearance in mm.")] = 0.1,
+    to_mm: Annotated[float, typer.Option(help="Largest radial clearance in mm.")] = 0.5,
     levels: Annotated[
         int, typer.Option(help="Levels of each clearance of a factorial design; 9 levels are the thesis' 729 runs.")
     ] = 9,
@@ -36,7 +36,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         int, typer.Option("-n", "--runs", help="Number of linkages for lhs and sobol (a power of two).")
     ] = 128,
     to_friction: Annotated[
-        float | None, typer.Option(help="Also vary the coefficient of friction, from 0 to this value.")
+        float | None, typer.Option(help="Vary the coefficient of friction too, from 0 to this value.")
     ] = None,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
@@ -44,7 +44,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     replicates: Annotated[
         int,
         typer.Option(
-            help="Indistinguishable copies simulated beside each linkage, 0 to 15: their spread measures chaos."
+            help="Replicates of each linkage with clearances a nanometre apart, 0 to 15: their spread measures chaos."
         ),
     ] = 3,
     seed: Annotated[int, typer.Option(help="Seed of lhs and sobol.")] = 0,

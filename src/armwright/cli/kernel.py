@@ -20,7 +20,8 @@ def kernel(
     ],
     count: Annotated[bool, typer.Option("--count", help="Print the operation count only.")] = False,
     single: Annotated[
-        bool, typer.Option("--single", help="Print the function of a single configuration, not of many.")
+        bool,
+        typer.Option("--single", help="Print the function for a single configuration instead of an array of them."),
     ] = False,
     as_json: Json = False,
 ) -> None:

@@ -26,7 +26,9 @@ FrictionVelocity: TypeAlias = Annotated[
         autocompletion=setting("SLIP_SPEEDS"),
     ),
 ]
-Threshold: TypeAlias = Annotated[float, typer.Option(help="Sliding speed below which friction fades.")]
+Threshold: TypeAlias = Annotated[
+    float, typer.Option(help="Sliding speed in mm/s below which friction is reduced towards 0.")
+]
 
 
 def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float | None = None) -> "Linkage":

@@ -33,24 +33,27 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
         str | None,
         typer.Option(help="Initial joint positions in degrees and mm, as in 10,20,30; they select the branch."),
     ] = None,
-    ends: Annotated[Literal["rest", "running"], typer.Option(help="Start and end at rest, or at full speed.")] = "rest",
+    ends: Annotated[
+        Literal["rest", "running"], typer.Option(help="Start and end at rest, or at the speed of the path.")
+    ] = "rest",
     orientation: Annotated[
         Literal["geodesic", "zyz"] | None,
-        typer.Option(help="Interpolation of the orientation: about a fixed axis, or of ZYZ Euler angles."),
+        typer.Option(help="Interpolate the orientation about a fixed axis (geodesic), or in ZYZ Euler angles (zyz)."),
     ] = None,
     deviation_mm: Annotated[
-        float | None, typer.Option(help="Allowed path deviation of the tool; the default is 0.1.")
+        float | None, typer.Option(help="Largest path deviation of the tool in mm; the default is 0.1.")
     ] = None,
     around: Annotated[
         Literal["via", "damped"] | None,
         typer.Option(
-            help="Stop at every pose; detour where a line is blocked: by a via pose, or damped least squares."
+            help="Stop at every pose; replace an infeasible line: via, by a detour; damped, by damped least squares."
         ),
     ] = None,
     keep_limits: Annotated[
-        bool, typer.Option("--keep-limits", help="Slow the motion down where the times of the file exceed limits.")
+        bool,
+        typer.Option("--keep-limits", help="Slow the motion down if the times of the file would exceed joint limits."),
     ] = False,
-    servo_ms: Annotated[float, typer.Option(help="Servo period of motion.csv.")] = 2.0,
+    servo_ms: Annotated[float, typer.Option(help="Servo period of motion.csv in ms.")] = 2.0,
     film: Annotated[bool, typer.Option(help="Draw move.gif, and move.mp4 where ffmpeg is installed.")] = True,
     as_json: Json = False,
     quiet: QuietButWarnings = False,

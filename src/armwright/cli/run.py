@@ -42,22 +42,27 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     deviation_mm: Annotated[
         float | None,
-        typer.Option(help="Allowed deviation from straight lines; the default is that of the cell file, or 1."),
+        typer.Option(
+            help="Largest path deviation of straight lines in mm; the default is that of the cell file, or 1."
+        ),
     ] = None,
     around: Annotated[
         Around | None,
-        typer.Option(help="Detour where a straight line is blocked: by a via pose, or damped least squares."),
+        typer.Option(
+            help="Replace an infeasible straight line: via, by a detour; damped, by damped least squares; none."
+        ),
     ] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     max_steps: Annotated[
-        int, typer.Option(min=1, help="Limit of the steps that a program executes without advancing the clock.")
+        int, typer.Option(min=1, help="Largest number of steps that a program may execute without advancing the clock.")
     ] = 1_000_000,
     max_time: Annotated[
-        float, typer.Option(min=0.0, max=1e9, help="Limit of the duration on the clock of the cell, in s.")
+        float, typer.Option(min=0.0, max=1e9, help="Largest duration of the run on the clock of the cell, in s.")
     ] = 3600.0,
     most_rows: Annotated[
-        int, typer.Option("--motion-rows", min=2, help="Limit of the rows of motion.csv; omitted rows are reported.")
+        int,
+        typer.Option("--motion-rows", min=2, help="Largest number of rows of motion.csv; omitted rows are reported."),
     ] = 1_000_000,
     as_json: Json = False,
     quiet: QuietButWarnings = False,

@@ -16,15 +16,16 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     configuration: Annotated[
         str, typer.Option("-q", help="Initial joint positions in degrees and mm, as in 10,20,30.")
     ],
-    speeds: Annotated[str | None, typer.Option("--qd", help="Initial joint velocities in degrees/s and mm/s.")] = None,
-    duration: Annotated[float, typer.Option(help="Duration in s.")] = 1.0,
-    drives: Annotated[
-        Literal["off", "gravity"], typer.Option(help="Drives off, or holding the weight of the arm.")
-    ] = "off",
+    speeds: Annotated[
+        str | None, typer.Option("--qd", help="Initial joint velocities, in degrees/s (revolute) and mm/s (prismatic).")
+    ] = None,
+    duration: Annotated[float, typer.Option(help="Duration of the simulation in s.")] = 1.0,
+    drives: Annotated[Literal["off", "gravity"], typer.Option(help="Drives off, or compensating gravity.")] = "off",
     method: Annotated[
-        Literal["gill", "adaptive"], typer.Option(help="Runge-Kutta-Gill in fixed steps, or adaptive.")
+        Literal["gill", "adaptive"],
+        typer.Option(help="Integrator: Runge-Kutta-Gill with fixed steps, or adaptive steps."),
     ] = "adaptive",
-    step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and period of the rows.")] = 1.0,
+    step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and period of the rows, in ms.")] = 1.0,
     load: Load = None,
     output: OutputFolder = None,
     as_json: Json = False,
