@@ -47,7 +47,7 @@ def expression(text: str) -> tree.Expression:
 def judged(text: str) -> tuple[ExpressionType | None, list[Diagnostic]]:
     """Return what an expression is, and what is said of it."""
     names = Names(None)
-    names.main.types.update(DECLARED)
+    names.symbols.types.update(DECLARED)
     return sort(names, expression(text)), names.diagnostics
 
 

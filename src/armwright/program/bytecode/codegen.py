@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from armwright.program.bytecode import control_flow, devices, frames, move, output
-from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.emitter import Emitter
 from armwright.program.bytecode.instructions import Code, Op, ProcedureCode
 from armwright.program.flow_analysis.analysis import Flow
@@ -12,7 +12,7 @@ from armwright.program.language.source import Source
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
-GENERATORS: Mapping[type, Generate] = {
+GENERATORS: Generators = {
     **frames.GENERATORS,
     **devices.GENERATORS,
     **move.GENERATORS,

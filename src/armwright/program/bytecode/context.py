@@ -12,6 +12,7 @@ from armwright.program.language.names import is_arm
 from armwright.program.syntax import tree
 
 Generate: TypeAlias = Callable[["Context", Any], None]
+Generators: TypeAlias = Mapping[type, Generate]
 
 
 @attrs.define
@@ -26,7 +27,7 @@ class Context:
         in_action: whether the statements are the action of an ON, whose HALT ends the MOVE and not the program.
     """
 
-    generators: Mapping[type, Generate]
+    generators: Generators
     out: Emitter
     flow: Flow
     spelling: Mapping[str, str]

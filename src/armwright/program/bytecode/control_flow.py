@@ -1,8 +1,6 @@
 """Code of control flow: choices, loops, processes, events, locks, recovery, calls."""
 
-from collections.abc import Mapping
-
-from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.emitter import LATER
 from armwright.program.bytecode.instructions import Op
 from armwright.program.syntax import tree
@@ -136,7 +134,7 @@ def call(context: Context, node: tree.Call) -> None:
     context.out.emit(Op.CALL, node.name.key, *values, span=node.span)
 
 
-GENERATORS: Mapping[type, Generate] = {
+GENERATORS: Generators = {
     tree.Block: block,
     tree.If: if_,
     tree.While: while_,

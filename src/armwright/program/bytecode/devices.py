@@ -1,8 +1,6 @@
 """Code of OPEN, GRASP, OPERATE and READ."""
 
-from collections.abc import Mapping
-
-from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.instructions import Op
 from armwright.program.syntax import tree
 
@@ -38,7 +36,7 @@ def read_system(context: Context, node: tree.ReadSystem) -> None:
     context.out.emit(Op.READS, context.operand(node.arm), span=node.span)
 
 
-GENERATORS: Mapping[type, Generate] = {
+GENERATORS: Generators = {
     tree.Open: open_,
     tree.Grasp: grasp,
     tree.Operate: operate,

@@ -1,8 +1,6 @@
 """Code of AFFIX, UNFIX and assignments."""
 
-from collections.abc import Mapping
-
-from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.instructions import Op
 from armwright.program.syntax import tree
 
@@ -33,4 +31,4 @@ def unfix(context: Context, node: tree.Unfix) -> None:
     context.out.emit(Op.UNFIX, context.operand(node.child), *above, span=node.span)
 
 
-GENERATORS: Mapping[type, Generate] = {tree.Assign: assign, tree.Affix: affix, tree.Unfix: unfix}
+GENERATORS: Generators = {tree.Assign: assign, tree.Affix: affix, tree.Unfix: unfix}

@@ -1,8 +1,8 @@
 """Code of MOVE, with its clauses and its guards."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
-from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.emitter import LATER
 from armwright.program.bytecode.instructions import Form, Op, Operand, stages_text
 from armwright.program.syntax import tree
@@ -97,4 +97,4 @@ def form_of(move: tree.Move, text: Callable[[tree.Expression], str]) -> Form:
     )
 
 
-GENERATORS: Mapping[type, Generate] = {tree.Move: move}
+GENERATORS: Generators = {tree.Move: move}

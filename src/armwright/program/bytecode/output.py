@@ -1,8 +1,6 @@
 """Code of PRINT."""
 
-from collections.abc import Mapping
-
-from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.instructions import Op, Text
 from armwright.program.syntax import tree
 
@@ -13,4 +11,4 @@ def print_(context: Context, node: tree.Print) -> None:
     context.out.emit(Op.PRINT, *items, span=node.span)
 
 
-GENERATORS: Mapping[type, Generate] = {tree.Print: print_}
+GENERATORS: Generators = {tree.Print: print_}

@@ -225,13 +225,13 @@ def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
         ):
             continue
         reported.add(head(name))
-        declared, text = scope.declared(key), written(node.event)
+        text = written(node.event)
         findings.report(
             "E501",
             f"nothing signals `{text}`, so this WAIT never ends",
             node.span,
             "waits for ever",
-            secondary=(Label(declared.span, "declared here"),) if declared else (),
+            secondary=scope.where_declared(key),
             advice=f"write `SIGNAL {text}` in another branch",
         )
 

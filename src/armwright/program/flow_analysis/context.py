@@ -14,6 +14,7 @@ from armwright.program.syntax import tree
 
 Node = TypeVar("Node", bound=tree.Statement)
 Step: TypeAlias = Callable[["Context", Any], None]
+Steps: TypeAlias = Mapping[type, Step]
 
 # Statements inside one another that are followed; deeper ones only make things unknown.
 _MAX_DEPTH = 100
@@ -35,7 +36,7 @@ class Context:
         recovering: whether the statements stand in a RECOVER part.
     """
 
-    steps: Mapping[type, Step]
+    steps: Steps
     state: FlowState
     loops: int = 0
     recovering: bool = False

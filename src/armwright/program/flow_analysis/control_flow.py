@@ -1,10 +1,10 @@
 """Control flow: what holds on every path through choices, loops, branches, TRY and calls."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from armwright.program.flow_analysis import concurrency
-from armwright.program.flow_analysis.context import Context, Step, of_state
+from armwright.program.flow_analysis.context import Context, Steps, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.lattice import Outcome, Uncertainty
@@ -232,7 +232,7 @@ def _first_word(span: Span) -> Span:
     return Span(span.start, span.start + len("TRY"))
 
 
-STEPS: Mapping[type, Step] = {
+STEPS: Steps = {
     tree.Block: lambda context, node: context.follow(*node.statements),
     tree.If: if_,
     tree.While: while_,

@@ -59,8 +59,7 @@ def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
     slot = state.bound(head.key)
     if slot is None or kind is None or scope.is_poisoned(head.key) or not state.settle(slot):
         return
-    declared = scope.declared(head.key)
-    secondary = (Label(declared.span, "declared here"),) if declared else ()
+    secondary = scope.where_declared(head.key)
     if kind is VariableKind.FRAME:
         _no_place(state, node, secondary, from_cell=slot == head.key and head is node)
         return

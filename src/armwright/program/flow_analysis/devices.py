@@ -1,9 +1,7 @@
 """OPEN, GRASP, OPERATE and READ: which gripper holds what, and what sensors find."""
 
-from collections.abc import Mapping
-
 from armwright.errors import closest
-from armwright.program.flow_analysis.context import Step, of_state
+from armwright.program.flow_analysis.context import Steps, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import set_pose
@@ -116,7 +114,7 @@ def operate(state: FlowState, node: tree.Operate) -> None:
     )
 
 
-STEPS: Mapping[type, Step] = {
+STEPS: Steps = {
     tree.Open: of_state(open_),
     tree.Grasp: of_state(grasp),
     tree.Operate: of_state(operate),

@@ -1,9 +1,7 @@
 """AFFIX, UNFIX and assignments: what has a value, and what hangs on what."""
 
-from collections.abc import Mapping
-
 from armwright.program.flow_analysis import plausibility, poses
-from armwright.program.flow_analysis.context import Step, of_state
+from armwright.program.flow_analysis.context import Steps, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label
@@ -189,4 +187,4 @@ def _not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
     )
 
 
-STEPS: Mapping[type, Step] = {tree.Assign: of_state(assign), tree.Affix: of_state(affix), tree.Unfix: of_state(unfix)}
+STEPS: Steps = {tree.Assign: of_state(assign), tree.Affix: of_state(affix), tree.Unfix: of_state(unfix)}

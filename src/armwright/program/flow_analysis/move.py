@@ -1,9 +1,7 @@
 """MOVE: which arm moves what, whether it can, and where it arrives."""
 
-from collections.abc import Mapping
-
 from armwright.program.flow_analysis import plausibility
-from armwright.program.flow_analysis.context import Context, Step
+from armwright.program.flow_analysis.context import Context, Steps
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import leaves
@@ -212,4 +210,4 @@ def _targets(node: tree.Move) -> list[tree.Expression]:
     return targets
 
 
-STEPS: Mapping[type, Step] = {tree.Move: move}
+STEPS: Steps = {tree.Move: move}

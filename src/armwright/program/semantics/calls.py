@@ -10,7 +10,8 @@ from armwright.program.semantics import type_check
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import OF_KIND, a_type, called
-from armwright.program.semantics.scopes import Names, Procedure
+from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
 
 # What a misspelt call with parentheses may have been meant as, beside a procedure.
@@ -22,9 +23,9 @@ _NUMBERS_OF_A_PLACE = 12
 class _Passed:
     """An argument that the procedure sees itself, not a copy of it."""
 
-    caller: Procedure | None
+    caller: ProcedureSymbols | None
     argument: tree.Name | tree.ArmName
-    procedure: Procedure
+    procedure: ProcedureSymbols
     parameter: str
 
 
@@ -37,7 +38,7 @@ class Calls:
         self._passed: list[_Passed] = []
         self._changed: dict[tuple[int, str], Span] = {}
 
-    def check(self, node: tree.Call, caller: Procedure | None) -> None:
+    def check(self, node: tree.Call, caller: ProcedureSymbols | None) -> None:
         """Check one call."""
         names, arguments = self._names, node.arguments
         procedure = names.call(node.name.key)
@@ -50,7 +51,7 @@ class Calls:
                 _wrong_count(names, node, procedure)
             return
         for position, (argument, parameter) in enumerate(zip(arguments, procedure.parameters, strict=True)):
-            kind = procedure.own.types.get(parameter)
+            kind = procedure.types.get(parameter)
             if kind is None or procedure.parameters.index(parameter) != position:
                 # Something has been said of this parameter.
                 _look(names, argument)
@@ -59,7 +60,7 @@ class Calls:
             if kind == VariableType(VariableKind.FRAME) and isinstance(argument, tree.Name | tree.ArmName):
                 self._passed.append(_Passed(caller, argument, procedure, parameter))
 
-    def changes(self, node: tree.Expression, inside: Procedure | None, span: Span) -> None:
+    def changes(self, node: tree.Expression, inside: ProcedureSymbols | None, span: Span) -> None:
         """Take note that a statement gives a value to a variable, or hangs it elsewhere."""
         if inside is not None and isinstance(node, tree.Name) and node.key in inside.parameters:
             self._changed.setdefault((id(inside), node.key), span)
@@ -71,7 +72,7 @@ class Calls:
             changed = self._changed.get((id(passed_.procedure), passed_.parameter))
             argument = passed_.argument
             fixed = isinstance(argument, tree.ArmName) or (
-                argument.key == WORLD and (passed_.caller is None or WORLD not in passed_.caller.own.types)
+                argument.key == WORLD and (passed_.caller is None or WORLD not in passed_.caller.types)
             )
             if changed is None or not fixed:
                 continue
@@ -109,7 +110,9 @@ def _look(names: Names, argument: tree.Expression) -> None:
         type_check.sort(names, argument)
 
 
-def _fits(names: Names, argument: tree.Expression, procedure: Procedure, parameter: str, kind: VariableType) -> None:
+def _fits(
+    names: Names, argument: tree.Expression, procedure: ProcedureSymbols, parameter: str, kind: VariableType
+) -> None:
     what = f"parameter `{_text(procedure, parameter)}` of `{procedure.node.name.text}` is "
     if not kind.sizes:
         takes = OF_KIND[kind.kind]
@@ -128,11 +131,11 @@ def _fits(names: Names, argument: tree.Expression, procedure: Procedure, paramet
     names.report("E220", message, argument.span, f"{argument_type}", secondary=names.where_declared(argument.key))
 
 
-def _text(procedure: Procedure, parameter: str) -> str:
-    return procedure.own.declared[parameter].text
+def _text(procedure: ProcedureSymbols, parameter: str) -> str:
+    return procedure.declared[parameter].text
 
 
-def _wrong_count(names: Names, node: tree.Call, procedure: Procedure) -> None:
+def _wrong_count(names: Names, node: tree.Call, procedure: ProcedureSymbols) -> None:
     name, takes, argument_type = node.name, len(procedure.parameters), len(node.arguments)
     listed = ", ".join(
         f"{', '.join(name.text for name in declaration.names)} : {declaration.type.text}"
@@ -177,4 +180,4 @@ def _unknown(names: Names, node: tree.Call) -> None:
 
 
 def _spelled(names: Names) -> list[str]:
-    return [procedure.node.name.text for procedure in names.procedures.values()]
+    return [procedure.node.name.text for procedure in names.symbols.procedures.values()]

@@ -1,18 +1,16 @@
 """Names and types: every name declared once and used as what it is; clauses that go together; values in range."""
 
-from collections.abc import Mapping
-
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.words import Standard
 from armwright.program.semantics import control_flow, devices, frames, headers, move, output
 from armwright.program.semantics.calls import Calls
 from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadImport
-from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
-CHECKS: Mapping[type, Check] = {
+CHECKS: Checks = {
     **frames.CHECKS,
     **devices.CHECKS,
     **move.CHECKS,

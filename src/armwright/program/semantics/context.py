@@ -7,10 +7,12 @@ import attrs
 
 from armwright.program.language.source import Span
 from armwright.program.semantics.calls import Calls
-from armwright.program.semantics.scopes import Names, Procedure
+from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
 
 Check: TypeAlias = Callable[["Context", Any], None]
+Checks: TypeAlias = Mapping[type, Check]
 
 
 @attrs.define
@@ -25,10 +27,10 @@ class Context:
         recovering: whether they stand in a RECOVER part, whose TRY can be started again.
     """
 
-    checks: Mapping[type, Check]
+    checks: Checks
     names: Names
     calls: Calls
-    procedure: Procedure | None = None
+    procedure: ProcedureSymbols | None = None
     recovering: bool = False
 
     def check(self, *statements: tree.Statement) -> None:

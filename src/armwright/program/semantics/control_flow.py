@@ -1,9 +1,7 @@
 """Control flow: choices, loops, processes, events, locks, recovery, calls."""
 
-from collections.abc import Mapping
-
 from armwright.program.language.kinds import VariableKind, VariableType
-from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType, a_type
 from armwright.program.semantics.quantities import in_range, measure
 from armwright.program.semantics.scopes import Names
@@ -130,7 +128,7 @@ def mention(context: Context, node: tree.Poison) -> None:
     context.names.mention(node.names)
 
 
-CHECKS: Mapping[type, Check] = {
+CHECKS: Checks = {
     tree.Block: block,
     tree.If: if_,
     tree.While: while_,

@@ -1,9 +1,7 @@
 """OPEN, GRASP, OPERATE and READ: grippers, devices and sensors."""
 
-from collections.abc import Mapping
-
 from armwright.program.language.kinds import VariableKind, VariableType
-from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType, a_type, called, written
 from armwright.program.semantics.quantities import in_range
 from armwright.program.semantics.scopes import Names
@@ -82,7 +80,7 @@ def _arm(names: Names, node: tree.Mobile | None, who: str) -> None:
     names.report("E201", text, node.span, str(kind or "not an arm"), secondary=declared(names, node), advice=advice)
 
 
-CHECKS: Mapping[type, Check] = {
+CHECKS: Checks = {
     tree.Open: open_,
     tree.Grasp: grasp,
     tree.Operate: operate,

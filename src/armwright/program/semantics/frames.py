@@ -1,11 +1,9 @@
 """AFFIX, UNFIX and assignments: what gives variables their values and frames their parents."""
 
-from collections.abc import Mapping
-
 from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.language.words import Standard
 from armwright.program.semantics import events
-from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import (
     FITTING,
     ExpressionType,
@@ -131,4 +129,4 @@ def _child(names: Names, node: tree.Mobile, verb: str, done: str, advice: str = 
         need(names, node, ExpressionType.FRAME, "E215", f"{verb} a FRAME")
 
 
-CHECKS: Mapping[type, Check] = {tree.Assign: assign, tree.Affix: affix, tree.Unfix: unfix}
+CHECKS: Checks = {tree.Assign: assign, tree.Affix: affix, tree.Unfix: unfix}

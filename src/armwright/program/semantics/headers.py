@@ -9,8 +9,8 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
-from armwright.program.semantics.scopes import Names, Procedure, Table
-from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, Table
 from armwright.program.syntax import tree
 
 # More elements than this are a slip, and would take the memory of the machine.
@@ -26,7 +26,7 @@ _LONG_UNITS: Mapping[str, str] = {
 }
 
 
-def declare(names: Names, program: tree.Program, read_import: ReadImport | None) -> list[Procedure]:
+def declare(names: Names, program: tree.Program, read_import: ReadImport | None) -> list[ProcedureSymbols]:
     """Take up all that the headers declare, wherever they stand among each other.
 
     Returns:
@@ -37,7 +37,7 @@ def declare(names: Names, program: tree.Program, read_import: ReadImport | None)
         if isinstance(header, tree.Import):
             _import(names, header, read_import)
     for declaration in program.declarations:
-        _variables(names, names.main, declaration)
+        _variables(names, names.symbols, declaration)
     return [_procedure(names, node) for node in program.procedures]
 
 
@@ -54,7 +54,7 @@ def _variables(names: Names, table: Table, declaration: tree.Declaration) -> Non
             note = "the station may be declared again as a FRAME" if name.key == STATION else ""
             text = f"`{name.text}` is predeclared as a FRAME"
             names.report("E203", text, name.span, "declared again here", note=note)
-        elif table is names.main and name.key in names.imported and not _is_frame(declaration.type):
+        elif table is names.symbols and name.key in names.symbols.imported and not _is_frame(declaration.type):
             text = f"`{name.text}` is a FRAME that an IMPORT brings"
             names.report("E203", text, name.span, "declared as something else here")
         else:
@@ -122,7 +122,7 @@ def _units(names: Names, program: tree.Program) -> None:
                     "E224", text, unit.span, "second", secondary=(Label(earlier.span, "first"),), advice=advice
                 )
     chosen = {dimension: unit.key for dimension, unit in first.items()}
-    names.units = UnitSystem(length=chosen.get("length", "M"), angle=chosen.get("angle", "DEG"))
+    names.symbols.units = UnitSystem(length=chosen.get("length", "M"), angle=chosen.get("angle", "DEG"))
 
 
 def _no_unit(names: Names, unit: tree.Name) -> None:
@@ -163,31 +163,33 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
     for frame in brought.frames:
         if frame in PREDECLARED:
             continue
-        if frame in names.imported:
+        if frame in names.symbols.imported:
             text = f"frame `{frame}` comes from two imports"
             names.report("E228", text, path.span, "it comes from here too")
-        names.imported.add(frame)
-        names.main.types[frame] = VariableType(VariableKind.FRAME)
+        names.symbols.imported.add(frame)
+        names.symbols.types[frame] = VariableType(VariableKind.FRAME)
 
 
 # ---- procedures ----------------------------------------------------------------------------------------------------
 
 
-def _procedure(names: Names, node: tree.Procedure) -> Procedure:
+def _procedure(names: Names, node: tree.Procedure) -> ProcedureSymbols:
     """Take up a procedure and its own names; where its name is taken it cannot be called, but is checked."""
-    name, procedure = node.name, Procedure(node)
+    name = node.name
+    parameters = tuple(parameter.key for declaration in node.parameters for parameter in declaration.names)
+    procedure = ProcedureSymbols(node=node, parameters=parameters)
     for declaration in (*node.parameters, *node.declarations):
-        _variables(names, procedure.own, declaration)
-    first = names.procedures.get(name.key)
-    variable = names.main.declared.get(name.key)
+        _variables(names, procedure, declaration)
+    first = names.symbols.procedures.get(name.key)
+    variable = names.symbols.declared.get(name.key)
     if first is not None or variable is not None:
         _twice(names, name, variable or first.node.name)  # type: ignore[union-attr]
-    elif name.key in names.main.types:
-        where = "an IMPORT brings" if name.key in names.imported else "is predeclared"
+    elif name.key in names.symbols.types:
+        where = "an IMPORT brings" if name.key in names.symbols.imported else "is predeclared"
         names.report("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a procedure of the same name")
     elif name.key in FUNCTIONS:
         text = f"`{name.text}` is a function of the language"
         names.report("E203", text, name.span, "a procedure of the same name")
     else:
-        names.procedures[name.key] = procedure
+        names.symbols.procedures[name.key] = procedure
     return procedure

@@ -1,10 +1,8 @@
 """Names, types and clauses of one MOVE."""
 
-from collections.abc import Mapping
-
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
-from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType, written
 from armwright.program.semantics.quantities import in_range, measure
 from armwright.program.semantics.scopes import Names
@@ -152,4 +150,4 @@ def _times(names: Names, first: dict[type, tree.Clause]) -> None:
         )
 
 
-CHECKS: Mapping[type, Check] = {tree.Move: move}
+CHECKS: Checks = {tree.Move: move}

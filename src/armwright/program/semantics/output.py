@@ -1,9 +1,7 @@
 """PRINT."""
 
-from collections.abc import Mapping
-
 from armwright.program.semantics import events
-from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType
 from armwright.program.semantics.type_check import sort
 from armwright.program.syntax import tree
@@ -16,4 +14,4 @@ def print_(context: Context, node: tree.Print) -> None:
             events.refuse(context.names, item, "printed")
 
 
-CHECKS: Mapping[type, Check] = {tree.Print: print_}
+CHECKS: Checks = {tree.Print: print_}

@@ -6,47 +6,13 @@ from contextlib import contextmanager
 from armwright.errors import closest
 from armwright.program.language.diagnostic import DiagnosticList, Label, did_you_mean
 from armwright.program.language.kinds import VariableType
-from armwright.program.language.units import UnitSystem
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import Imported, KnownCell
-from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, Symbols
+from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, Scope, Symbols, Table
 from armwright.program.syntax import tree
 
 # Looking for what a name was meant to be takes time; a program that goes on like this gets no more advice.
 _MAX_COMPARISONS = 20_000
-
-
-class Table:
-    """The names that belong together: those of the program, or those of one procedure."""
-
-    def __init__(self, types: dict[str, VariableType | None]) -> None:
-        """Start with names that nobody has to declare."""
-        self.types = types
-        self.declared: dict[str, tree.Name] = {}
-        self.poisoned: set[str] = set()
-        self.used: set[str] = set()
-
-
-class Procedure:
-    """A procedure and its own names."""
-
-    def __init__(self, node: tree.Procedure) -> None:
-        """Start without names."""
-        self.node = node
-        self.parameters = tuple(name.key for declaration in node.parameters for name in declaration.names)
-        self.own = Table({})
-
-    @property
-    def symbols(self) -> ProcedureSymbols:
-        """The names as they are now."""
-        own = self.own
-        return ProcedureSymbols(
-            node=self.node,
-            parameters=self.parameters,
-            types=own.types,
-            declared=own.declared,
-            poisoned=frozenset(own.poisoned),
-        )
 
 
 class Names:
@@ -56,46 +22,30 @@ class Names:
         """Start with the predeclared names."""
         self.diagnostics = DiagnosticList()
         self.report = self.diagnostics.report
-        self.main = Table(dict(PREDECLARED))
-        self.procedures: dict[str, Procedure] = {}
-        self.units = UnitSystem()
+        self.symbols = Symbols(types=dict(PREDECLARED), std=std)
         self.imports: list[Imported] = []
-        self.imported: set[str] = set()
-        self.std, self.cell = std, cell
+        self.cell = cell
         # Whether some IMPORT was not looked up, so that any name may be that of a frame in it.
         self.open_import = False
-        self._inside: Procedure | None = None
+        self._scope = Scope(symbols=self.symbols)
         self._called: set[str] = set()
         self._said: set[tuple[str, int, str]] = set()
         self._comparisons = 0
         self._undeclared_names: set[str] = set()
 
-    @property
-    def symbols(self) -> Symbols:
-        """The names as they are now."""
-        return Symbols(
-            types=self.main.types,
-            declared=self.main.declared,
-            procedures={key: procedure.symbols for key, procedure in self.procedures.items()},
-            poisoned=frozenset(self.main.poisoned),
-            units=self.units,
-            imported=frozenset(self.imported),
-            std=self.std,
-        )
-
     @contextmanager
-    def inside(self, procedure: Procedure) -> Iterator[None]:
+    def inside(self, procedure: ProcedureSymbols) -> Iterator[None]:
         """Look names up as the statements of a procedure see them."""
-        self._inside = procedure
+        self._scope = Scope(symbols=self.symbols, procedure=procedure)
         yield
-        self._inside = None
+        self._scope = Scope(symbols=self.symbols)
 
     # ---- looking up ------------------------------------------------------------------------------------------------
 
     def type(self, name: tree.Name) -> VariableType | None:
         """Return what a name stands for; say once when it is not declared. None where that is unknown."""
         key = name.key
-        table = self._table(key)
+        table = self._scope.table(key)
         table.used.add(key)
         if key not in table.types:
             # Apart from the types: whoever looks for what a name was meant to be goes through all of those.
@@ -107,39 +57,39 @@ class Names:
 
     def peek(self, key: str) -> VariableType | None:
         """Return what a name stands for, without asking anything of it."""
-        return self._table(key).types.get(key)
+        return self._scope.type(key)
 
     def use(self, keys: Iterable[str]) -> None:
         """Take note that names are used."""
         for key in keys:
-            self._table(key).used.add(key)
+            self._scope.table(key).used.add(key)
             self._called.add(key)
 
     def mention(self, keys: Iterable[str]) -> None:
         """Take note of names in a part of the program that is passed over: used, and nothing is asked of them."""
         for key in keys:
-            self._table(key).used.add(key)
+            self._scope.table(key).used.add(key)
             self._called.add(key)
             self.poison(key)
 
     def poison(self, key: str) -> None:
         """Ask nothing more of a name."""
-        self._table(key).poisoned.add(key)
+        self._scope.table(key).poisoned.add(key)
 
     def is_poisoned(self, key: str) -> bool:
         """Whether nothing more is asked of a name."""
-        return key in self._table(key).poisoned
+        return self._scope.is_poisoned(key)
 
-    def call(self, key: str) -> Procedure | None:
+    def call(self, key: str) -> ProcedureSymbols | None:
         """Return a procedure; a call from within itself does not count as use."""
-        procedure = self.procedures.get(key)
-        if procedure is not None and (self._inside is None or self._inside.node.name.key != key):
+        procedure, around = self.symbols.procedures.get(key), self._scope.procedure
+        if procedure is not None and (around is None or around.node.name.key != key):
             self._called.add(key)
         return procedure
 
     def first(self, code: str, *keys: str) -> bool:
         """Whether a diagnostic of this code is news of any of these names; it is where there are none."""
-        news = {(code, id(self._table(key)), key) for key in keys} - self._said
+        news = {(code, id(self._scope.table(key)), key) for key in keys} - self._said
         self._said |= news
         return bool(news) or not keys
 
@@ -147,8 +97,7 @@ class Names:
 
     def where_declared(self, key: str) -> tuple[Label, ...]:
         """Return a label on the declaration of a name, if it has one."""
-        declared = self._table(key).declared
-        return (Label(declared[key].span, "declared here"),) if key in declared else ()
+        return self._scope.where_declared(key)
 
     def arms(self) -> list[str]:
         """Return the arms there are, as far as is known; at least one."""
@@ -159,7 +108,8 @@ class Names:
 
     def spelled(self) -> list[str]:
         """Return the variables that can be seen here, as they were declared."""
-        tables = [self.main] if self._inside is None else [self._inside.own, self.main]
+        own = self._scope.procedure
+        tables: list[Table] = [self.symbols] if own is None else [own, self.symbols]
         return [
             table.declared[key].text if key in table.declared else key
             for table in tables
@@ -169,7 +119,7 @@ class Names:
 
     def _of_the_cell(self) -> list[str]:
         """Return the frames that the cell has and the program has not."""
-        return [] if self.cell is None else [name for name in self.cell.frames if name not in self.main.types]
+        return [] if self.cell is None else [name for name in self.cell.frames if name not in self.symbols.types]
 
     def near(self, text: str, known: Callable[[], Collection[str]]) -> str | None:
         """Return what a name was probably meant to be; None where nothing is near, or too much was asked.
@@ -188,12 +138,12 @@ class Names:
 
     def unused(self) -> None:
         """Point at names that are declared and never used."""
-        self._unused(self.main)
-        for key, procedure in self.procedures.items():
+        self._unused(self.symbols)
+        for key, procedure in self.symbols.procedures.items():
             name = procedure.node.name
             if key not in self._called:
                 self._lint(f"procedure `{name.text}` is never called", name)
-            self._unused(procedure.own)
+            self._unused(procedure)
 
     def _unused(self, table: Table) -> None:
         for key, name in table.declared.items():
@@ -203,20 +153,16 @@ class Names:
     def _lint(self, message: str, name: tree.Name) -> None:
         self.report("L304", message, name.span, "declared here")
 
-    def _table(self, key: str) -> Table:
-        inside = self._inside
-        return inside.own if inside is not None and key in inside.own.types else self.main
-
-    def _owner(self, key: str) -> Procedure | None:
+    def _owner(self, key: str) -> ProcedureSymbols | None:
         """Return a procedure that has a name of its own like this."""
         if self._comparisons > _MAX_COMPARISONS:
             return None
-        self._comparisons += len(self.procedures)
-        return next((procedure for procedure in self.procedures.values() if key in procedure.own.types), None)
+        self._comparisons += len(self.symbols.procedures)
+        return next((procedure for procedure in self.symbols.procedures.values() if key in procedure.types), None)
 
     def _undeclared(self, name: tree.Name) -> None:
         note, advice = "", "declare it in the VAR part"
-        if name.key in self.procedures:
+        if name.key in self.symbols.procedures:
             text = f"`{name.text}` is a procedure and no variable"
             help_ = f"a procedure is called by a statement of its own: `{name.text}(...)`"
             self.report("E227", text, name.span, "a procedure", advice=help_)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import attrs
 
+from armwright.program.language.diagnostic import Label
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import UnitSystem
 from armwright.program.language.words import Standard
@@ -14,45 +15,50 @@ FRAME = VariableType(VariableKind.FRAME)
 PREDECLARED: Mapping[str, VariableType] = {WORLD: FRAME, STATION: FRAME}
 
 
-@attrs.frozen(kw_only=True)
-class ProcedureSymbols:
-    """A procedure and its own names.
+@attrs.define(kw_only=True, eq=False)
+class Table:
+    """The names that belong together: those of a program, or those of one procedure.
+
+    Attributes:
+        types: what each stands for; None where that was reported as wrong.
+        declared: where each was declared; predeclared and imported names have no such place.
+        poisoned: names of which something has been said, so that they give no second message.
+        used: names that statements use.
+    """
+
+    types: dict[str, VariableType | None] = attrs.field(factory=dict)
+    declared: dict[str, tree.Name] = attrs.field(factory=dict)
+    poisoned: set[str] = attrs.field(factory=set)
+    used: set[str] = attrs.field(factory=set)
+
+
+@attrs.define(kw_only=True, eq=False)
+class ProcedureSymbols(Table):
+    """A procedure with its parameters and own variables.
 
     Attributes:
         node: the procedure.
         parameters: their names, in order; a name given twice stands here twice.
-        types: what parameters and own variables stand for; None where that was reported as wrong.
-        declared: where each was declared.
-        poisoned: own names of which something has been said, so that they give no second message.
     """
 
     node: tree.Procedure
     parameters: tuple[str, ...]
-    types: Mapping[str, VariableType | None]
-    declared: Mapping[str, tree.Name]
-    poisoned: frozenset[str] = frozenset()
 
 
-@attrs.frozen(kw_only=True)
-class Symbols:
-    """The names of a program.
+@attrs.define(kw_only=True, eq=False)
+class Symbols(Table):
+    """The names of a program, those that are predeclared or imported among them.
 
     Attributes:
-        types: what each declared, predeclared or imported name stands for; None where that was reported as wrong.
-        declared: where each was declared; predeclared and imported names have no such pose.
         procedures: by name.
-        poisoned: names of which something has been said, so that they give no second message.
         units: what bare numbers count.
         imported: the frames that IMPORT has brought.
         std: the language.
     """
 
-    types: Mapping[str, VariableType | None]
-    declared: Mapping[str, tree.Name]
-    procedures: Mapping[str, ProcedureSymbols] = attrs.field(factory=dict)
-    poisoned: frozenset[str] = frozenset()
+    procedures: dict[str, ProcedureSymbols] = attrs.field(factory=dict)
     units: UnitSystem = attrs.field(factory=UnitSystem)
-    imported: frozenset[str] = frozenset()
+    imported: set[str] = attrs.field(factory=set)
     std: Standard = Standard.RLO_2
 
     def scope(self, procedure: str | None) -> "Scope":
@@ -80,21 +86,27 @@ class Scope:
         """Whether a name is a parameter or own variable of the procedure."""
         return self.procedure is not None and key in self.procedure.types
 
+    def table(self, key: str) -> Table:
+        """Return the names among which a name is looked up."""
+        local = self.procedure
+        return local if local is not None and key in local.types else self.symbols
+
     def type(self, key: str) -> VariableType | None:
         """Return what a name stands for; None where it is unknown or was reported as wrong."""
-        local = self.procedure
-        return local.types[key] if local is not None and key in local.types else self.symbols.types.get(key)
+        return self.table(key).types.get(key)
 
     def declared(self, key: str) -> tree.Name | None:
-        """Return where a name was declared; None where it has no such pose."""
-        local = self.procedure
-        table = local.declared if local is not None and key in local.types else self.symbols.declared
-        return table.get(key)
+        """Return where a name was declared; None where it has no such place."""
+        return self.table(key).declared.get(key)
+
+    def where_declared(self, key: str) -> tuple[Label, ...]:
+        """Return a label on the declaration of a name, if it has one."""
+        name = self.declared(key)
+        return () if name is None else (Label(name.span, "declared here"),)
 
     def is_poisoned(self, key: str) -> bool:
         """Whether something has been said of a name, so that it is passed over in silence."""
-        local = self.procedure
-        return key in (local.poisoned if local is not None and key in local.types else self.symbols.poisoned)
+        return key in self.table(key).poisoned
 
     def frame(self, node: object) -> str | None:
         """Return the canonical name of a single FRAME or an arm; None for anything else or what is unknown."""
