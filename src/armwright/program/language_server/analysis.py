@@ -1,8 +1,7 @@
 """All that is known of one version of a program, worked out once; and what stands around a position in a text."""
 
 from bisect import bisect_right
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -78,23 +77,6 @@ class Analysis:
         return occurrences(self.compiled.tokens, self.scopes)
 
     @cached_property
-    def by_key(self) -> Mapping[str, Sequence[Occurrence]]:
-        """All occurrences of each name."""
-        by_key: defaultdict[str, list[Occurrence]] = defaultdict(list)
-        for occurrence in self.occurrences:
-            by_key[occurrence.key].append(occurrence)
-        return by_key
-
-    @cached_property
-    def _occurrence_starts(self) -> list[int]:
-        return [occurrence.start for occurrence in self.occurrences]
-
-    @cached_property
-    def token_starts(self) -> list[int]:
-        """Where each token starts."""
-        return [token.start for token in self.compiled.tokens]
-
-    @cached_property
     def statements(self) -> tuple[tree.Move | tree.Call | tree.Grasp, ...]:
         """The statements that hints are given for, in the order of the text."""
         program = self.compiled.tree
@@ -109,19 +91,23 @@ class Analysis:
         return first is not None and first.text.islower()
 
     def at(self, offset: int) -> Occurrence | None:
-        """Return the name at a place, or right in front of it."""
-        index = bisect_right(self._occurrence_starts, offset) - 1
+        """Return the name at a position, or right in front of it."""
+        index = bisect_right(self.occurrences, offset, key=lambda occurrence: occurrence.start) - 1
         return self.occurrences[index] if index >= 0 and self.occurrences[index].end >= offset else None
 
     def token_at(self, offset: int) -> Token | None:
-        """Return the token that holds a place."""
-        index = bisect_right(self.token_starts, offset) - 1
-        token = self.compiled.tokens[index] if index >= 0 else None
-        return token if token is not None and token.start <= offset < token.end else None
+        """Return the token that holds a position."""
+        token = next(self.tokens_back(offset), None)
+        return token if token is not None and offset < token.end else None
+
+    def tokens_back(self, offset: int) -> Iterator[Token]:
+        """Give the tokens that start at a position or in front of it, the nearest first."""
+        index = bisect_right(self.compiled.tokens, offset, key=lambda token: token.start)
+        return reversed(self.compiled.tokens[:index])
 
     def same(self, occurrence: Occurrence) -> tuple[Occurrence, ...]:
         """Return all occurrences of the same thing."""
-        return tuple(other for other in self.by_key.get(occurrence.key, ()) if other.is_same(occurrence))
+        return tuple(other for other in self.occurrences if other.is_same(occurrence))
 
     def declaration(self, occurrence: Occurrence) -> tree.Name | None:
         """Return where the name was declared, if it was."""

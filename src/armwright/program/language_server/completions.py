@@ -17,6 +17,7 @@ from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import WORDS, Word, explained
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import open_call
+from armwright.program.language_server.symbol_index import What
 from armwright.program.semantics.builtins import AXES, FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
@@ -279,7 +280,8 @@ class _Maker:
         if not operand.arms:
             return
         cell = self._analysis.cell
-        used = dict.fromkeys(("ARM_1", *filter(is_arm, self._analysis.by_key)), "arm")
+        written = (occurrence.key for occurrence in self._analysis.occurrences if occurrence.what is What.ARM)
+        used = dict.fromkeys(("ARM_1", *filter(is_arm, written)), "arm")
         arms = used if cell is None else {name: arm.arm.name for name, arm in cell.arms.items()}
         for name in sorted(arms):
             yield self._item(name, Kind.Constant, "", arms[name])

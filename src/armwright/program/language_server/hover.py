@@ -1,6 +1,7 @@
 """What there is to say about a place of a program: names with their types and poses, words, numbers with units."""
 
 from collections.abc import Sequence
+from itertools import takewhile
 from typing import TypeAlias
 
 from lsprotocol import types as lsp
@@ -79,13 +80,9 @@ def _type_text(written: tree.TypeName) -> str:
 
 def _statement(analysis: Analysis, token: Token) -> str:
     """Return the word that starts the statement that a token stands in."""
-    tokens = analysis.compiled.tokens
-    index = analysis.token_starts.index(token.start)
-    while index >= 0 and tokens[index].key != ";":
-        if tokens[index].key in _STARTS and tokens[index].kind is TokenKind.KEYWORD:
-            return tokens[index].key
-        index -= 1
-    return ""
+    own = takewhile(lambda before: before.key != ";", analysis.tokens_back(token.start))
+    starts = (before.key for before in own if before.key in _STARTS and before.kind is TokenKind.KEYWORD)
+    return next(starts, "")
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------

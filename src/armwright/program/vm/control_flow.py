@@ -3,11 +3,11 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from armwright.program.bytecode.instructions import Instruction, JumpTarget, Op
+from armwright.program.bytecode.instructions import Instruction, Op
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Span
 from armwright.program.vm.contact import contact_of, note_contact, stop
-from armwright.program.vm.machine import Handler, Machine, RunError
+from armwright.program.vm.machine import Handler, Machine, RunError, jump_target
 from armwright.program.vm.move import halt, release
 from armwright.program.vm.process import Activation, Attempt, EarlyEnd, Pending, Process, Waiting
 from armwright.program.vm.synchronization import give_up, lock, signal, unlock, wait
@@ -18,19 +18,13 @@ _ROUNDING = 1e-9
 _MAX_PAUSE = 1e6
 
 
-def _place(step: Instruction, index: int) -> int:
-    target = step.operands[index]
-    assert isinstance(target, JumpTarget)  # noqa: S101 - the translator lands them
-    return target.index
-
-
 def _jump(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
-    process.at = _place(step, 0)
+    process.at = jump_target(step, 0)
 
 
 def _jump_if_not(machine: Machine, process: Process, step: Instruction) -> None:
     if not machine.read(process, step.operands[0], step):
-        process.at = _place(step, 1)
+        process.at = jump_target(step, 1)
 
 
 def _for(machine: Machine, process: Process, step: Instruction) -> None:
@@ -40,7 +34,7 @@ def _for(machine: Machine, process: Process, step: Instruction) -> None:
     if step_ == 0:
         raise machine.error(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
     if done > (last - first) / step_ + _ROUNDING:
-        process.at = _place(step, 5)
+        process.at = jump_target(step, 5)
         return
     machine.write(process, variable, first + done * step_, step)
     machine.write(process, count, done + 1, step)
@@ -112,7 +106,7 @@ def _fork(machine: Machine, process: Process, step: Instruction) -> None:
     branch = Process(
         path=(*process.path, len(process.branches)),
         priority=rank,
-        at=_place(step, 0),
+        at=jump_target(step, 0),
         wake=machine.state.ticks,
         stack=[Activation(kind="main", bindings=now.bindings, passing=dict(now.passing), wrote=dict(now.wrote))],
         parent=process,
@@ -176,13 +170,13 @@ def _pause(machine: Machine, process: Process, step: Instruction) -> None:
 
 
 def _try(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
-    attempt = Attempt(process.at - 1, _place(step, 0), recovering=False, locks=len(process.locks))
+    attempt = Attempt(process.at - 1, jump_target(step, 0), recovering=False, locks=len(process.locks))
     process.now.attempts.append(attempt)
 
 
 def _well(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
     process.now.attempts.pop()
-    process.at = _place(step, 0)
+    process.at = jump_target(step, 0)
 
 
 def _recovered(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op
-from armwright.program.vm.machine import Handler, Machine
+from armwright.program.bytecode.instructions import Constant, Instruction, Op
+from armwright.program.vm.machine import Handler, Machine, jump_target
 from armwright.program.vm.operators import IN_UNITS, PLAIN, ValueFault
 from armwright.program.vm.process import Element, Process
 
@@ -74,8 +74,6 @@ def evaluate_instructions(machine: Machine, process: Process, steps: Sequence[In
         index += 1
         if step.op is Op.JZ:
             # AND and OR jump forwards; nothing else in an expression jumps.
-            target = step.operands[1]
-            assert isinstance(target, JumpTarget)  # noqa: S101 - the translator lands them
-            index = index if machine.read(process, step.operands[0], step) else target.index
+            index = index if machine.read(process, step.operands[0], step) else jump_target(step, 1)
         else:
             HANDLERS[step.op](machine, process, step)

@@ -14,7 +14,7 @@ from armwright.cell.model import Cell, base_name
 from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.program.bytecode.instructions import Code, Instruction, Operand
+from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand
 from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
@@ -383,6 +383,13 @@ def arrays_of(constants: Sequence[tuple[float, ...] | float]) -> list[float | Ar
 def pose_data(frame: str, X: Array) -> dict[str, object]:
     """Return the facts of an effect that gives a frame a pose."""
     return {"frame": frame, "pose": to_noap(X).tolist()}
+
+
+def jump_target(step: Instruction, operand: int) -> int:
+    """Return the index of the instruction that an operand of another leads to."""
+    target = step.operands[operand]
+    assert isinstance(target, JumpTarget)  # noqa: S101 - the translator lands them
+    return target.index
 
 
 # Executes an instruction for a process.

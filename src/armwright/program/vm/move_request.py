@@ -1,11 +1,12 @@
 """What the instructions of one MOVE ask for, gathered and checked."""
 
+from itertools import takewhile
 from typing import NamedTuple
 
-from armwright.program.bytecode.instructions import Form, Instruction, JumpTarget, Op, Operand
+from armwright.program.bytecode.instructions import Form, Instruction, Op, Operand
 from armwright.program.language.source import Span
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
-from armwright.program.vm.machine import Machine
+from armwright.program.vm.machine import Machine, jump_target
 from armwright.program.vm.process import Guard, Process
 
 # The longest MOVE; more is a slip of units [s].
@@ -112,11 +113,7 @@ def _quantity(machine: Machine, process: Process, part: Instruction) -> float:
 
 
 def _guard(machine: Machine, part: Instruction) -> Guard:
-    condition, truth, action = part.operands
-    assert isinstance(condition, JumpTarget)  # noqa: S101 - the translator lands them
-    assert isinstance(action, JumpTarget)  # noqa: S101
-    index, reads_pose = condition.index, False
-    while (step := machine.code.instructions[index]).op is not Op.RET:
-        reads_pose = reads_pose or step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV)
-        index += 1
-    return Guard(condition=condition.index, truth=str(truth), action=action.index, looks=reads_pose)
+    condition, action = jump_target(part, 0), jump_target(part, 2)
+    steps = takewhile(lambda step: step.op is not Op.RET, machine.code.instructions[condition:])
+    reads_pose = any(step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV) for step in steps)
+    return Guard(condition=condition, truth=str(part.operands[1]), action=action, looks=reads_pose)
