@@ -8,9 +8,10 @@ from armwright.program.flow_analysis.side_effects import every, parts, written_n
 from armwright.program.flow_analysis.state import FlowState, Use, Uses
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label
 from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import array, is_any
 from armwright.program.language.source import Source
 from armwright.program.semantics.expression_types import written
-from armwright.program.semantics.symbols import Scope, Symbols
+from armwright.program.semantics.symbols import Scope, Symbols, bodies
 from armwright.program.syntax import tree
 
 # Locations shown in one message.
@@ -26,19 +27,14 @@ def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagn
         source: its text.
     """
     findings = DiagnosticList()
-    bodies = [_Body(symbols.scope(None), program.statements)]
-    for node in program.procedures:
-        procedure = symbols.procedures.get(node.name.key)
-        if procedure is not None and procedure.node is node:
-            bodies.append(_Body(symbols.scope(node.name.key), node.body.statements))
-    events = _Events(bodies)
+    events = _Events(bodies(program, symbols))
     for _, fork in events.forks:
         _priorities(findings, fork, source)
     if not events.waits or events.may_halt:
         return findings
     _never_signalled(findings, events)
     groups = [(scope, [branch.body.statements for branch in fork.branches]) for scope, fork in events.forks]
-    for scope, branches in [(bodies[0].scope, [program.statements]), *groups]:
+    for scope, branches in [(symbols.scope(None), [program.statements]), *groups]:
         _deadlock(findings, events.sequences(scope, branches), source, main=branches[0] is program.statements)
     return findings
 
@@ -95,17 +91,6 @@ def _other(state: FlowState, used: set[str]) -> str:
 # ---- events --------------------------------------------------------------------------------------------------------
 
 
-_OF_PROCESSES = (tree.Signal, tree.Wait, tree.Call, tree.Cobegin)
-
-
-@attrs.frozen
-class _Body:
-    """The main program or a procedure."""
-
-    scope: Scope
-    statements: tuple[tree.Statement, ...]
-
-
 @attrs.frozen
 class _Step:
     """A SIGNAL or WAIT that is certain to be come to, if nothing before it goes wrong or waits for ever."""
@@ -117,35 +102,31 @@ class _Step:
 class _Events:
     """Where a program signals and waits for which events, and where it parts into branches."""
 
-    def __init__(self, bodies: Sequence[_Body]) -> None:
+    def __init__(self, bodies: Sequence[tuple[Scope, Sequence[tree.Statement]]]) -> None:
         self.forks: list[tuple[Scope, tree.Cobegin]] = []
         self.waits: dict[str, list[tuple[Scope, tree.Wait]]] = {}
         self.signals: dict[str, list[tree.Signal]] = {}
         # Events that are given to procedures, so that one cannot see who signals them.
         self.given: set[str] = set()
-        for body in bodies:
-            for step in every(body.statements):
-                if isinstance(step, _OF_PROCESSES):
-                    self._take(body.scope, step)
-        self.may_halt = bool(self.waits) and any(beside for body in bodies for beside in _ends(body))
+        for scope, statements in bodies:
+            for statement in every(statements):
+                self._take(scope, statement)
+        self.may_halt = bool(self.waits) and any(_may_halt_beside(*body) for body in bodies)
 
     def _take(self, scope: Scope, node: tree.Statement) -> None:
-        if isinstance(node, tree.Signal | tree.Wait):
-            name = written_name(node.event, scope)
-            if name is None:
-                return
+        if isinstance(node, tree.Cobegin):
+            self.forks.append((scope, node))
+        elif isinstance(node, tree.Call):
+            self.given.update(array(name) for argument in node.arguments if (name := written_name(argument, scope)))
+        elif isinstance(node, tree.Signal | tree.Wait) and (name := written_name(node.event, scope)) is not None:
             if isinstance(node, tree.Wait):
                 self.waits.setdefault(name, []).append((scope, node))
             else:
                 self.signals.setdefault(name, []).append(node)
-        elif isinstance(node, tree.Cobegin):
-            self.forks.append((scope, node))
-        elif isinstance(node, tree.Call):
-            self.given.update(head(name) for argument in node.arguments if (name := written_name(argument, scope)))
 
     def is_signalled(self, name: str) -> bool:
         """Whether something may signal an event, or another element of its array."""
-        return head(name) in self.given or any(head(other) == head(name) for other in self.signals)
+        return array(name) in self.given or any(array(other) == array(name) for other in self.signals)
 
     def sequences(self, scope: Scope, branches: Iterable[Sequence[tree.Statement]]) -> list[list[_Step]]:
         """Return what branches signal and wait for, one after the other; only events that nobody else deals with."""
@@ -164,19 +145,14 @@ class _Events:
         procedure = scope.procedure
         if procedure is not None:
             # Several runs of a procedure share what is not its own.
-            key = head(name).rpartition(".")[2]
+            key = array(name).rpartition(".")[2]
             if not scope.is_local(key) or key in procedure.parameters:
                 return False
-        unclear = name.endswith("[]") or f"{head(name)}[]" in (*self.waits, *self.signals)
-        if unclear or head(name) in self.given or name not in self.signals:
+        unclear = is_any(name) or f"{array(name)}[]" in (*self.waits, *self.signals)
+        if unclear or array(name) in self.given or name not in self.signals:
             return False
         nodes = [*self.signals[name], *(node for _, node in self.waits.get(name, ()))]
         return all(id(node) in here for node in nodes)
-
-
-def head(name: str) -> str:
-    """Return the variable of an element."""
-    return name.partition("[")[0]
 
 
 def _straight(statements: Sequence[tree.Statement], scope: Scope) -> Iterator[_Step]:
@@ -197,23 +173,24 @@ def _straight(statements: Sequence[tree.Statement], scope: Scope) -> Iterator[_S
                 pass
 
 
-def _ends(body: _Body) -> Iterator[bool]:
-    """Give whether each HALT that ends the program may do so while others wait."""
-    waiting = [(statement, body.scope.procedure is not None) for statement in body.statements]
+def _may_halt_beside(scope: Scope, statements: Sequence[tree.Statement]) -> bool:
+    """Whether a HALT may end the program while others wait."""
+    waiting = [(statement, scope.procedure is not None) for statement in statements]
     while waiting:
         node, beside = waiting.pop()
-        if isinstance(node, tree.Halt):
-            yield beside
-        elif not isinstance(node, tree.Move):
-            # In an action of a MOVE it only ends the MOVE.
-            waiting += [(inner, beside or isinstance(node, tree.Cobegin)) for inner in parts(node)]
+        if beside and isinstance(node, tree.Halt):
+            return True
+        # In an action of a MOVE it only ends the MOVE.
+        inside = () if isinstance(node, tree.Move) else parts(node)
+        waiting += [(inner, beside or isinstance(node, tree.Cobegin)) for inner in inside]
+    return False
 
 
 def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
     reported: set[str] = set()
     for name, waits in events.waits.items():
         scope, node = waits[0]
-        key = head(name).rpartition(".")[2]
+        key = array(name).rpartition(".")[2]
         kind, procedure = scope.type(key), scope.procedure
         is_parameter = procedure is not None and scope.is_local(key) and key in procedure.parameters
         if (
@@ -221,10 +198,10 @@ def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
             or kind.kind is not VariableKind.EVENT
             or is_parameter
             or events.is_signalled(name)
-            or head(name) in reported
+            or array(name) in reported
         ):
             continue
-        reported.add(head(name))
+        reported.add(array(name))
         text = written(node.event)
         findings.report(
             "E501",

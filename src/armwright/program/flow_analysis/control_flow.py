@@ -8,7 +8,7 @@ from armwright.program.flow_analysis.context import Context, Steps, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.lattice import Outcome, Uncertainty
-from armwright.program.flow_analysis.side_effects import ANY_ARM, ANYTHING, NOTHING, SideEffects
+from armwright.program.flow_analysis.side_effects import ANY_ARM, ANYTHING, SideEffects, union
 from armwright.program.flow_analysis.state import LAST, FlowState, Uses
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any, is_arm
@@ -116,7 +116,10 @@ def _loop(
         state.forget(writes)
         return
     if context.loops < _MAX_LOOP_DEPTH:
-        _first_pass(context, body)
+        # Follow what is certain to run at the first pass of several, and come back.
+        state.first = True
+        context.path(*body)
+        state.first = False
     context.loops += 1
     mark = state.facts.checkpoint()
     none = state.facts.outcome(mark)
@@ -124,13 +127,6 @@ def _loop(
     again = context.path(*body, mark=mark)
     context.loops -= 1
     context.merge(*(again,) if parting is None else (none, again), parting=parting)
-
-
-def _first_pass(context: Context, body: Sequence[tree.Statement]) -> None:
-    """Follow what is certain to run at the first pass of several, and come back."""
-    context.state.first = True
-    context.path(*body)
-    context.state.first = False
 
 
 def cobegin(context: Context, node: tree.Cobegin) -> None:
@@ -193,7 +189,8 @@ def try_(context: Context, node: tree.Try) -> None:
     context.recovering = outside
     says = "it gets a value in this TRY, where a statement before may fail"
     advice = "give it a value before the TRY, or after RECOVER too"
-    context.merge(well, recovered, parting=state.parting(_first_word(node.span), says, advice))
+    word = Span(node.span.start, node.span.start + len("TRY"))
+    context.merge(well, recovered, parting=state.parting(word, says, advice))
 
 
 def _given_at_once(context: Context, statements: Sequence[tree.Statement]) -> Iterator[str]:
@@ -219,17 +216,7 @@ def end(context: Context, node: tree.Halt | tree.Retry) -> None:
 
 def _others(writes: list[SideEffects], number: int) -> SideEffects:
     """Return what all branches but one may change; where there are many of them, anything."""
-    if len(writes) > _MAX_BRANCHES:
-        return ANYTHING
-    others = NOTHING
-    for own in (*writes[:number], *writes[number + 1 :]):
-        others |= own
-    return others
-
-
-def _first_word(span: Span) -> Span:
-    """Return where the TRY stands that begins a statement."""
-    return Span(span.start, span.start + len("TRY"))
+    return ANYTHING if len(writes) > _MAX_BRANCHES else union((*writes[:number], *writes[number + 1 :]))
 
 
 STEPS: Steps = {

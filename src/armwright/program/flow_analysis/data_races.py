@@ -8,8 +8,9 @@ import attrs
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label
 from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import array, is_any
 from armwright.program.language.source import Span
-from armwright.program.semantics.symbols import Scope, Symbols
+from armwright.program.semantics.symbols import Scope, Symbols, bodies
 from armwright.program.syntax import tree
 
 # Branches beside one another of which one checks each, and pairs of writes, signals and waits that are compared.
@@ -96,7 +97,7 @@ class _Branch:
 def _alike(branch: tuple[str, _Location], other: tuple[str, _Location]) -> bool:
     """Whether two events may be the same."""
     names = {branch[0], other[0]}
-    any_element = any(name.endswith("[]") for name in names) and len({name.partition("[")[0] for name in names}) == 1
+    any_element = any(is_any(name) for name in names) and len({array(name) for name in names}) == 1
     return _ANY in names or len(names) == 1 or any_element
 
 
@@ -106,19 +107,15 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
     Branches of which one waits, before its write, for what the other signals behind its own are no danger.
     """
     findings = DiagnosticList()
-    bodies = [(symbols.scope(None), program.statements)]
-    for node in program.procedures:
-        procedure = symbols.procedures.get(node.name.key)
-        if procedure is not None and procedure.node is node:
-            bodies.append((symbols.scope(node.name.key), node.body.statements))
-    for scope, statements in bodies:
+    everywhere = bodies(program, symbols)
+    for scope, statements in everywhere:
         forks = [branch for branch in every(statements) if isinstance(branch, tree.Cobegin)]
         inner = {id(branch) for fork in forks for branch in every(part.body for part in fork.branches)}
         for fork in forks:
             if len(fork.branches) <= _MAX_BRANCHES:
                 # Beside a COBEGIN that stands in a branch or a procedure others may be at work.
                 alone = id(fork) not in inner and scope.procedure is None
-                _branches(findings, fork, scope, symbols, () if alone else bodies)
+                _branches(findings, fork, scope, symbols, () if alone else everywhere)
     return findings
 
 
@@ -216,14 +213,14 @@ def _writes(step: _Step, scope: Scope) -> Iterator[_Write]:
         targets = node.targets
     for target in targets:
         name = written_name(target, own)
-        if name is None or name.endswith("[]") or not isinstance(target, tree.Name | tree.Index):
+        if name is None or is_any(name) or not isinstance(target, tree.Name | tree.Index):
             continue
         head = target.name if isinstance(target, tree.Index) else target
         kind = own.type(head.key)
         # In a procedure that is called only the variables of the program are those of everybody.
         if kind is None or kind.kind is VariableKind.EVENT or (own is not scope and own.is_local(head.key)):
             continue
-        is_locked = bool(step.locked & {name, name.partition("[")[0]})
+        is_locked = bool(step.locked & {name, array(name)})
         span = node.head if isinstance(node, tree.For) else node.span
         text = head.text + (f"[{name.partition('[')[2]}" if isinstance(target, tree.Index) else "")
         yield _Write(name, text, step.call or span, value, is_locked, step.place)

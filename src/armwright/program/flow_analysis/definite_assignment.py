@@ -50,7 +50,7 @@ def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
     if name is None or is_any(name) or is_arm(name):
         return
     if state.table.valued[name]:
-        parting = state.table.is_sure(name)
+        parting = state.table.sure[name]
         if isinstance(parting, Divergence) and state.conditions <= parting.depth:
             _uncertain(state, node, name, parting)
         return

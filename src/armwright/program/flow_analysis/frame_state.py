@@ -1,6 +1,7 @@
 """The frame table of the checker: what hangs on what and since where, what has a value, what each hand is doing."""
 
 from collections.abc import Iterator
+from operator import or_
 
 import attrs
 
@@ -20,7 +21,7 @@ from armwright.program.flow_analysis.facts import (
     joined_hands,
     joined_links,
 )
-from armwright.program.flow_analysis.lattice import Facts, FactTable, either, same
+from armwright.program.flow_analysis.lattice import Facts, FactTable, same
 from armwright.program.flow_analysis.poses import HERE, Pose, after, inverse
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
@@ -47,7 +48,7 @@ class FrameState:
         self.links: FactTable[Link | None] = FactTable(
             facts, default=None, unknown=ANY_LINK, joined=joined_links, watch=self._watch
         )
-        self.valued = FactTable(facts, default=False, unknown=True, joined=either)
+        self.valued = FactTable(facts, default=False, unknown=True, joined=or_)
         # Of what may have a value, whether it has one on every path here, or where the paths have parted.
         self.sure: FactTable[Divergence | bool] = FactTable(
             facts, default=False, unknown=True, joined=self._joined_sure
@@ -144,10 +145,6 @@ class FrameState:
         there, here = self.where(child), self.where(parent)
         return None if there is None or here is None else after(inverse(here), there)
 
-    def is_sure(self, name: str) -> "Divergence | bool":
-        """Return whether what may have a value has one on every path here; if not, where the paths parted."""
-        return self.sure[name]
-
     # ---- changing --------------------------------------------------------------------------------------------------
 
     def has(self, name: str) -> None:
@@ -167,8 +164,7 @@ class FrameState:
         if is_any(child):
             self.forget(child)
             return
-        link = ANY_LINK if is_any(parent) else Link(parent, span, rigid)
-        self.links.put(child, link)
+        self.links.put(child, ANY_LINK if is_any(parent) else Link(parent, span, rigid))
         self._steps.put(child, step)
         self.has(child)
         if self._facts.shaky and not self._steady(child):

@@ -6,6 +6,8 @@ from typing import Any, Generic, TypeVar
 
 import attrs
 
+from armwright.program.language.names import array
+
 V = TypeVar("V")
 
 # What stands for every name there is.
@@ -14,7 +16,7 @@ EVERYTHING = "*"
 
 def base(name: str) -> str:
     """Return the array of an element, as a name for any of its elements: ``SLOT[]``; else the name itself."""
-    return f"{name.partition('[')[0]}[]" if "[" in name else name
+    return f"{array(name)}[]" if "[" in name else name
 
 
 @attrs.frozen(kw_only=True)
@@ -42,7 +44,7 @@ class Uncertainty:
         if name in self.names or base(name) in self.names:
             return True
         any_name = self.everything or (self.arms and name.startswith("ARM_"))
-        return any_name and name.partition("[")[0] not in self.excepted
+        return any_name and array(name) not in self.excepted
 
 
 @attrs.frozen
@@ -61,14 +63,15 @@ class Facts:
         self.tick = 0
         self.wipes: dict[str, int] = {}
         self.shaky: tuple[Uncertainty, ...] = ()
-        self._changes: list[tuple[FactTable[Any] | None, str, Any]] = []
+        # What each entry was that has changed, for the way back.
+        self.changes: list[tuple[FactTable[Any] | None, str, Any]] = []
 
     # ---- forgetting ------------------------------------------------------------------------------------------------
 
     def wipe(self, name: str) -> None:
         """Forget all that is known of a name: ``SLOT[]`` for every element, ``*`` for all there is."""
         self.tick += 1
-        self._changes.append((None, name, self.wipes.get(name)))
+        self.changes.append((None, name, self.wipes.get(name)))
         self.wipes[name] = self.tick
 
     def is_shaky(self, name: str) -> bool:
@@ -83,21 +86,17 @@ class Facts:
 
     def checkpoint(self) -> int:
         """Return what to go back to later."""
-        return len(self._changes)
-
-    def record_change(self, book: "FactTable[Any]", key: str, old: Any) -> None:
-        """Keep an entry of a book that is about to change."""
-        self._changes.append((book, key, old))
+        return len(self.changes)
 
     def outcome(self, mark: int) -> Outcome:
         """Return what has been changed since a mark."""
-        keys = dict.fromkeys((book, key) for book, key, _ in self._changes[mark:] if book is not None)
+        keys = dict.fromkeys((book, key) for book, key, _ in self.changes[mark:] if book is not None)
         return Outcome({(book, key): book[key] for book, key in keys}, dict(self.wipes))
 
     def take_back(self, mark: int) -> None:
         """Put everything back as it was at a mark."""
-        while len(self._changes) > mark:
-            book, key, old = self._changes.pop()
+        while len(self.changes) > mark:
+            book, key, old = self.changes.pop()
             if book is not None:
                 book.restore(key, old)
             elif old is None:
@@ -123,7 +122,7 @@ class Facts:
         for name in dict.fromkeys(name for outcome in outcomes for name in outcome.wipes):
             last = max(outcome.wipes.get(name, 0) for outcome in outcomes)
             if last != self.wipes.get(name):
-                self._changes.append((None, name, self.wipes.get(name)))
+                self.changes.append((None, name, self.wipes.get(name)))
                 self.wipes[name] = last
         for book, key, value in joined:
             book.put(key, value)
@@ -184,7 +183,7 @@ class FactTable(Generic[V]):
         if facts.shaky and facts.is_shaky(key):
             value = self.unknown
         old = self._entries.get(key)
-        facts.record_change(self, key, old)
+        facts.changes.append((self, key, old))
         self._write(key, old, (value, facts.tick))
 
     def restore(self, key: str, old: tuple[V, int] | None) -> None:
@@ -206,8 +205,3 @@ class FactTable(Generic[V]):
 def same(value: V | None, other: V | None) -> V | None:
     """Return what both paths agree on; None where they differ."""
     return value if value == other else None
-
-
-def either(value: bool, other: bool) -> bool:  # noqa: FBT001 - two values of one kind
-    """Whether something may be so on one of two paths."""
-    return value or other

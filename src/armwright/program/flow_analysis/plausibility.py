@@ -7,10 +7,9 @@ from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_any, is_arm
-from armwright.program.language.units import convert
+from armwright.program.language.units import LENGTHS, convert
 from armwright.program.syntax import tree
 
-_UNITS = {"M": "metres", "MM": "millimetres", "CM": "centimetres", "IN": "inches"}
 # A pose, or a step, this many times longer than an arm reaches is out of every robot's world.
 _FAR = 50.0
 # A pose nearer to WORLD than this part of the reach that would be one in metres was typed in metres.
@@ -31,7 +30,7 @@ def placed(state: FlowState, frame: str, value: tree.Expression) -> None:
         size = math.hypot(*(number.value for number in numbers))
         bare, broken = not any(number.unit for number in numbers), any(number.value % 1 for number in numbers)
         if bare and broken and 0 < away < _NEAR * reach and _LEAST * reach < size < _MAX_SIZE * reach:
-            unit = _UNITS[units.length]
+            unit = LENGTHS[units.length]
             advice = f"write the lengths in {unit}, or with their unit: `{numbers[0].text}m`"
             _odd(state, f"`{state.name(frame)}` would be {_length(away)} from WORLD", numbers, reach, advice)
             return
@@ -52,7 +51,7 @@ def lengths(state: FlowState, *nodes: tree.Expression | None) -> None:
                     if isinstance(node, tree.Matrix)
                     else "this translation is {} long"
                 )
-                advice = f"write the lengths in {_UNITS[units.length]}"
+                advice = f"write the lengths in {LENGTHS[units.length]}"
                 if units.length == "M":
                     advice = "write `UNITS MM ;` before BEGIN if they are in millimetres, or write each with its unit"
                 _odd(state, what.format(_length(away)), numbers, reach, advice)
@@ -78,7 +77,7 @@ def _typed(node: tree.Expression) -> Iterator[list[tree.Number]]:
 
 
 def _odd(state: FlowState, what: str, numbers: list[tree.Number], reach: float, advice: str) -> None:
-    unit = _UNITS[state.symbols.units.length]
+    unit = LENGTHS[state.symbols.units.length]
     text = f"{what}, in a cell whose arm reaches {_length(reach)}"
     note = f"lengths in this program are {unit}"
     state.report("W208", text, numbers[0].span.to(numbers[-1].span), unit, note=note, advice=advice)

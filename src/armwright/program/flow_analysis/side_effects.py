@@ -4,6 +4,8 @@ Names are those of the text: a parameter or variable of a procedure stands with 
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import reduce
+from operator import or_
 
 import attrs
 
@@ -50,19 +52,8 @@ class SideEffects:
         """Return what either may change."""
         if self is NOTHING or other is NOTHING:
             return other if self is NOTHING else self
-        return _limited(
-            SideEffects(
-                placed=self.placed | other.placed,
-                hung=self.hung | other.hung,
-                moved=self.moved | other.moved,
-                values=self.values | other.values,
-                arms=self.arms | other.arms,
-                grasps=self.grasps or other.grasps,
-                everything=self.everything or other.everything,
-                halts=self.halts or other.halts,
-                retries=self.retries or other.retries,
-            )
-        )
+        merged = {name: getattr(self, name) | getattr(other, name) for name in _FIELDS}
+        return _limited(SideEffects(**merged))
 
     @property
     def names(self) -> frozenset[str]:
@@ -70,6 +61,7 @@ class SideEffects:
         return self.placed | self.hung | self.moved | self.values | self.arms - {ANY_ARM}
 
 
+_FIELDS = tuple(attrs.fields_dict(SideEffects))
 NOTHING = SideEffects()
 ANYTHING = SideEffects(arms=frozenset({ANY_ARM}), grasps=True, everything=True)
 
@@ -125,10 +117,7 @@ class Writing:
 
     def all(self, statements: Iterable[tree.Statement], scope: Scope) -> SideEffects:
         """Return what several statements may change."""
-        effects = NOTHING
-        for statement in statements:
-            effects |= self.of(statement, scope)
-        return effects
+        return union(self.of(statement, scope) for statement in statements)
 
     def called(self, call: tree.Call, scope: Scope) -> SideEffects:
         """Return what a call may change."""
@@ -153,7 +142,7 @@ class Writing:
                 for statement in inner
                 if isinstance(statement, tree.Call) and statement.name.key in self._symbols.procedures
             ]
-            self._procedures[key] = _union(
+            self._procedures[key] = union(
                 self._own(statement, scope) for statement in inner if not isinstance(statement, tree.Call | tree.Retry)
             )
         order = _callees_first({key: [statement.name.key for statement in several] for key, several in calls.items()})
@@ -161,7 +150,7 @@ class Writing:
             news = {}
             for key in order:
                 scope, old = self._symbols.scope(key), self._procedures[key]
-                new = _union((old, *(self.called(call, scope) for call in calls[key])))
+                new = union((old, *(self.called(call, scope) for call in calls[key])))
                 if new != old:
                     news[key] = self._procedures[key] = new
             if not news:
@@ -257,19 +246,16 @@ def _names(scope: Scope, node: tree.Expression) -> frozenset[str]:
 def _arms(scope: Scope, node: tree.Expression | None) -> frozenset[str]:
     """Return the arm that a node names; a parameter may be one."""
     if isinstance(node, tree.Poison):
-        named = frozenset(key for key in node.names if is_arm(key))
-        return named or frozenset({ANY_ARM})
+        return frozenset(filter(is_arm, node.names)) or frozenset({ANY_ARM})
     if isinstance(node, tree.Name):
         name = qualified(node.key, scope)
         return frozenset({name} if _is_parameter(name, scope) else ())
     return frozenset({node.key}) if isinstance(node, tree.ArmName) else frozenset()
 
 
-def _union(several: Iterable[SideEffects]) -> SideEffects:
-    effects = NOTHING
-    for statement in several:
-        effects |= statement
-    return effects
+def union(several: Iterable[SideEffects]) -> SideEffects:
+    """Return what any of several parts of a program may change."""
+    return reduce(or_, several, NOTHING)
 
 
 def _callees_first(calls: Mapping[str, list[str]]) -> list[str]:

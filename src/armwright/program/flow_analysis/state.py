@@ -14,7 +14,7 @@ from armwright.program.flow_analysis.poses import Pose
 from armwright.program.flow_analysis.side_effects import ANY_ARM, SideEffects, Writing
 from armwright.program.language.diagnostic import Details, DiagnosticList, Label
 from armwright.program.language.kinds import VariableKind
-from armwright.program.language.names import is_any, is_arm
+from armwright.program.language.names import array, is_any, is_arm
 from armwright.program.language.source import Source, Span
 from armwright.program.semantics.cell_symbols import KnownCell
 from armwright.program.semantics.symbols import Scope, Symbols
@@ -107,8 +107,7 @@ class FlowState:
         )
         self.steps: FactTable[Pose | None] = FactTable(self.facts, default=None, unknown=None, joined=same)
         self.last: FactTable[str | None] = FactTable(self.facts, default=None, unknown=UNKNOWN, joined=_joined_arms)
-        self.main = Activation(scope=symbols.scope(None))
-        self.now = self.main
+        self.now = Activation(scope=symbols.scope(None))
         self.calls: list[Called] = []
         self.branches: list[Uses] = []
         self.first = self.over = False
@@ -345,7 +344,7 @@ class FlowState:
 
     def settle(self, slot: str) -> bool:
         """Whether this is the first thing said of a variable or an arm; no second shall follow."""
-        key = slot.partition("[")[0].partition("'")[0]
+        key = array(slot).partition("'")[0]
         news = key not in self._settled
         self._settled.add(key)
         return news

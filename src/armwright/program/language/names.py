@@ -9,3 +9,8 @@ def is_arm(name: str) -> bool:
 def is_any(name: str) -> bool:
     """Whether a name stands for some element of an array, nobody knows which."""
     return name.endswith("[]")
+
+
+def array(name: str) -> str:
+    """Return the array of an element; the name itself where it is no element."""
+    return name.partition("[")[0]

@@ -20,6 +20,8 @@ UNITS: Mapping[str, tuple[Dimension, float]] = {
     "MS": ("time", 1e-3),
     "N": ("force", 1.0),
 }
+# Those of lengths in words.
+LENGTHS = {"MM": "millimetres", "CM": "centimetres", "M": "metres", "IN": "inches"}
 # What a UNITS line may name: times are always seconds and forces newtons.
 DECLARABLE = tuple(unit for unit, (dimension, _) in UNITS.items() if dimension in ("length", "angle"))
 # Speeds of a MOVE, in per cent of the normal one.

@@ -70,6 +70,13 @@ class Symbols(Table):
         return Scope(symbols=self, procedure=None if procedure is None else self.procedures[procedure])
 
 
+def bodies(program: tree.Program, symbols: Symbols) -> "list[tuple[Scope, tuple[tree.Statement, ...]]]":
+    """Return the statements of the main program and of each procedure, with the names that they see."""
+    procedures = symbols.procedures.items()
+    inside = [(symbols.scope(key), procedure.node.body.statements) for key, procedure in procedures]
+    return [(symbols.scope(None), program.statements), *inside]
+
+
 @attrs.frozen(kw_only=True)
 class Scope:
     """The names that statements see: a procedure's own hide those of the program.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import attrs
 
 from armwright.program.language.diagnostic import Diagnostic, Fix, Severity
-from armwright.program.language.units import UnitSystem
+from armwright.program.language.units import LENGTHS, UnitSystem
 from armwright.program.syntax import tree
 from armwright.spatial.rotations import nearest_rotation
 
@@ -16,10 +16,9 @@ REPAIRABLE = 1e-2
 # `orthonormality_error` adds this for a mirror image.
 _MIRROR = 2.0
 
-_ROW_WISE_12 = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
+# Of numbers written row by row, with the bottom row or without, and of columns with it: where n, o, a, p stand.
+_ROW_WISE = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
 _COLUMNS_OF_16 = (0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14)
-_ROW_WISE_16 = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
-_LENGTHS = {"MM": "millimetres", "CM": "centimetres", "M": "metres", "IN": "inches"}
 
 
 def check(matrix: tree.Matrix, units: UnitSystem | None = None) -> Diagnostic | None:
@@ -41,7 +40,7 @@ def check(matrix: tree.Matrix, units: UnitSystem | None = None) -> Diagnostic | 
         diagnostic = _not_exact(matrix, values, error) if error > EXACT else None
     if diagnostic is None or diagnostic.code != "E206":
         return diagnostic
-    lengths = _LENGTHS[units.length if units else "M"]
+    lengths = LENGTHS[units.length if units else "M"]
     note = f"the numbers are the columns n, o, a, p in this order: n, o, a are the axes, p is the position in {lengths}"
     return attrs.evolve(diagnostic, notes=(note, *diagnostic.notes))
 
@@ -56,8 +55,8 @@ def _not_exact(matrix: tree.Matrix, values: Sequence[float], error: float) -> Di
             label=f"off by {error:.1g}; the nearest rotation is taken",
             helps=("write more digits",),
         )
-    if len(values) == 12 and is_rotation([values[index] for index in _ROW_WISE_12[:9]]):
-        return _rearranged(matrix, _ROW_WISE_12, "this matrix is written row by row")
+    if len(values) == 12 and is_rotation([values[index] for index in _ROW_WISE[:9]]):
+        return _rearranged(matrix, _ROW_WISE, "this matrix is written row by row")
     if _MIRROR <= error <= _MIRROR + REPAIRABLE:
         return _fault(
             matrix, "this matrix is a mirror image, not a rotation", "n, o, a are left-handed", "a must be n times o"
@@ -102,7 +101,7 @@ def _wrong_count(matrix: tree.Matrix, values: list[float]) -> Diagnostic:
     if len(values) == count == 16:
         wholes = {
             (values[3], values[7], values[11], values[15]): (_COLUMNS_OF_16, "this matrix includes its bottom row"),
-            (values[12], values[13], values[14], values[15]): (_ROW_WISE_16, "this matrix is written row by row"),
+            (values[12], values[13], values[14], values[15]): (_ROW_WISE, "this matrix is written row by row"),
         }
         for row, (order, message) in wholes.items():
             if row == (0, 0, 0, 1) and is_rotation([values[index] for index in order[:9]]):
