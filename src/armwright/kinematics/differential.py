@@ -18,7 +18,7 @@ from armwright.arm.positions import known_arm, positions
 from armwright.arrays import LARGEST, Array, ArrayLike, of_shape, read_only, reduce_by_fields
 from armwright.errors import ArmwrightError, UnsupportedArmError, one_of
 from armwright.kinematics.forward_kinematics import link_frames, per_joint, stack, tool_frame
-from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, rotation_about_z_then_y
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.jacobians import Axes, known_axes, together
 from armwright.kinematics.singularity_analysis import determinant_factors
@@ -30,7 +30,7 @@ Method: TypeAlias = Literal["blocks", "derivative"]
 # A factor of the determinant below this, in metres or as a sine, is taken for zero: of what is divided by it no more
 # than some six digits would be left.
 SINGULAR_FACTOR = 1e-9
-_FACTORS = ("shoulder", "elbow", "wrist")
+FACTORS = ("shoulder", "elbow", "wrist")
 
 
 class Motion(NamedTuple):
@@ -87,7 +87,7 @@ class DifferentialInverse:
         """
         if self.singular.any():
             *index, factor = (int(i) for i in np.argwhere(self.singular)[0])
-            raise SingularConfigurationError(_FACTORS[factor], float(self.factors[*index, factor]), tuple(index))
+            raise SingularConfigurationError(FACTORS[factor], float(self.factors[*index, factor]), tuple(index))
         return self.rates
 
 
@@ -118,12 +118,7 @@ def differential_inverse(
     Source:
         The seed on the differential kinematics of the PUMA, (a) and (b); the illegible inverse of (b) derived anew.
     """
-    geometry = find_geometry(known_arm(arm))
-    if geometry is None or geometry.family != "puma" or not np.array_equal(geometry.R_3W, np.eye(3)):
-        raise UnsupportedArmError(
-            f"arm '{arm.name}': no differential inverse in closed form; expected an arm built like puma560 "
-            "(damped_rates takes any arm)"
-        )
+    geometry = puma_geometry(arm, "differential inverse in closed form", "damped_rates")
     one_of("method", method, get_args(Method))
     known_axes(frame)
     q, twist = together(positions(arm, q), of_shape(twist, (6,), "twist", LARGEST), "q", "twist")
@@ -140,6 +135,26 @@ def differential_inverse(
         factors=factors,
         singular=singular,
     )
+
+
+def puma_geometry(arm: Arm, quantity: str, alternative: str) -> ClosedFormGeometry:
+    """Return the build of an arm like the PUMA: its axis of joint 4 in the plane of the arm.
+
+    Args:
+        arm: the arm.
+        quantity: what there is for such an arm alone, for the message.
+        alternative: the function that takes any arm.
+
+    Raises:
+        KindError: ``arm`` is no arm.
+        UnsupportedArmError: it is built in another way.
+    """
+    geometry = find_geometry(known_arm(arm))
+    if geometry is None or geometry.family != "puma" or not np.array_equal(geometry.R_3W, np.eye(3)):
+        raise UnsupportedArmError(
+            f"arm '{arm.name}': no {quantity}; expected an arm built like puma560 ({alternative} takes any arm)"
+        )
+    return geometry
 
 
 def wrist_motion(
@@ -184,7 +199,7 @@ def rates_by_blocks(geometry: ClosedFormGeometry, angles: Sequence[Scalar], moti
     a2, (a3, d4) = geometry.upper_arm, geometry.forearm
     _, t2, t3, t4, t5, _ = angles
     c2, c3, s3, c4, s4, c5, s5 = cos(t2), cos(t3), sin(t3), cos(t4), sin(t4), cos(t5), sin(t5)
-    R_S3 = _forearm(angles)
+    R_S3 = rotation_about_z_then_y(angles[0], angles[1] + angles[2])
     v, w = apply(transpose(R_S3), motion.v), apply(transpose(R_S3), motion.w)
     J41, J61 = R_S3[2][0], R_S3[2][2]
     J11, J31 = -J61 * geometry.plane_offset, J41 * geometry.plane_offset
@@ -247,7 +262,7 @@ def _wrist_rates(
     d1, d23 = first
     c4, s4 = fourth
     c5 = cos(angles[4])
-    R_S3 = _forearm(angles)
+    R_S3 = rotation_about_z_then_y(angles[0], angles[1] + angles[2])
     # The forearm turns about z of the shoulder with joint 1 and about its own y with joints 2 and 3.
     w_3 = [R_S3[0][1] * d23, R_S3[1][1] * d23, d1]
     n, o, a = transpose(motion.R)
@@ -264,13 +279,6 @@ def _wrist_rates(
     ds6 = c4 * dn[1] - s4 * dn[0] - d4 * (s4 * n[1] + c4 * n[0])
     dc6 = c4 * do[1] - s4 * do[0] - d4 * (s4 * o[1] + c4 * o[0])
     return [d4, d5, dot([c6, -s6], [ds6, dc6])]
-
-
-def _forearm(angles: Sequence[Scalar]) -> Matrix:
-    """Return frame 3 seen from the shoulder frame: rotated by angle 1 about z, then by angles 2 and 3 about y."""
-    c1, s1 = cos(angles[0]), sin(angles[0])
-    c23, s23 = cos(angles[1] + angles[2]), sin(angles[1] + angles[2])
-    return [[c1 * c23, -s1, c1 * s23], [s1 * c23, c1, s1 * s23], [-s23, 0.0, c23]]
 
 
 def _safe(factor: Scalar) -> Scalar:

@@ -186,7 +186,7 @@ def together(a: Array, b: Array, name_a: str, name_b: str) -> tuple[Array, Array
         lead = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
     except ValueError as error:
         raise ShapeError(
-            f"{name_a}, {name_b}: leading axes must fit together, got shapes {a.shape} and {b.shape}"
+            f"{name_a}, {name_b}: leading axes must broadcast together, got shapes {a.shape} and {b.shape}"
         ) from error
     return np.broadcast_to(a, (*lead, a.shape[-1])), np.broadcast_to(b, (*lead, b.shape[-1]))
 

@@ -71,6 +71,6 @@ def scaled_rows(J: Array, length: float) -> Array:
     length = number(length, "length")
     if not 0 < length <= LARGEST:
         raise InvalidValueError(
-            f"length: expected a length above 0 that a rotation by one radian is worth, got {length}"
+            f"length: expected a characteristic length above 0 (the length equivalent to one radian), got {length}"
         )
     return np.asarray(J * np.repeat((1.0, length), 3)[:, None])

@@ -123,8 +123,8 @@ def singularity_factors(arm: Arm, q: ArrayLike) -> Array:
     geometry = find_geometry(known_arm(arm))
     if geometry is None:
         raise UnsupportedArmError(
-            f"arm '{arm.name}': the determinant of its Jacobian has no known factors; use its singular values "
-            "(singularities, manipulability)"
+            f"arm '{arm.name}': no closed-form factors of its Jacobian determinant are known; use the "
+            "singular values (singularities, manipulability)"
         )
     q = positions(arm, q)
     return stack(determinant_factors(geometry, geometry.angles(per_joint(q))), q.shape[:-1])
@@ -154,7 +154,7 @@ def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: fl
     """
     threshold, length = number(threshold, "threshold"), number(length, "length")
     if not 0 < threshold < 1:
-        raise InvalidValueError(f"threshold: expected a part of the scale between 0 and 1, got {threshold}")
+        raise InvalidValueError(f"threshold: expected a fraction of the scale between 0 and 1, got {threshold}")
     q = single_configuration(arm, q)
     U, sigma, Vt = np.linalg.svd(scaled_rows(jacobian(arm, q), length))
     small = int(np.count_nonzero(sigma < threshold * sigma[0]))

@@ -11,15 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import known_arm, positions
+from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike
-from armwright.errors import UnsupportedArmError
-from armwright.kinematics.differential import SINGULAR_FACTOR, SingularConfigurationError
+from armwright.kinematics.differential import FACTORS, SINGULAR_FACTOR, SingularConfigurationError, puma_geometry
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
-from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.singularity_analysis import determinant_factors
-
-_FACTORS = ("shoulder", "elbow", "wrist")
 
 
 def wrist_partitioned_jacobian(arm: Arm, q: ArrayLike) -> Array:
@@ -44,7 +40,7 @@ def wrist_partitioned_jacobian(arm: Arm, q: ArrayLike) -> Array:
     Source:
         The seed on the differential kinematics of the PUMA, method (b); its J21 has the shoulder's offset added here.
     """
-    geometry = _puma(arm)
+    geometry = puma_geometry(arm, "wrist-partitioned Jacobian", "jacobian")
     return np.asarray(_blocks(geometry, positions(arm, q)) * np.array(geometry.signs))
 
 
@@ -72,12 +68,12 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
     Source:
         The seed on the differential kinematics of the PUMA, method (b); its inverse, partly illegible, is derived anew.
     """
-    geometry = _puma(arm)
+    geometry = puma_geometry(arm, "wrist-partitioned Jacobian", "jacobian")
     q = positions(arm, q)
     factors = np.stack(np.broadcast_arrays(*determinant_factors(geometry, _angles(geometry, q))), axis=-1)
     for index in np.argwhere(np.abs(factors) < SINGULAR_FACTOR).tolist():
         *which, factor = index
-        raise SingularConfigurationError(_FACTORS[factor], float(factors[*index]), tuple(which))
+        raise SingularConfigurationError(FACTORS[factor], float(factors[*index]), tuple(which))
     J = _blocks(geometry, q)
     out, plane, bend = factors[..., 0], geometry.upper_arm * factors[..., 1], factors[..., 2]
     inverse = np.zeros_like(J)
@@ -94,21 +90,6 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
     inverse[..., 3, 5] = 1.0
     inverse[..., 3:, :3] = -inverse[..., 3:, 3:] @ J[..., 3:, :3] @ inverse[..., :3, :3]
     return np.asarray(inverse * np.array(geometry.signs)[:, None])
-
-
-def _puma(arm: Arm) -> ClosedFormGeometry:
-    """Return the build of an arm like the PUMA.
-
-    Raises:
-        UnsupportedArmError: it is another.
-    """
-    geometry = find_geometry(known_arm(arm))
-    if geometry is None or geometry.family != "puma" or not np.array_equal(geometry.R_3W, np.eye(3)):
-        raise UnsupportedArmError(
-            f"arm '{arm.name}': no wrist-partitioned Jacobian; expected an arm built like puma560 "
-            "(jacobian takes any arm)"
-        )
-    return geometry
 
 
 def _angles(geometry: ClosedFormGeometry, q: Array) -> list[Array]:

@@ -12,6 +12,7 @@ from armwright.kinematics.inverse_kinematics.geometry import (
     first_three,
     reach_error,
     rotated_about_y,
+    rotation_about_z_then_y,
     solve_elbow,
     solve_joint_1,
 )
@@ -52,7 +53,7 @@ def branch_angles(
         return _parallel(geometry, p, R, signs, near)
     first = first_three(geometry, p, arm, elbow, near)
     raised = first[1] if geometry.family == "stanford" else first[1] + first[2]
-    R_SW = product(_about_z_then_y(first[0], raised), geometry.R_3W.tolist())
+    R_SW = product(rotation_about_z_then_y(first[0], raised), geometry.R_3W.tolist())
     last, wrist_free = last_three(product(transpose(R_SW), R), flip, near[3])
     _, X = solve_joint_1(geometry, p, arm, near[0])
     return BranchAngles(
@@ -74,7 +75,7 @@ def _parallel(
     arm, elbow, flip = signs
     other: Sign = -1 if flip > 0 else 1
     theta_1, X = solve_joint_1(geometry, p, arm, near[0])
-    R_SW = product(_about_z_then_y(theta_1, 0.0), geometry.R_3W.tolist())
+    R_SW = product(rotation_about_z_then_y(theta_1, 0.0), geometry.R_3W.tolist())
     # Read backwards, so that it is joint 6 that is free with joint 5 straight, and not the sum.
     back = transpose(product(transpose(R_SW), R))
     last, wrist_free = last_three(back, other, -near[5])
@@ -110,11 +111,6 @@ def _into_reach(geometry: ClosedFormGeometry, X: Scalar, Z: Scalar, raised: Scal
 
 def _arc_cosine(x: Scalar) -> Scalar:
     return atan2(sqrt(1 - x * x), x)
-
-
-def _about_z_then_y(first: Scalar, second: Scalar) -> Matrix:
-    c1, s1, c2, s2 = cos(first), sin(first), cos(second), sin(second)
-    return [[c1 * c2, -s1, c1 * s2], [s1 * c2, c1, s1 * s2], [-s2, 0.0, c2]]
 
 
 def _on_first_axis(p: Vector) -> Scalar:

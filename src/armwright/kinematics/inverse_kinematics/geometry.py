@@ -16,7 +16,7 @@ import attrs
 
 from armwright.arrays import Array
 from armwright.tracing.scalar import Scalar, atan2, cos, select, sin, sqrt
-from armwright.tracing.vectors import Vector
+from armwright.tracing.vectors import Matrix, Vector
 
 Family: TypeAlias = Literal["puma", "stanford", "parallel"]
 Sign: TypeAlias = Literal[1, -1]
@@ -61,10 +61,10 @@ class ClosedFormGeometry:
     offsets: tuple[float, ...]
     shoulder_offset: float
     plane_offset: float
-    upper_arm: float
+    upper_arm: float = 0.0
     forearm: tuple[float, float]
-    wrist_link: tuple[float, float]
-    tilt: float
+    wrist_link: tuple[float, float] = (0.0, 0.0)
+    tilt: float = 0.0
     R_3W: Array
     R_T6: Array
     p_TW: Array
@@ -99,6 +99,12 @@ def rotated_about_y(angle: Scalar, x: Scalar, z: Scalar) -> tuple[Scalar, Scalar
     """Rotate the point (x, z) about y, over abstract scalars: from x towards -z."""
     c, s = cos(angle), sin(angle)
     return c * x + s * z, c * z - s * x
+
+
+def rotation_about_z_then_y(first: Scalar, second: Scalar) -> Matrix:
+    """Return the rotation by one angle about z and then by another about the y axis that was rotated."""
+    c1, s1, c2, s2 = cos(first), sin(first), cos(second), sin(second)
+    return [[c1 * c2, -s1, c1 * s2], [s1 * c2, c1, s1 * s2], [-s2, 0.0, c2]]
 
 
 def first_three(geometry: ClosedFormGeometry, p: Vector, arm: Sign, elbow: Sign, free: Vector | None = None) -> Vector:

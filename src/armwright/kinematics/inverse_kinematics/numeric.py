@@ -52,8 +52,22 @@ class _Task:
     X: Array
     lower: Array
     upper: Array
-    size: float
-    length: float
+    size: float = attrs.field(init=False)
+    length: float = attrs.field(init=False)
+
+    @size.default
+    def _size(self) -> float:
+        """Return how long the arm is, joint after joint, slides as far as they go; 1 m where it has no length [m]."""
+        total = float(np.linalg.norm(self.arm.tool[:3, 3]))
+        for joint in self.arm.joints:
+            way = joint.limits.upper - joint.limits.lower
+            slide = way if not joint.revolute and math.isfinite(way) else 0.0
+            total += joint.span() + slide
+        return total or 1.0
+
+    @length.default
+    def _length(self) -> float:
+        return max(self.size / 4, POSE_TOLERANCE)
 
 
 def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
@@ -76,19 +90,10 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
         Levenberg (1944), Marquardt (1963); damping in proportion to the squared residual after Sugihara (2011); starts
         by the additive recurrence of Roberts (2018).
     """
-    size = _size(arm)
-    limited = _Task(
-        arm=arm,
-        X=X,
-        lower=arm.limits.lower,
-        upper=arm.limits.upper,
-        size=size,
-        length=max(size / 4, POSE_TOLERANCE),
-    )
+    limited = _Task(arm=arm, X=X, lower=arm.limits.lower, upper=arm.limits.upper)
     tried, reached = _search(limited, near)
     if not len(reached):
-        endless = np.full(arm.n, np.inf)
-        free = attrs.evolve(limited, lower=-endless, upper=endless)
+        free = _unlimited(arm, X)
         more = _descend(free, np.concatenate([tried, _starts(limited, near, 0, _STARTS)]))
         reached = np.array([nearest_equivalent(arm, q, near) for q in _reaching(free, more)]).reshape(-1, arm.n)
         tried = np.concatenate([tried, more])
@@ -109,9 +114,13 @@ def descend_from(arm: Arm, X: Array, near: Array) -> Array:
         X: (k, 4, 4) tool poses in the base frame.
         near: (k, n) joint positions.
     """
-    size, endless = _size(arm), np.full(arm.n, np.inf)
-    task = _Task(arm=arm, X=X, lower=-endless, upper=endless, size=size, length=max(size / 4, POSE_TOLERANCE))
-    return _descend(task, near)
+    return _descend(_unlimited(arm, X), near)
+
+
+def _unlimited(arm: Arm, X: Array) -> _Task:
+    """Return the task without bounds of the joints."""
+    endless = np.full(arm.n, np.inf)
+    return _Task(arm=arm, X=X, lower=-endless, upper=endless)
 
 
 def _search(task: _Task, near: Array) -> tuple[Array, Array]:
@@ -260,13 +269,3 @@ def _starts(task: _Task, near: Array, first: int, count: int) -> Array:
     if first == 0:
         starts[0] = around
     return starts
-
-
-def _size(arm: Arm) -> float:
-    """Return how long the arm is, joint after joint, slides as far as they go; 1 m where it has no length [m]."""
-    total = float(np.linalg.norm(arm.tool[:3, 3]))
-    for joint in arm.joints:
-        way = joint.limits.upper - joint.limits.lower
-        slide = way if not joint.revolute and math.isfinite(way) else 0.0
-        total += joint.span() + slide
-    return total or 1.0

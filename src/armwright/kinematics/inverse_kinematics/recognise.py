@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -106,34 +106,16 @@ class _ShoulderView:
         """Say whether an axis parallel to y points along it."""
         return math.copysign(1.0, float(self.directions[joint - 1, 1]))
 
-    def build(
-        self,
-        family: Family,
-        *,
-        signs: Sequence[float],
-        offsets: Sequence[float],
-        upper_arm: float = 0.0,
-        forearm: tuple[float, float],
-        wrist_link: tuple[float, float] = (0.0, 0.0),
-        tilt: float = 0.0,
-        R_3W: Array,
-        R_SW: Array,
-    ) -> ClosedFormGeometry:
+    def geometry(self, family: Family, *, R_SW: Array, **lengths_and_angles: Any) -> ClosedFormGeometry:
         """Put the geometry together; ``R_SW`` is the last frame of the wrist at joint positions 0."""
         return ClosedFormGeometry(
             family=family,
             X_BS=self.X_BS,
-            signs=tuple(signs),
-            offsets=tuple(offsets),
             shoulder_offset=self.shoulder_offset,
             plane_offset=self.plane_offset,
-            upper_arm=upper_arm,
-            forearm=forearm,
-            wrist_link=wrist_link,
-            tilt=tilt,
-            R_3W=R_3W,
             R_T6=nearest_rotation(self.R_TS @ R_SW),
             p_TW=self.p_TW,
+            **lengths_and_angles,
         )
 
 
@@ -149,12 +131,12 @@ def _with_elbow(axes: Axes, wrist: Array) -> ClosedFormGeometry | None:
     flat = abs(float(axis_4[1])) < SAME
     folded = math.atan2(axis_4[0], axis_4[2]) if flat else raised
     R_3W, offset_4, offset_5, R_SW = _wrist(view, folded, flat)
-    return view.build(
+    return view.geometry(
         "puma",
         signs=(1, view.sign(2), view.sign(3), 1, 1, 1),
         offsets=(0, raised, folded - raised, offset_4, offset_5, 0),
         upper_arm=math.hypot(*upper),
-        forearm=_as_floats(rotated_about_y(-folded, *fore)),
+        forearm=tuple(map(float, rotated_about_y(-folded, *fore))),
         R_3W=R_3W,
         R_SW=R_SW,
     )
@@ -166,7 +148,7 @@ def _with_slide(axes: Axes, wrist: Array) -> ClosedFormGeometry:
     raised = math.atan2(along[0], along[2])
     beside, length = rotated_about_y(-raised, *view.segment(view.points[1], view.centre))
     R_3W, offset_4, offset_5, R_SW = _wrist(view, raised, parallel(view.directions[3], along))
-    return view.build(
+    return view.geometry(
         "stanford",
         signs=(1, view.sign(2), 1, 1, 1, 1),
         offsets=(0, raised, length, offset_4, offset_5, 0),
@@ -188,7 +170,7 @@ def _with_parallel_axes(axes: Axes, crossing: Array) -> ClosedFormGeometry | Non
     A = np.stack([np.cross(y, axis_5), y, axis_5], axis=-1)
     across, along, _ = A.T @ view.directions[5]
     offset_5 = math.atan2(-across, along)
-    return view.build(
+    return view.geometry(
         "parallel",
         signs=(1, view.sign(2), view.sign(3), view.sign(4), 1, 1),
         offsets=(0, raised, folded - raised, -folded, offset_5, 0),
@@ -231,7 +213,3 @@ def _about_y(angle: float) -> Array:
 def _about_z(angle: float) -> Array:
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-
-
-def _as_floats(pair: tuple[float, float]) -> tuple[float, float]:
-    return float(pair[0]), float(pair[1])

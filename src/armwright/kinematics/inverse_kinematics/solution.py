@@ -61,7 +61,7 @@ class Violation:
         unit, scale = ("deg", math.degrees(1.0)) if self.revolute else ("mm", 1e3)
         name = f" ('{self.name}')" if self.name else ""
         return (
-            f"joint {self.joint}{name} would stand at {self.value * scale:.1f} {unit}, "
+            f"joint {self.joint}{name} would be at {self.value * scale:.1f} {unit}, "
             f"{self.excess * scale:.1f} {unit} beyond its limit {self.limit * scale:.1f} {unit}"
         )
 

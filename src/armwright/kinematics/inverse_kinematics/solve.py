@@ -114,7 +114,7 @@ def _branches(arm: Arm, geometry: ClosedFormGeometry, X_BT: Array, near: Array) 
         lead = np.broadcast_shapes(X_BT.shape[:-2], near.shape[:-1])
     except ValueError as error:
         raise ShapeError(
-            f"pose, near: leading axes must fit together, got shapes {X_BT.shape} and {near.shape}"
+            f"pose, near: leading axes must broadcast together, got shapes {X_BT.shape} and {near.shape}"
         ) from error
     X_BT, near = np.broadcast_to(X_BT, (*lead, 4, 4)), np.broadcast_to(near, (*lead, arm.n))
     R = [per_joint(X_BT[..., i, :3]) for i in range(3)]
