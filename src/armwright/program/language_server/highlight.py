@@ -27,13 +27,9 @@ _NAME = r"(?a:[A-Z]\w*)(?!\w)"
 _NUMBER = r"[0-9]+(?:\.[0-9]+)?(?a:E[+-]?[0-9]+)?"
 
 
-def _whole(*words: str) -> str:
-    """Return a pattern for one of some words, in any case and not as the beginning of a longer one."""
-    return rf"(?a:{'|'.join(words)})(?!\w)"
-
-
 def _any_of(words: Collection[str]) -> str:
-    return _whole(*sorted(words))
+    """Return a pattern for one of some words, in any case and not as the beginning of a longer one."""
+    return rf"(?a:{'|'.join(sorted(words))})(?!\w)"
 
 
 class RloLexer(RegexLexer):
@@ -50,9 +46,9 @@ class RloLexer(RegexLexer):
     tokens: ClassVar[dict[str, list[object]]] = {
         "root": [
             include("blank"),
-            (_whole("READ"), Keyword, "sensor"),
-            (_whole("UNITS"), Keyword.Declaration, "units"),
-            (_whole("PROCEDURE"), Keyword.Declaration, "procedure"),
+            (_any_of(["READ"]), Keyword, "sensor"),
+            (_any_of(["UNITS"]), Keyword.Declaration, "units"),
+            (_any_of(["PROCEDURE"]), Keyword.Declaration, "procedure"),
             include("reserved"),
             include("operand"),
             include("sign"),

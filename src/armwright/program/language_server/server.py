@@ -119,12 +119,6 @@ class RloServer(LanguageServer):
         for document in self.documents.values():
             document.outdate()
 
-    def saved(self, uri: str) -> None:
-        """Analyse a document that has been saved; others may depend on what has been saved beside it."""
-        self.outdate()
-        if uri in self.documents:
-            self.documents[uri].analyse()
-
     def analyse(self, document: Document) -> Analysis:
         """Analyse a document as it is now, and tell the editor what is wrong with it."""
         folder = None if document.path is None else document.path.parent
@@ -246,10 +240,6 @@ def _conversation(server: RloServer) -> None:
         if document is not None:
             document.change(params.content_changes, params.text_document.version)
 
-    @server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
-    def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
-        server.saved(params.text_document.uri)
-
     @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
     def did_close(params: lsp.DidCloseTextDocumentParams) -> None:
         document = server.documents.pop(params.text_document.uri, None)
@@ -271,6 +261,13 @@ def _surroundings(server: RloServer) -> None:
             await server.ask_settings()
         else:
             server.take_settings(params.settings)
+
+    @server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
+    def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
+        # Others may depend on what has been saved beside them.
+        server.outdate()
+        if (document := server.documents.get(params.text_document.uri)) is not None:
+            document.analyse()
 
     @server.feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
     def did_change_watched_files(_: lsp.DidChangeWatchedFilesParams) -> None:

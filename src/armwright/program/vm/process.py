@@ -303,7 +303,6 @@ class Process:
             stack=[activation.copy(shared) for activation in self.stack],
             motion=None if self.motion is None else self.motion.copy(),
             locks=list(self.locks),
-            branches=list(self.branches),
         )
 
     def descends_from(self, other: "Process") -> bool:

@@ -105,9 +105,19 @@ class MachineState:
 
         What never changes is shared: frame trees, trajectories, effects, spans, poses.
         """
-        twins = _copied(self._all_processes())
+        names: dict[int, dict[str, Any]] = {}
+        twins: dict[int, Process] = {}
+
+        def shared(own: dict[str, Any]) -> dict[str, Any]:
+            """An action has the names of the activation that it interrupts: both have the same copy."""
+            return names.setdefault(id(own), dict(own))
 
         def twin(process: Process) -> Process:
+            """Processes know one another, so the copy of each is made once."""
+            if id(process) not in twins:
+                copied = twins[id(process)] = process.copy(shared)
+                copied.parent = None if process.parent is None else twin(process.parent)
+                copied.branches = [twin(branch) for branch in process.branches]
             return twins[id(process)]
 
         return attrs.evolve(
@@ -127,30 +137,3 @@ class MachineState:
             effects=list(self.effects),
             stages=list(self.stages),
         )
-
-    def _all_processes(self) -> dict[int, Process]:
-        """Return every process that is known, by its id."""
-        processes: dict[int, Process] = {}
-        waiting = [self.program, *self.processes, *self.locks.values()]
-        waiting += [process for owners in self.owners.values() for process in owners]
-        while waiting:
-            process = waiting.pop()
-            if id(process) not in processes:
-                processes[id(process)] = process
-                waiting += process.branches if process.parent is None else [*process.branches, process.parent]
-        return processes
-
-
-def _copied(processes: dict[int, Process]) -> dict[int, Process]:
-    """Return copies of processes that know one another as the originals do, by the ids of these."""
-    names: dict[int, dict[str, Any]] = {}
-
-    def shared(own: dict[str, Any]) -> dict[str, Any]:
-        """An action has the names of the activation that it interrupts: both have the same copy."""
-        return names.setdefault(id(own), dict(own))
-
-    twins = {number: process.copy(shared) for number, process in processes.items()}
-    for number, process in processes.items():
-        twins[number].parent = None if process.parent is None else twins[id(process.parent)]
-        twins[number].branches = [twins[id(branch)] for branch in process.branches]
-    return twins
