@@ -1,5 +1,7 @@
 """Writing instructions: places that are known later, values in passing, and the code of expressions."""
 
+import attrs
+
 from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op, Operand
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import UnitSystem, convert
@@ -57,9 +59,7 @@ class Emitter:
         """Let a jump whose target was left open go to the next instruction."""
         old, target = self.instructions[number], self.here
         operands = tuple(target if operand == LATER else operand for operand in old.operands)
-        self.instructions[number] = Instruction(
-            op=old.op, operands=operands, span=old.span, begins=old.begins, comment=old.comment
-        )
+        self.instructions[number] = attrs.evolve(old, operands=operands)
 
     def constant(self, value: tuple[float, ...] | float) -> Constant:
         """Keep a constant."""
@@ -81,59 +81,54 @@ class Emitter:
         match node:
             case tree.Number() | tree.Name() | tree.ArmName():
                 operand = self.number(node) if isinstance(node, tree.Number) else node.key
-                if into is None:
-                    return operand
-                self.emit(Op.COPY, into, operand, span=node.span)
+                return self._passed_on(operand, node, into)
             case tree.Index(name=name, indices=indices):
-                element = self.passing()
-                numbers = [self.value(index) for index in indices]
-                self.emit(Op.ELEM, element, name.key, *numbers, span=node.span)
-                if into is None:
-                    return element
-                self.emit(Op.COPY, into, element, span=node.span)
+                element = self._operation(Op.ELEM, self.passing(), name.key, *map(self.value, indices), node=node)
+                return self._passed_on(element, node, into)
             case tree.Binary():
                 return self._chain(node, into)
             case tree.Matrix():
                 return self._matrix(node, into or self.passing())
+            case tree.Function(name=name, arguments=arguments):
+                operands = [self.value(argument) for argument in arguments]
+                return self._operation(Op(name.key), into or self.passing(), *operands, node=node)
+            case tree.Unary():
+                value = self.value(node.operand)
+                op = Op.NOT if node.operation == "NOT" else Op.NEG
+                return self._operation(op, into or self.passing(), value, node=node)
             case _:
-                return self._operation(node, into)
-        return _given(into)
+                raise AssertionError(f"a checked program has no {type(node).__name__}")
+
+    def _passed_on(self, operand: Operand, node: tree.Expression, into: str | None) -> Operand:
+        """Return an operand that has a value; copy it where it shall go, if that is said."""
+        return operand if into is None else self._operation(Op.COPY, into, operand, node=node)
+
+    def _operation(self, op: Op, to: str, *operands: Operand, node: tree.Expression) -> str:
+        """Write an operation; return where its result goes."""
+        self.emit(op, to, *operands, span=node.span)
+        return to
 
     def number(self, node: tree.Number) -> float:
         """Return what a number counts in the units of the program."""
         return float(convert(node.value, node.unit, self.units))
-
-    def _operation(self, node: tree.Expression, into: str | None) -> Operand:
-        match node:
-            case tree.Function(name=name, arguments=arguments):
-                op, operands = Op(name.key), [self.value(argument) for argument in arguments]
-            case tree.Unary(operation=operation, operand=operand):
-                op, operands = Op.NOT if operation == "NOT" else Op.NEG, [self.value(operand)]
-            case _:
-                raise AssertionError(f"a checked program has no {type(node).__name__}")
-        to = into or self.passing()
-        self.emit(op, to, *operands, span=node.span)
-        return to
 
     def _chain(self, node: tree.Binary, into: str | None) -> Operand:
         """Write the operations of a chain, one after the other."""
         first, chain = tree.chain(node)
         # Both sides of AND and OR go to the same place, so that of the last is that of all in front of it.
         targets: list[str | None] = []
-        for one in reversed(chain):
-            joins = one.operation in ("AND", "OR")
+        for link in reversed(chain):
+            joins = link.operation in ("AND", "OR")
             targets.append((into or self.passing()) if joins else into)
             into = targets[-1] if joins else None
         left = self.value(first, into)
-        for one in chain:
+        for link in chain:
             to = targets.pop()
-            if one.operation in ("AND", "OR"):
-                left = self._joint(one, _given(to))
-                continue
-            right = self.value(one.right)
-            to = to or self.passing()
-            self.emit(_OPERATIONS[one.operation], to, left, right, span=one.span)
-            left = to
+            if to is not None and link.operation in ("AND", "OR"):
+                left = self._joint(link, to)
+            else:
+                right = self.value(link.right)
+                left = self._operation(_OPERATIONS[link.operation], to or self.passing(), left, right, node=link)
         return left
 
     def _joint(self, node: tree.Binary, to: str) -> str:
@@ -148,20 +143,12 @@ class Emitter:
         return to
 
     def _matrix(self, node: tree.Matrix, to: str) -> str:
-        if all(isinstance(item, tree.Number) for item in node.items):
-            numbers = pose_literals.constant(node)
-            metres = self.units.metres
-            shift = [self.number(item) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
-            self.emit(Op.LOADM, to, self.constant((*numbers[:9], *shift)), span=node.span)
-        else:
-            self.emit(Op.MATX, to, *(self.value(item) for item in node.items), span=node.span)
-        return to
+        if not all(isinstance(item, tree.Number) for item in node.items):
+            return self._operation(Op.MATX, to, *map(self.value, node.items), node=node)
+        numbers, metres = pose_literals.constant(node), self.units.metres
+        shift = [self.number(item) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
+        return self._operation(Op.LOADM, to, self.constant((*numbers[:9], *shift)), node=node)
 
     def text(self, node: tree.Expression) -> str:
         """Return an expression as the program writes it, on one line."""
         return " ".join(self.source.slice(node.span).split())
-
-
-def _given(into: str | None) -> str:
-    assert into is not None  # noqa: S101 - the cases without were returned from
-    return into

@@ -1,5 +1,7 @@
 """Code of AFFIX, UNFIX and assignments."""
 
+import attrs
+
 from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.instructions import Op
 from armwright.program.syntax import tree
@@ -12,8 +14,7 @@ def assign(context: Context, node: tree.Assign) -> None:
         out.emit(Op.LOADS, to, out.constant(out.number(node.value)), span=node.span)
         return
     out.value(node.value, to)
-    last = out.instructions[-1]
-    out.instructions[-1] = type(last)(op=last.op, operands=last.operands, span=node.span, begins=last.begins)
+    out.instructions[-1] = attrs.evolve(out.instructions[-1], span=node.span, comment="")
 
 
 def affix(context: Context, node: tree.Affix) -> None:

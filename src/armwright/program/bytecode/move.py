@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+import attrs
+
 from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.emitter import LATER
 from armwright.program.bytecode.instructions import Form, Op, Operand, stages_text
@@ -49,16 +51,14 @@ def _guard(context: Context, guard: tree.On, number: int) -> None:
     """Generate condition and action of a guard, each ended by RET."""
     out = context.out
     old = out.instructions[number]
-    truth = old.operands[1]
+    _, truth, _ = old.operands
     condition = out.here
     out.value(guard.condition, str(truth))
     out.emit(Op.RET, span=guard.head)
     action = out.here
     context.generate_with(guard.action, in_action=True)
     out.emit(Op.RET, span=guard.span)
-    out.instructions[number] = type(old)(
-        op=old.op, operands=(condition, truth, action), span=old.span, begins=old.begins
-    )
+    out.instructions[number] = attrs.evolve(old, operands=(condition, truth, action))
 
 
 def _in_order(move: tree.Move) -> list[tuple[Op, tree.Clause]]:
