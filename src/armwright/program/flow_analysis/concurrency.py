@@ -203,13 +203,10 @@ def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
             continue
         reported.add(array(name))
         text = written(node.event)
+        message = f"nothing signals `{text}`, so this WAIT never ends"
+        advice = f"write `SIGNAL {text}` in another branch"
         findings.report(
-            "E501",
-            f"nothing signals `{text}`, so this WAIT never ends",
-            node.span,
-            "waits for ever",
-            secondary=scope.where_declared(key),
-            advice=f"write `SIGNAL {text}` in another branch",
+            "E501", message, node.span, "waits for ever", secondary=scope.where_declared(key), advice=advice
         )
 
 

@@ -144,13 +144,8 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
     if read_import is None:
         names.open_import = True
         note = "a name that is not declared may be one of them"
-        names.report(
-            "W205",
-            f"the frames of `{path.value}` are unknown: the file was not read",
-            header.span,
-            "not read",
-            note=note,
-        )
+        message = f"the frames of `{path.value}` are unknown: the file was not read"
+        names.report("W205", message, header.span, "not read", note=note)
         return
     try:
         brought = read_import(path.value)
