@@ -88,9 +88,6 @@ def merged(
         new.append(header)
     new = [*imports, *new]
     again = declared(old).keys() & declared(new).keys()
-    if not again:
-        both = (*old, *new)
-        return Heading(headers=both, statements=tuple(statements), imports=tuple(imports), remarks=tuple(remarks))
     words = VOCABULARIES[std]
     taken = {*declared((*old, *new)), *fixed, *words.reserved, *FUNCTIONS}
     for header in (*old, *new):
@@ -101,7 +98,7 @@ def merged(
     return Heading(
         headers=(*changed.headers, *new),
         statements=changed.statements,
-        spelling={**_spelling(changed), **{key: name.text for key, name in declared(new).items()}},
+        spelling={**_spelling(changed), **{key: declared(new)[key].text for key in again}},
         renamed=changed.renamed,
         dropped=changed.dropped,
         imports=tuple(imports),

@@ -6,6 +6,7 @@ characters, so that every place is one in the text of the session.
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import takewhile
 
 import attrs
 
@@ -205,12 +206,9 @@ def _behind(tokens: Sequence[Token], index: int, key: str) -> int:
 
 
 def _end_of_statements(tokens: Sequence[Token], index: int, words: Vocabulary) -> int:
-    depth = 0
-    for number in range(index, len(tokens)):
-        if depth <= 0 and number > index and tokens[number - 1].key == ";" and _is_header(tokens[number], words):
-            return number
-        depth += _depth(tokens[number : number + 1])
-    return len(tokens)
+    first, *others = _pieces(tokens[index:])
+    statements = takewhile(lambda piece: not _is_header(piece[0], words), others)
+    return index + len(first) + sum(map(len, statements))
 
 
 # ---- parsing -------------------------------------------------------------------------------------------------------

@@ -61,6 +61,8 @@ def redeclare(
         taken: names that cannot be given.
         longest: how long a name may be.
     """
+    if not names:
+        return Redeclared(headers=tuple(headers), statements=tuple(statements), renamed={}, dropped=frozenset())
     procedures = {header.name.key: header for header in headers if isinstance(header, tree.Procedure)}
     mentions = {key: mentioned(procedure) - {key} for key, procedure in procedures.items()}
     used = _reached(mentioned(tuple(statements)), mentions)

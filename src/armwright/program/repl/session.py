@@ -7,6 +7,7 @@ come to the same: going on from an earlier state.
 """
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import TypeAlias
 
 import attrs
@@ -26,7 +27,7 @@ from armwright.program.repl.session_text import program_text, title
 from armwright.program.repl.snapshots import bring, forget, fresh, go_through, new_warnings, rename, with_code
 from armwright.program.repl.undo_report import SILENT, taken_back
 from armwright.program.semantics import check
-from armwright.program.semantics.cell_symbols import Imported, ReadImport, known_cell
+from armwright.program.semantics.cell_symbols import ReadImport, known_cell
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 from armwright.program.vm.machine import Limits, Machine, RunError
@@ -155,8 +156,8 @@ class Session:
         """
         self.std, self.name = std, name
         self.limits = limits or Limits()
-        self._read_import = read_import
-        self._imports: dict[str, Imported] = {}
+        # Each file counts as it was when it was first read.
+        self._read_import = None if read_import is None else cache(read_import)
         self._text = ""
         cell = cell or Cell(name=_NO_CELL, arms={})
         empty = tree.Program(Span(0, 0), (), (), Span(0, 0))
@@ -296,20 +297,13 @@ class Session:
 
     def _check_names(self, program: tree.Program) -> tuple[Cell, Symbols, list[Diagnostic]]:
         """Check names and types; where nothing was done yet, the arms of an imported cell are those of the session."""
-        cell = self.state.cell
-        read_import = None if self._read_import is None else self._import
+        cell, read_import = self.state.cell, self._read_import
         symbols, diagnostics, imports = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
         other = next((imported.cell for imported in imports if imported.cell and imported.cell.arms), None)
         if other is not None and not cell.arms and not self.state.statements:
             cell = other
             symbols, diagnostics, _ = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
         return cell, symbols, diagnostics
-
-    def _import(self, path: str) -> Imported:
-        if path not in self._imports:
-            assert self._read_import is not None  # noqa: S101 - asked for only then
-            self._imports[path] = self._read_import(path)
-        return self._imports[path]
 
     # ---- doing -----------------------------------------------------------------------------------------------------
 
@@ -351,9 +345,9 @@ class Session:
         rename(machine, heading.renamed)
         forget(machine, heading.dropped)
         for header in heading.imports:
-            brought = self._imports.get(header.path.value)
-            if brought is not None and brought.cell is not None:
-                bring(machine, brought.cell.frames, header.span)
+            imported = None if self._read_import is None else self._read_import(header.path.value).cell
+            if imported is not None:
+                bring(machine, imported.frames, header.span)
         machine = with_code(machine, checked.code(), self.limits)
         text = "; ".join(title(source, header) for header in checked.entry.headers)
         self._go_on(attrs.evolve(checked.state, machine=machine, text=text))
