@@ -71,15 +71,10 @@ def shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
             if first is use:
                 continue
             does = "moved" if first.moves and use.moves else "used"
-            state.report(
-                "E503",
-                f"{arm} is {does} in two branches of one COBEGIN",
-                use.span,
-                "second branch",
-                secondary=(Label(first.span, "first branch"), *dict.fromkeys((*first.hung, *use.hung))),
-                note="each arm belongs to one process at a time",
-                advice=f"use {free} in one branch, or give the arm over with SIGNAL and WAIT outside COBEGIN",
-            )
+            text, note = f"{arm} is {does} in two branches of one COBEGIN", "each arm belongs to one process at a time"
+            here = (Label(first.span, "first branch"), *dict.fromkeys((*first.hung, *use.hung)))
+            advice = f"use {free} in one branch, or give the arm over with SIGNAL and WAIT outside COBEGIN"
+            state.report("E503", text, use.span, "second branch", secondary=here, note=note, advice=advice)
 
 
 def _other(state: FlowState, used: set[str]) -> str:
@@ -264,18 +259,12 @@ def _run(branches: list[list[_Step]]) -> list[int]:
 
 
 def _too_few(findings: DiagnosticList, step: _Step, branches: list[list[_Step]]) -> None:
-    text = written(step.node.event)
     nodes = [statement.node for several in branches for statement in several if statement.event == step.event]
     signals = [node.span for node in nodes if isinstance(node, tree.Signal)]
-    plural = "s" * (len(signals) > 1)
-    findings.report(
-        "E501",
-        f"`{text}` is waited for more often than it is signalled",
-        step.node.span,
-        "waits for ever",
-        secondary=tuple(Label(span, "signalled here") for span in signals[:_MAX_LOCATIONS]),
-        note=f"{len(nodes) - len(signals)} WAITs, and {len(signals)} SIGNAL{plural}",
-    )
+    text = f"`{written(step.node.event)}` is waited for more often than it is signalled"
+    here = tuple(Label(span, "signalled here") for span in signals[:_MAX_LOCATIONS])
+    note = f"{len(nodes) - len(signals)} WAITs, and {len(signals)} SIGNAL{'s' * (len(signals) > 1)}"
+    findings.report("E501", text, step.node.span, "waits for ever", secondary=here, note=note)
 
 
 def _wait_for_each_other(

@@ -6,7 +6,7 @@ from itertools import combinations, islice, product
 import attrs
 
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
-from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label
+from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, labels
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import array, is_any
 from armwright.program.language.source import Span
@@ -165,16 +165,11 @@ def _leads_round(start: _Branch, end: _Branch, beside: list[_Branch]) -> bool:
 
 
 def _say(findings: DiagnosticList, first: _Write, second: _Write) -> None:
-    unlocked = second if first.locked else first
-    findings.report(
-        "W503",
-        f"`{unlocked.text}` is written in two branches of one COBEGIN without LOCK",
-        second.span,
-        "second branch",
-        secondary=(Label(first.span, "first branch"),),
-        note="which of them writes last depends on how long each takes",
-        advice=f"write `LOCK ({unlocked.text}) DO ...` around what reads and writes it in each branch",
-    )
+    name, here = second.text if first.locked else first.text, labels(first.span, "first branch")
+    text = f"`{name}` is written in two branches of one COBEGIN without LOCK"
+    note = "which of them writes last depends on how long each takes"
+    advice = f"write `LOCK ({name}) DO ...` around what reads and writes it in each branch"
+    findings.report("W503", text, second.span, "second branch", secondary=here, note=note, advice=advice)
 
 
 def _is_inside(span: Span, around: Span) -> bool:

@@ -2,7 +2,7 @@
 
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.state import FlowState
-from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.diagnostic import Label
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.semantics.expression_types import written
@@ -84,17 +84,11 @@ def _uncertain(state: FlowState, node: tree.Name | tree.Index, name: str, partin
 
 def _no_place(state: FlowState, node: tree.Name | tree.Index, secondary: tuple[Label, ...], *, from_cell: bool) -> None:
     """Say that a frame has no value; a cell file may give one to the frames of the program, and to no others."""
-    certain = state.cell is not None or not from_cell
-    note = "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
-    if not certain:
-        note = "no cell was given; a cell file may give it one"
-    nothing_yet = state.table.is_empty
-    state.report(
-        "E304" if certain else "W204",
-        f"frame `{written(node)}` is used before it has a value",
-        node.span,
-        "no value here",
-        secondary=() if nothing_yet and certain else secondary,
-        note=note if nothing_yet or not certain else "",
-        severity=Severity.ERROR if certain else Severity.WARNING,
-    )
+    code, note = "E304", ""
+    if state.cell is None and from_cell:
+        code, note = "W204", "no cell was given; a cell file may give it one"
+    elif state.table.is_empty:
+        note = "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
+        secondary = ()
+    text = f"frame `{written(node)}` is used before it has a value"
+    state.report(code, text, node.span, "no value here", secondary=secondary, note=note)

@@ -6,7 +6,7 @@ from armwright.program.flow_analysis.definite_assignment import need, need_indic
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import set_pose
 from armwright.program.flow_analysis.state import LAST, FlowState
-from armwright.program.language.diagnostic import Label, did_you_mean
+from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.names import is_arm
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import WORLD
@@ -55,14 +55,9 @@ def _closed_on_arrival(state: FlowState, arm: str) -> None:
     never_opened = hand.arrived_open is False and hand.opened is None
     if hand.arrival is None or hand.at is None or not (opened_late or never_opened):
         return
-    state.report(
-        "L301",
-        f"{arm} {'may come' if opened_late else 'comes'} to `{state.name(hand.at)}` with closed fingers",
-        hand.arrival,
-        "it arrives here",
-        secondary=(Label(hand.opened, "they open here"),) if hand.opened else (),
-        advice=f"write `OPEN {arm}` before this MOVE",
-    )
+    text = f"{arm} {'may come' if opened_late else 'comes'} to `{state.name(hand.at)}` with closed fingers"
+    here, advice = labels(hand.opened, "they open here"), f"write `OPEN {arm}` before this MOVE"
+    state.report("L301", text, hand.arrival, "it arrives here", secondary=here, advice=advice)
 
 
 # ---- tools and sensors ---------------------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from armwright.program.flow_analysis.facts import (
 )
 from armwright.program.flow_analysis.lattice import Facts, FactTable, same
 from armwright.program.flow_analysis.poses import HERE, Pose, after, inverse
+from armwright.program.language.diagnostic import Label, labels
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import STATION, WORLD, KnownCell
@@ -144,6 +145,11 @@ class FrameState:
         """Return the step from one frame to another; None where that is not certain."""
         there, here = self.where(child), self.where(parent)
         return None if there is None or here is None else after(inverse(here), there)
+
+    def affixed(self, name: str, text: str) -> tuple[Label, ...]:
+        """Return a label on the AFFIX that hung a frame where it hangs; none where there is no such statement."""
+        link = self.links[name]
+        return labels(link.span if link else None, text)
 
     # ---- changing --------------------------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from armwright.program.flow_analysis import plausibility, poses
 from armwright.program.flow_analysis.context import Steps, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.state import FlowState
-from armwright.program.language.diagnostic import Label
+from armwright.program.language.diagnostic import Label, labels
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
@@ -42,16 +42,10 @@ def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) ->
         return
     leader = frame if is_any(frame) else state.table.leader(frame)
     if leader is not None and leader != frame and (is_arm(leader) or leader == WORLD):
-        link = state.table.links[frame]
-        name = written(node)
-        state.report(
-            "E310",
-            f"`{name}` is rigidly attached to {state.name(leader)}, which an assignment cannot move",
-            node.span,
-            "cannot be assigned a pose",
-            secondary=(Label(link.span, "rigidly attached here"),) if link and link.span else (),
-            advice=f"remove RIGIDLY, or write `UNFIX {name}` before this",
-        )
+        name, here = written(node), state.table.affixed(frame, "rigidly attached here")
+        text = f"`{name}` is rigidly attached to {state.name(leader)}, which an assignment cannot move"
+        advice = f"remove RIGIDLY, or write `UNFIX {name}` before this"
+        state.report("E310", text, node.span, "cannot be assigned a pose", secondary=here, advice=advice)
         return
     state.table.assign(frame, span)
 
@@ -96,15 +90,15 @@ def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
     link = None if is_any(child) else state.table.links[child]
     if link is None or link.parent is None or link.parent == parent or _may_be(state, parent, link.parent):
         return
-    name = state.name
+    name, old = state.name(child), state.name(link.parent)
     state.report(
         "W203",
-        f"`{name(child)}` is still attached to `{name(link.parent)}`",
+        f"`{name}` is still attached to `{old}`",
         span,
-        f"from here on it is attached to {name(parent)}",
-        secondary=(Label(link.span, f"affixed to {name(link.parent)} here"),) if link.span else (),
-        note="" if link.span else f"in the cell it is attached to {name(link.parent)}",
-        advice=f"write `UNFIX {name(child)} FROM {name(link.parent)}` before to make this explicit",
+        f"from here on it is attached to {state.name(parent)}",
+        secondary=labels(link.span, f"affixed to {old} here"),
+        note="" if link.span else f"in the cell it is attached to {old}",
+        advice=f"write `UNFIX {name} FROM {old}` before to make this explicit",
     )
 
 
@@ -138,15 +132,10 @@ def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
     above, below = state.table.assigned[parent], state.table.assigned[child]
     if above is None or below is None or not above.moved or above.order < below.order:
         return
-    name = state.name
-    state.report(
-        "L303",
-        f"`{name(parent)}` was moved before `{name(child)}` was attached to it",
-        node.link,
-        f"{name(child)} follows only from here on",
-        secondary=(Label(above.span, f"{name(child)} did not follow this"),),
-        advice="write the AFFIX before the assignment, or specify the transformation with AT",
-    )
+    name, here = state.name(child), labels(above.span, f"{state.name(child)} did not follow this")
+    text = f"`{state.name(parent)}` was moved before `{name}` was attached to it"
+    advice = "write the AFFIX before the assignment, or specify the transformation with AT"
+    state.report("L303", text, node.link, f"{name} follows only from here on", secondary=here, advice=advice)
 
 
 # ---- UNFIX ---------------------------------------------------------------------------------------------------------
@@ -173,18 +162,14 @@ def unfix(state: FlowState, node: tree.Unfix) -> None:
 
 def _not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
     assert node.parent is not None  # noqa: S101 - it has a name in the frame table
-    link, name = state.table.links[child], state.name
-    on = link.parent if link else None
-    where = Label(link.span, f"{name(child)} was affixed to {name(on)} here") if link and link.span and on else None
-    instead = f"write `UNFIX {name(child)} FROM {name(on)}`" if on else "remove this UNFIX"
-    state.report(
-        "E306",
-        f"`{name(child)}` is not affixed to `{written(node.parent)}`",
-        node.parent.span,
-        "not its parent" if on else f"{name(child)} has no parent",
-        secondary=(where,) if where else (),
-        advice=instead,
-    )
+    link, name = state.table.links[child], state.name(child)
+    text = f"`{name}` is not affixed to `{written(node.parent)}`"
+    if link is None or link.parent is None:
+        state.report("E306", text, node.parent.span, f"{name} has no parent", advice="remove this UNFIX")
+        return
+    parent = state.name(link.parent)
+    here, advice = labels(link.span, f"{name} was affixed to {parent} here"), f"write `UNFIX {name} FROM {parent}`"
+    state.report("E306", text, node.parent.span, "not its parent", secondary=here, advice=advice)
 
 
 STEPS: Steps = {tree.Assign: of_state(assign), tree.Affix: of_state(affix), tree.Unfix: of_state(unfix)}

@@ -6,7 +6,7 @@ from armwright.program.flow_analysis.definite_assignment import need, need_indic
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import leaves
 from armwright.program.flow_analysis.state import FlowState
-from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.diagnostic import Label, Severity, labels
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED
 from armwright.program.semantics.cell_symbols import WORLD
@@ -103,14 +103,10 @@ def _left_hanging(state: FlowState, node: tree.Move, arm: str) -> None:
     link, name = state.table.links[frame], state.name(frame)
     if link is None or link.parent != arm:
         return
-    state.report(
-        "W209",
-        f"`{name}` is still attached to {arm}, whose gripper has released it",
-        node.span,
-        f"{name} moves along",
-        secondary=(Label(opened, "they open here"), *((Label(link.span, "affixed here"),) if link.span else ())),
-        advice=f"write `UNFIX {name} FROM {arm}` after OPEN",
-    )
+    text = f"`{name}` is still attached to {arm}, whose gripper has released it"
+    here = (Label(opened, "they open here"), *labels(link.span, "affixed here"))
+    advice = f"write `UNFIX {name} FROM {arm}` after OPEN"
+    state.report("W209", text, node.span, f"{name} moves along", secondary=here, advice=advice)
 
 
 def _hung(state: FlowState, moved: str | None, arm: str) -> tuple[Label, ...]:
@@ -120,7 +116,7 @@ def _hung(state: FlowState, moved: str | None, arm: str) -> tuple[Label, ...]:
     for name in (moved, *state.table.above(moved)):
         link = state.table.links[name]
         if link is not None and link.parent == arm:
-            return (Label(link.span, f"{state.name(name)} was affixed to {arm} here"),) if link.span else ()
+            return labels(link.span, f"{state.name(name)} was affixed to {arm} here")
     return ()
 
 
@@ -151,7 +147,7 @@ def _imply(state: FlowState, node: tree.Move, moved: str, arm: str) -> None:
         f"`{name}` is moved, but no AFFIX attaches it to {arm}",
         node.span,
         f"`AFFIX {name} TO {arm}` is implied",
-        secondary=(Label(grip.span, f"{arm} grasped it here"),) if grip and grip.span else (),
+        secondary=labels(grip.span if grip else None, f"{arm} grasped it here"),
         advice=f"write `AFFIX {name} TO {arm}` after GRASP",
         severity=Severity.ERROR if state.strict else Severity.WARNING,
     )
@@ -160,17 +156,12 @@ def _imply(state: FlowState, node: tree.Move, moved: str, arm: str) -> None:
 
 
 def _not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
-    link, name = state.table.links[moved], state.name(moved)
-    state.report(
-        "E301",
-        f"`{name}` cannot be moved: it is not affixed to an arm",
-        node.moved.span,
-        f"is attached to {state.name(link.parent) if link and link.parent else WORLD}, not to an arm",
-        secondary=(Label(link.span, "affixed here"),) if link and link.span else (),
-        advice=f"grasp it and write `AFFIX {name} TO {state.last_arm() or state.some_arm()}` first"
-        if moved != WORLD
-        else "",
-    )
+    link, name, here = state.table.links[moved], state.name(moved), state.table.affixed(moved, "affixed here")
+    parent = state.name(link.parent) if link and link.parent else WORLD
+    text, label = f"`{name}` cannot be moved: it is not affixed to an arm", f"is attached to {parent}, not to an arm"
+    arm = state.last_arm() or state.some_arm()
+    advice = "" if moved == WORLD else f"grasp it and write `AFFIX {name} TO {arm}` first"
+    state.report("E301", text, node.moved.span, label, secondary=here, advice=advice)
 
 
 def _relative(state: FlowState, node: tree.Move, arm: str) -> None:
@@ -189,14 +180,9 @@ def _speed(state: FlowState, node: tree.Expression) -> None:
     if LOWEST_SPEED <= value <= HIGHEST_SPEED or slot is None or state.now.scope.is_poisoned(node.key):
         return
     if state.settle(slot):
-        state.report(
-            "E207",
-            f"speed `{node.text}` = {value:.12g} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
-            node.span,
-            "out of range",
-            secondary=(Label(span, f"{node.text} gets its value here"),),
-            note=SPEED_NOTE,
-        )
+        text = f"speed `{node.text}` = {value:.12g} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
+        here = labels(span, f"{node.text} gets its value here")
+        state.report("E207", text, node.span, "out of range", secondary=here, note=SPEED_NOTE)
 
 
 def _targets(node: tree.Move) -> list[tree.Expression]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.state import FlowState
-from armwright.program.language.diagnostic import Label
+from armwright.program.language.diagnostic import labels
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.units import LENGTHS, convert
 from armwright.program.syntax import tree
@@ -95,18 +95,11 @@ def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
     frame = table.hands[arm].at
     if frame is None or frame in (UNKNOWN, child) or is_any(frame) or is_arm(frame):
         return
-    here, there = table.where(frame), table.where(child)
-    if here is None or there is None:
+    stands, pose = table.where(frame), table.where(child)
+    if stands is None or pose is None or (away := math.dist(stands[9:], pose[9:])) <= _AWAY:
         return
-    away = math.dist(here[9:], there[9:])
-    if away <= _AWAY:
-        return
-    name, hand = state.name, table.hands[arm]
-    state.report(
-        "W210",
-        f"`{name(child)}` is {_length(away)} away from the gripper of {arm}",
-        node.link,
-        f"the gripper is at {name(frame)}",
-        secondary=(Label(hand.arrival, f"it moved to {name(frame)} here"),) if hand.arrival else (),
-        advice=f"write `AFFIX {name(frame)} TO {arm}`, or move the arm to {name(child)} first",
-    )
+    name, there = state.name(child), state.name(frame)
+    text = f"`{name}` is {_length(away)} away from the gripper of {arm}"
+    arrival = labels(table.hands[arm].arrival, f"it moved to {there} here")
+    advice = f"write `AFFIX {there} TO {arm}`, or move the arm to {name} first"
+    state.report("W210", text, node.link, f"the gripper is at {there}", secondary=arrival, advice=advice)

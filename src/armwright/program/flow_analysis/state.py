@@ -12,7 +12,7 @@ from armwright.program.flow_analysis.frame_state import FrameState
 from armwright.program.flow_analysis.lattice import EVERYTHING, Facts, FactTable, same
 from armwright.program.flow_analysis.poses import Pose
 from armwright.program.flow_analysis.side_effects import ANY_ARM, SideEffects, Writing
-from armwright.program.language.diagnostic import Details, DiagnosticList, Label
+from armwright.program.language.diagnostic import Details, DiagnosticList, Label, labels
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import array, is_any, is_arm
 from armwright.program.language.source import Source, Span
@@ -234,14 +234,9 @@ class FlowState:
         """Point at a statement that no path leads to."""
         if self.ended is None:
             return
-        self.report(
-            "L305",
-            "this statement is unreachable",
-            span,
-            "no path leads here",
-            secondary=(Label(self.ended, "no statement after this is executed"),),
-            advice="remove it, or make the statement that ends the path conditional",
-        )
+        here = labels(self.ended, "no statement after this is executed")
+        advice = "remove it, or make the statement that ends the path conditional"
+        self.report("L305", "this statement is unreachable", span, "no path leads here", secondary=here, advice=advice)
 
     # ---- arms ------------------------------------------------------------------------------------------------------
 
