@@ -84,12 +84,9 @@ def test_derivatives(rng: np.random.Generator) -> None:
     )
     model = MeasurementModel(
         chain=chain,
-        frames=(np.eye(4), random_pose(rng, 1.0)),
-        planes=(Plane(rng.standard_normal(3), rotation_from_vector(rng.standard_normal(3))),),
-        anchors=(rng.standard_normal(3),),
-        frame_names=("a", "b"),
-        plane_names=("table",),
-        anchor_names=("wire",),
+        frames={"a": np.eye(4), "b": random_pose(rng, 1.0)},
+        planes={"table": Plane(rng.standard_normal(3), rotation_from_vector(rng.standard_normal(3)))},
+        anchors={"wire": rng.standard_normal(3)},
     )
     q = configurations(rng, arm, 6)
     X = np.stack([random_pose(rng, 1.0) for _ in q])
@@ -200,12 +197,12 @@ def test_derivatives_of_large_turns(angle: float, rng: np.random.Generator) -> N
     """Turns that are far off have the derivatives that differences have, too."""
     arm = random_arm(rng, 4)
     chain = chain_of(arm)
-    model = MeasurementModel(chain=chain, frames=(np.eye(4), random_pose(rng, 1.0)), frame_names=("a", "b"))
+    model = MeasurementModel(chain=chain, frames={"a": np.eye(4), "b": random_pose(rng, 1.0)})
     q = configurations(rng, arm, 4)
     X, axes = np.tile(np.eye(4), (4, 1, 1)), rng.standard_normal((4, 3))
     axes *= angle / np.linalg.norm(axes, axis=1)[:, None]
     X[:, :3, :3] = rotation_from_vector(axes) @ chain.forward(q).rotation
-    X[2:, :3, :3] = model.frames[1][:3, :3].T @ X[2:, :3, :3]
+    X[2:, :3, :3] = model.frames["b"][:3, :3].T @ X[2:, :3, :3]
     given, h = readings(q, X, frame=list("aabb")), 1e-6
     x = 0.01 * rng.standard_normal(len(model.names))
 
@@ -363,7 +360,7 @@ def test_what_does_not_fit(truth: Truth) -> None:
         readings(q, distances=[1.0] * 4)
     with pytest.raises(InvalidValueError, match="expected points, poses, planes or distances, got none"):
         readings(q)
-    with pytest.raises(ShapeError, match=r"other: expected \(4, 6\) for as many q, got \(3, 6\)"):
+    with pytest.raises(ShapeError, match=r"other: expected a shape ending in \(4, 6\), got \(3, 6\)"):
         readings(q, distances=[1.0] * 4, other=q[:3])
     with pytest.raises(ShapeError, match=r"readings of arms with \[3, 6\] joints are not of one arm"):
         concatenate(readings(q, plane=["a"] * 4), readings(q[:, :3], plane=["a"] * 4))

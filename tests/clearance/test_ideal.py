@@ -357,7 +357,7 @@ class TestRefused:
     def test_wrong_number_of_drives(self) -> None:
         """The five-bar has two drives."""
         linkage = load_linkage("five-bar")
-        with pytest.raises(ShapeError, match=r"expected 2 numbers on the last axis, got shape \(3,\)"):
+        with pytest.raises(ShapeError, match=r"drives: expected a shape ending in \(2,\), got \(3,\)"):
             closed(linkage, assembly_guess(linkage), drives=[0.0, 0.0, 0.0])
 
     def test_too_few_drives(self) -> None:

@@ -82,7 +82,7 @@ class TestWhatItCannotBe:
     """Mistakes, each with a message that names what is wrong."""
 
     def test_unknown_body(self, five_bar: Linkage) -> None:
-        """A joint of a body that is not there is refused with the nearest name."""
+        """A joint of a body that does not exist is refused with the nearest name."""
         with pytest.raises(UnknownNameError, match=r"no body 'link11'. Did you mean 'link1'\?"):
             changed(five_bar, "joints", 0, body="link11")
 
@@ -155,9 +155,9 @@ class TestWhatItCannotBe:
     @pytest.mark.parametrize(
         ("wrong", "message"),
         [
-            ({"clearance": -1e-4}, "pin J2: clearance: expected a number not below 0, got -0.0001"),
+            ({"clearance": -1e-4}, "pin J2: clearance: expected 0 or more, got -0.0001"),
             ({"clearance": np.nan}, "pin J2: clearance"),
-            ({"journal_radius": 0.0}, "pin J2: journal radius: expected a number above 0, got 0"),
+            ({"journal_radius": 0.0}, "pin J2: journal radius: expected more than 0, got 0"),
         ],
     )
     def test_radii(self, five_bar: Linkage, wrong: dict[str, float], message: str) -> None:
@@ -169,18 +169,18 @@ class TestWhatItCannotBe:
         """Play is in pins that there are."""
         with pytest.raises(UnknownNameError, match=r"no pin 'J5'"):
             five_bar.with_clearances({"J5": 1e-4})
-        with pytest.raises(InvalidValueError, match="pin J2: clearance: expected a number not below 0"):
+        with pytest.raises(InvalidValueError, match="pin J2: clearance: expected 0 or more"):
             five_bar.with_clearances({"J2": -1e-4})
 
     @pytest.mark.parametrize(
         ("wrong", "message"),
         [
-            ({"young": 0.0}, "young: expected a number above 0"),
+            ({"young": 0.0}, "young: expected more than 0"),
             ({"poisson": 0.6}, "poisson: expected a ratio above -1, at most 0.5, got 0.6"),
             ({"poisson": -1.0}, "poisson"),
             ({"restitution": 0.0}, "restitution: expected a number above 0, at most 1, got 0"),
             ({"restitution": 1.2}, "restitution"),
-            ({"friction": -0.1}, "friction: expected a number not below 0, got -0.1"),
+            ({"friction": -0.1}, "friction: expected 0 or more, got -0.1"),
         ],
     )
     def test_material(self, wrong: dict[str, float], message: str) -> None:
@@ -192,7 +192,7 @@ class TestWhatItCannotBe:
         """Points lie in the plane."""
         with pytest.raises(ShapeError, match="point end"):
             Body(name="bar", mass=1.0, points={"end": (1.0, 0.0, 0.0)})
-        with pytest.raises(InvalidValueError, match="body bar: mass: expected a number not below 0, got -1"):
+        with pytest.raises(InvalidValueError, match="body bar: mass: expected 0 or more, got -1"):
             Body(name="bar", mass=-1.0)
 
 

@@ -133,7 +133,7 @@ def test_slack_pins_are_refused(linkage: Linkage) -> None:
 def test_clearances_that_do_not_fit(linkage: Linkage) -> None:
     """There is one clearance for each pin, and none is negative."""
     q = ideal(linkage, FIRST_GOAL)
-    with pytest.raises(ShapeError, match=r"clearances: expected 3 on the last axis, one per pin, got shape \(2,\)"):
+    with pytest.raises(ShapeError, match=r"clearances of J2, J3, J4: expected a shape ending in \(3,\), got \(2,\)"):
         at_rest(linkage, q, [1e-4, 1e-4])
     with pytest.raises(InvalidValueError, match=r"clearances: expected none below 0, got -0\.1 mm"):
         at_rest(linkage, q, [1e-4, -1e-4, 1e-4])

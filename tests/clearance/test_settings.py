@@ -43,7 +43,7 @@ def test_numbers(what: str, value: float) -> None:
 
 def test_gains() -> None:
     """A controller does not push away from its goal."""
-    with pytest.raises(InvalidValueError, match="gains: expected a number not below 0, got -1"):
+    with pytest.raises(InvalidValueError, match="gains: expected 0 or more, got -1"):
         Settings(gains=(100.0, -1.0))
 
 

@@ -258,7 +258,9 @@ class TestRefused:
 
     def test_clearances_per_pin(self, y1: Scenario) -> None:
         """There is one for each pin; the message names the pins."""
-        with pytest.raises(ShapeError, match=r"expected 3 on the last axis \(J2, J3, J4\), got shape \(2,\)"):
+        with pytest.raises(
+            ShapeError, match=r"clearances of J2, J3, J4: expected a shape ending in \(3,\), got \(2,\)"
+        ):
             simulate(y1, [5e-4, 5e-4])
 
     def test_axes_that_do_not_fit(self, y1: Scenario) -> None:

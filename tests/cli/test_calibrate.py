@@ -86,7 +86,7 @@ def test_json(measured: Path) -> None:
     [
         (("calibrate", "pumma560", "MEASURED"), 2, "Did you mean 'puma560'?"),
         (("calibrate", "ur5", "MEASURED"), 3, "are these its joints"),
-        (("calibrate", ARM, "MEASURED", "--noise-um", "0"), 2, "noise: expected a standard deviation above 0"),
+        (("calibrate", ARM, "MEASURED", "--noise-um", "0"), 2, "noise: expected more than 0 m"),
         (("calibrate", "ntu-3r", "MEASURED"), 4, "joint_4_deg"),
         (("calibrate", ARM, "nowhere.csv"), 4, "nowhere.csv"),
         (("calibrate", ARM, "MEASURED", "--tool-mm", "0,0"), 2, "expected 3 finite numbers, got 2: 0,0"),

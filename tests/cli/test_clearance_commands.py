@@ -159,7 +159,7 @@ def test_damaged_sweep(folder: Path, tmp_path: Path) -> None:
     anew = armwright(*sweep, "--json")
 
     assert [done.returncode for done in (learnt, again, anew)] == [4, 4, 4]
-    assert f"armwright: {results}: damaged: its hash is not that in run.json; it stays as it is" in learnt.stderr
+    assert f"armwright: {results}: damaged: its checksum does not match run.json; it stays as it is" in learnt.stderr
     assert f"{results}: damaged" in again.stderr
     assert json.loads(anew.stdout)["error"]["file"] == str(block)
     assert block.read_bytes() == b""
@@ -234,7 +234,7 @@ MISTAKES = [
     (("sweep", "five-bar", "--paths", "y15"), "no test path 'y15'. Did you mean 'y1'?"),
     (("sweep", "five-bar", "--paths", "pick-and-place"), "no test path 'pick-and-place'"),
     (("sweep", "five-bar", "--design", "lsh"), "no design 'lsh'. Did you mean 'lhs'?"),
-    (("sweep", "five-bar", "--design", "factorial", "--levels", "1"), "levels: expected a whole number not"),
+    (("sweep", "five-bar", "--design", "factorial", "--levels", "1"), "levels: expected an integer of at least"),
     (("sweep", "five-bar", "--design", "factorial", "--from-mm", "0"), "contact needs them above 0, got 0 mm"),
     (("sweep", "five-bar", "-n", "100"), "a Sobol design has a power of two of points, got 100"),
     (("sweep", "five-bar", "--from-mm", "0.5", "--to-mm", "0.1"), "bounds of c_J2: they are reversed"),
@@ -245,9 +245,9 @@ MISTAKES = [
     (("estimate", "five-bar", "none.csv"), "none.csv: no such file"),
     (("estimate", "five-bar", PATHS), "measurements on paths need a sweep to compare with"),
     (("estimate", "five-bar", PATHS, "--sweep", "SWEEP"), "--noise-um: expected the standard deviation"),
-    (("estimate", "five-bar", PATHS, "--sweep", "none", "--noise-um", "2"), "'none': the sweep is not there"),
+    (("estimate", "five-bar", PATHS, "--sweep", "none", "--noise-um", "2"), "'none': the sweep does not exist"),
     (("estimate", "five-bar", "x2.csv", "--sweep", "SWEEP", "--noise-um", "2"), "the sweep has no path x2; sweep the"),
-    (("estimate", "five-bar", REST, "--noise-um", "-1"), "noise: expected a standard deviation above 0, got -1"),
+    (("estimate", "five-bar", REST, "--noise-um", "-1"), "noise: expected more than 0 m, got -1e-06"),
     (("estimate", "slider-crank", REST), "slider-crank: with its pins closed it has 1 freedom"),
     (("correct", "five-bar", "--path", "y99"), "no path 'y99'. Did you mean 'y9'?"),
     (("correct", "five-bar", "--clearance", "J7=0.3"), "no pin 'J7'. Known: J2, J3, J4."),

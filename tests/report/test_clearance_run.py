@@ -191,7 +191,10 @@ def test_workspace(task: Scenario, run: ClearanceRun, cranked: dict[str, Clearan
     assert "elbows out" in drawn.caption
     assert workspace_of(cranked["four-bar"].simulation.scenario) is None
     for mode in ("left", "in"):
-        assert workspace_figure(FiveBar.symmetric(0.45, 0.3, 0.4), mode).svg != drawn.svg
+        assert (
+            workspace_figure(FiveBar(motors=[[-0.45, 0], [0.45, 0]], cranks=[0.3, 0.3], rods=[0.4, 0.4]), mode).svg
+            != drawn.svg
+        )
 
 
 # ---- the film ------------------------------------------------------------------------------------------------------

@@ -14,9 +14,9 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, positive
 from armwright.calibration.chain import chain_of
-from armwright.calibration.contradictions import contradictions, refuse_noise
+from armwright.calibration.contradictions import contradictions
 from armwright.calibration.cross_validation import HeldOut, cross_validate
 from armwright.calibration.fitting import Calibration, calibrate
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
@@ -216,7 +216,7 @@ def assess_calibration(
     report = progress or (lambda _: None)
     # Before a fit of some seconds.
     if noise is not None:
-        refuse_noise(noise)
+        positive(noise, "noise", "m")
     measured = measurements.readings.take(~measurements.check)
     check = measurements.readings.take(measurements.check)
     refuse_not_fitted(measured, check)

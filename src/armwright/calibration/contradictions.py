@@ -11,10 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.stats import chi2, mannwhitneyu
 
-from armwright.arrays import Array, Flags
+from armwright.arrays import Array, Flags, positive
 from armwright.calibration.fitting import CHECK, PRIOR_SIGMA_ANGLE, PRIOR_SIGMA_LENGTH, Calibration
 from armwright.calibration.readings import Readings
-from armwright.errors import InvalidValueError
 
 # A hypothesis is rejected at this level of significance; so few outliers are not tested, and so large a part of all is
 # too many.
@@ -61,19 +60,9 @@ def contradictions(calibration: Calibration, measured: Readings, noise: float | 
         yield from _excess_residuals(calibration, measured, noise)
 
 
-def refuse_noise(noise: float) -> None:
-    """Refuse a noise that no instrument has.
-
-    Raises:
-        InvalidValueError: it is not a finite number above 0.
-    """
-    if not 0 < noise < np.inf:
-        raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
-
-
 def _excess_residuals(calibration: Calibration, measured: Readings, noise: float) -> Iterator[str]:
     """Test by chi-square whether the residuals are larger than the stated noise makes them."""
-    refuse_noise(noise)
+    positive(noise, "noise", "m")
     residuals = calibration.model.residuals(measured, calibration.errors)
     # Lengths have their share of the degrees of freedom.
     degrees_of_freedom = max(1.0, calibration.degrees_of_freedom * float(np.mean(~residuals.is_rotation)))

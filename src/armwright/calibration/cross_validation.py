@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -95,7 +95,6 @@ def cross_validate(
     joint_errors: tuple[JointErrorModel, ...] = (),
     without: Sequence[str] = (),
     regions: bool = False,
-    progress: Callable[[int], None] | None = None,
 ) -> HeldOut:
     """Return by how much each reading misses an arm that was calibrated without it.
 
@@ -110,7 +109,6 @@ def cross_validate(
         joint_errors: see ``calibrate``.
         without: see ``calibrate``.
         regions: whether each fold is a region of the workspace, so that the arm is judged where it was not measured.
-        progress: called with how many folds are done.
 
     Raises:
         ContradictionError: a part alone leaves readings of another arm; see ``calibrate``.
@@ -125,8 +123,6 @@ def cross_validate(
             arm, measured, rows, called, base=base, joint_errors=joint_errors, without=without
         )
         held.put(rows, held_out_errors(calibration, measured.take(rows)))
-        if progress is not None:
-            progress(fold)
     return held
 
 
@@ -136,14 +132,7 @@ def random_folds(q: Array, folds: int, seed: int) -> list[Flags]:
     Raises:
         InvalidValueError: there are not as many configurations as folds, or fewer than two folds.
     """
-    configuration = distinct_configurations(q)
-    count = int(configuration.max()) + 1
-    if count < 2:
-        raise TooFewError(
-            f"folds: {len(q)} readings of one joint configuration leave none to hold out; measure in several"
-        )
-    if not 2 <= folds <= count:
-        raise InvalidValueError(f"folds: expected 2 to {count}, one joint configuration in each or more, got {folds}")
+    configuration, count = _folded(q, folds)
     number = (np.random.default_rng(seed).permutation(count) % folds)[configuration]
     return [number == fold for fold in range(folds)]
 
@@ -157,10 +146,7 @@ def workspace_regions(arm: Arm, q: Array, folds: int) -> list[Flags]:
     Raises:
         InvalidValueError: there are not as many configurations as parts, or fewer than two parts.
     """
-    configuration = distinct_configurations(q)
-    count = int(configuration.max()) + 1
-    if not 2 <= folds <= count:
-        raise InvalidValueError(f"folds: expected 2 to {count}, one joint configuration in each or more, got {folds}")
+    configuration, count = _folded(q, folds)
     _, first = np.unique(configuration, return_index=True)
     positions = chain_of(arm).forward(q[first]).position
 
@@ -174,6 +160,19 @@ def workspace_regions(arm: Arm, q: Array, folds: int) -> list[Flags]:
         return [*cut(order[:middle], half), *cut(order[middle:], parts - half)]
 
     return [np.isin(configuration, members) for members in cut(np.arange(count), folds)]
+
+
+def _folded(q: Array, folds: int) -> tuple[Numbers, int]:
+    """Return ``distinct_configurations``, and how many there are, if they are enough for so many folds."""
+    configuration = distinct_configurations(q)
+    count = int(configuration.max()) + 1
+    if count < 2:
+        raise TooFewError(
+            f"folds: {len(q)} readings of one joint configuration leave none to hold out; measure in several"
+        )
+    if not 2 <= folds <= count:
+        raise InvalidValueError(f"folds: expected 2 to {count}, one joint configuration in each or more, got {folds}")
+    return configuration, count
 
 
 def distinct_configurations(q: Array) -> Numbers:

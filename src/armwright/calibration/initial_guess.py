@@ -61,12 +61,9 @@ def initial_guess(
         chain=chain_of(
             arm, base=base, target_rotation=_target_rotation(chain, readings, frames), joint_errors=joint_errors
         ),
-        frames=frames,
-        planes=tuple(_plane(chain, readings, i) for i in range(len(readings.planes))),
-        anchors=tuple(_anchor(chain, readings, i) for i in range(len(readings.anchors))),
-        frame_names=readings.frames or ("",),
-        plane_names=readings.planes,
-        anchor_names=readings.anchors,
+        frames=dict(zip(readings.frames or ("",), frames, strict=True)),
+        planes={name: _plane(chain, readings, i) for i, name in enumerate(readings.planes)},
+        anchors={name: _anchor(chain, readings, i) for i, name in enumerate(readings.anchors)},
     )
     errors = model.pose_errors(readings)
     distance = float(np.median(errors.distance))

@@ -6,7 +6,7 @@ that was touched, and three coordinates for each anchor.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
@@ -69,30 +69,24 @@ class MeasurementModel:
 
     Attributes:
         chain: the arm.
-        frames: (4, 4) approximate pose of each frame in the measuring frame; the first is that frame.
-        planes: that were touched.
-        anchors: (3,) approximate position of each anchor in the measuring frame [m].
-        frame_names: of the frames.
-        plane_names: of the planes.
-        anchor_names: of the anchors.
+        frames: by name the (4, 4) approximate pose of each frame in the measuring frame; the first is that frame.
+        planes: that were touched, by name.
+        anchors: by name the (3,) approximate position of each anchor in the measuring frame [m].
     """
 
     chain: Chain
-    frames: tuple[Array, ...] = attrs.field(factory=lambda: (np.eye(4),))
-    planes: tuple[Plane, ...] = ()
-    anchors: tuple[Array, ...] = ()
-    frame_names: tuple[str, ...] = ("",)
-    plane_names: tuple[str, ...] = ()
-    anchor_names: tuple[str, ...] = ()
+    frames: Mapping[str, Array] = attrs.field(factory=lambda: {"": np.eye(4)})
+    planes: Mapping[str, Plane] = attrs.field(factory=dict)
+    anchors: Mapping[str, Array] = attrs.field(factory=dict)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The errors, in order: those of the arm come first."""
         return (
             *self.chain.names,
-            *(f"frame.{name}.{part}" for name in self.frame_names[1:] for part in _FRAME_ERRORS),
-            *(f"plane.{name}.{part}" for name in self.plane_names for part in _PLANE_ERRORS),
-            *(f"anchor.{name}.{part}" for name in self.anchor_names for part in "xyz"),
+            *(f"frame.{name}.{part}" for name in [*self.frames][1:] for part in _FRAME_ERRORS),
+            *(f"plane.{name}.{part}" for name in self.planes for part in _PLANE_ERRORS),
+            *(f"anchor.{name}.{part}" for name in self.anchors for part in "xyz"),
         )
 
     @property
@@ -144,7 +138,7 @@ class MeasurementModel:
 
     def _of_poses(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the residuals of points and rotations, frame by frame."""
-        for i, X in enumerate(self.frames):
+        for i, X in enumerate(self.frames.values()):
             first = len(self.chain.names) + 6 * (i - 1)
             rows = np.flatnonzero(readings.with_point & (readings.frame == i))
             R, origin, axes = _displaced(X, x[first : first + 6] if i else np.zeros(6))
@@ -178,7 +172,7 @@ class MeasurementModel:
     def _of_planes(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the heights of the tool over the planes that it touched."""
         first = len(self.chain.names) + 6 * (len(self.frames) - 1)
-        for i, plane in enumerate(self.planes):
+        for i, plane in enumerate(self.planes.values()):
             rows = np.flatnonzero(readings.plane == i)
             shift, a, b = x[first : first + 3]
             # Tilted by a about its x and by b about its y, as tangents.
@@ -195,7 +189,7 @@ class MeasurementModel:
     def _of_anchors(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the distances from anchors."""
         first = len(self.chain.names) + 6 * (len(self.frames) - 1) + 3 * len(self.planes)
-        for i, anchor in enumerate(self.anchors):
+        for i, anchor in enumerate(self.anchors.values()):
             rows = np.flatnonzero(readings.anchor == i)
             distance, direction = _polar(tool.position[rows] - anchor - x[first : first + 3])
             J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows])

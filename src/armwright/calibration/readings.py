@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array, ArrayLike, Flags, floats, read_only
+from armwright.arrays import Array, ArrayLike, Flags, exact_shape, floats, read_only
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.spatial.rotations import orthonormality_error
 
@@ -124,12 +124,12 @@ def readings(
             raise ShapeError(
                 f"points: expected ({m}, 3) points or ({m}, 4, 4) poses for as many q, got {measured.shape}"
             )
-    lengths = _no_numbers(m) if distances is None else _as_many(floats(distances, "distances"), (m,), "distances")
+    lengths = _no_numbers(m) if distances is None else exact_shape(distances, (m,), "distances")
     if points is None and plane is None and distances is None:
         raise InvalidValueError("expected points, poses, planes or distances, got none of them")
     if (distances is not None) != ((anchor is not None) or (other is not None)) or None not in (anchor, other):
         raise InvalidValueError("distances: tell from which anchor they are, or from which other configuration")
-    others = _no_numbers(m, n) if other is None else _as_many(np.atleast_2d(floats(other, "other")), (m, n), "other")
+    others = _no_numbers(m, n) if other is None else exact_shape(np.atleast_2d(floats(other, "other")), (m, n), "other")
     frames = [""] * m if frame is None and points is not None else _labels(frame, m, "frame")
     labels = numbered(frame=frames, plane=_labels(plane, m, "plane"), anchor=_labels(anchor, m, "anchor"))
     return Readings(q=configurations, points=positions, rotations=rotations, distances=lengths, other=others, **labels)
@@ -202,9 +202,3 @@ def _renumbered(numbers: Numbers, names: tuple[str, ...], order: tuple[str, ...]
     """Return numbers of names as numbers in another order; -1 stays."""
     table = np.array([*(order.index(name) for name in names), -1], dtype=np.intp)
     return np.asarray(table[numbers], dtype=np.intp)
-
-
-def _as_many(value: Array, shape: tuple[int, ...], what: str) -> Array:
-    if value.shape != shape:
-        raise ShapeError(f"{what}: expected {shape} for as many q, got {value.shape}")
-    return value

@@ -6,6 +6,7 @@ and their spread is the part of it that is chance.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -95,7 +96,7 @@ class FeatureSweep:
     def settings(self) -> Mapping[str, Any]:
         """The other inputs of the results."""
         return {
-            "linkage": _plain(attrs.asdict(self.linkage)),
+            "linkage": _plain(self.linkage),
             "paths": list(self.paths),
             "simulation": attrs.asdict(self.simulation_settings),
             "with_friction": self.with_friction,
@@ -156,10 +157,6 @@ class FeatureSweep:
         """Leave out the prepared paths, which a worker computes itself."""
         return {key: value for key, value in self.__dict__.items() if key != "tasks"}
 
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Restore the attributes."""
-        self.__dict__.update(state)
-
 
 def is_chance(values: Array, spreads: Array, runs: int) -> bool:
     """Whether a feature is chance alone: it varies more between indistinguishable runs than over the design.
@@ -188,7 +185,7 @@ def is_sweep_of(settings: Mapping[str, Any], linkage: Linkage) -> bool:
     """Whether a sweep is one of a linkage; its own clearances, which each run replaces, do not count."""
     swept, own = (
         {**plain, "pins": [{**pin, "clearance": None} for pin in plain.get("pins", [])]}
-        for plain in (settings.get("linkage", {}), _plain(attrs.asdict(linkage)))
+        for plain in (settings.get("linkage", {}), _plain(linkage))
     )
     return swept == own
 
@@ -201,12 +198,7 @@ def _simulated(task: Scenario, clearances: Array, frictions: Array | None) -> _R
     return _Runs(values, run.time, run.error, np.asarray(run.status != Status.FINISHED))
 
 
-def _plain(value: Any) -> Any:
-    """Return a value as plain data for JSON."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, tuple | list):
-        return [_plain(entry) for entry in value]
-    return value
+def _plain(linkage: Linkage) -> dict[str, Any]:
+    """Return a linkage as JSON holds it."""
+    plain: dict[str, Any] = json.loads(json.dumps(attrs.asdict(linkage), default=np.ndarray.tolist))
+    return plain

@@ -43,9 +43,9 @@ class Features(NamedTuple):
 UNITS = {"slope": "m/s", "intercept": "m", "amp_dc": "m", "amp_ac": "m", "offset_x": "m", "offset_y": "m"}
 
 
-def features(simulation: Simulation, window: tuple[float, float] = WINDOW) -> Features:
+def features(simulation: Simulation) -> Features:
     """Return the features of the error curves of a simulation; see ``features_of``."""
-    return features_of(simulation.time, simulation.error, window)
+    return features_of(simulation.time, simulation.error)
 
 
 def features_of(time: Array, error: Array, window: tuple[float, float] = WINDOW) -> Features:

@@ -16,11 +16,11 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, of_shape, positive
 from armwright.clearance.five_bar_parts import parts_of
-from armwright.clearance.linkage import Linkage, not_negative
+from armwright.clearance.linkage import Linkage
 from armwright.clearance.placement import Vec2
-from armwright.errors import InvalidValueError, ShapeError, one_of
+from armwright.errors import InvalidValueError, one_of
 from armwright.tracing.scalar import Scalar, atan2, sqrt
 
 # The sides of the elbows, with the tip below the motors: both outside, as in the thesis, or both inside, or both to one
@@ -37,7 +37,7 @@ _ROUNDING = 1e-12
 def _lengths(value: ArrayLike) -> Array:
     lengths = exact_shape(value, (2,), "lengths", LARGEST)
     for length in lengths:
-        not_negative(length, "length of a link", zero=False)
+        positive(length, "length of a link")
     return lengths
 
 
@@ -58,17 +58,6 @@ class FiveBar:
     motors: Array = attrs.field(converter=_motors)
     cranks: Array = attrs.field(converter=_lengths)
     rods: Array = attrs.field(converter=_lengths)
-
-    @classmethod
-    def symmetric(cls, half_width: float, crank: float, rod: float) -> FiveBar:
-        """Return a five-bar with equal arms and its motors at (∓half_width, 0).
-
-        Args:
-            half_width: half the distance of the motors [m].
-            crank: length of the cranks [m].
-            rod: length of the rods [m].
-        """
-        return cls(motors=[[-half_width, 0.0], [half_width, 0.0]], cranks=[crank, crank], rods=[rod, rod])
 
     @classmethod
     def of(cls, linkage: Linkage) -> FiveBar:
@@ -145,7 +134,7 @@ def inverse(bar: FiveBar, tip: ArrayLike, mode: Mode = "out") -> Array:
         Thesis eq. (3.8).
     """
     signs = MODES[one_of("assembly mode", mode, MODES)]  # type: ignore[index]
-    points = point_array(tip, "tip")
+    points = of_shape(tip, (2,), "tip", LARGEST)
     _check_reach(bar, points)
     return _stacked(
         [
@@ -162,36 +151,12 @@ def inverse_all(bar: FiveBar, tip: ArrayLike) -> dict[Mode, Array]:
 
 def elbows(bar: FiveBar, cranks: ArrayLike) -> Array:
     """Return (..., 2, 2) positions of the left and the right elbow [m] for angles (..., 2) of the cranks [rad]."""
-    theta = point_array(cranks, "cranks")
+    theta = of_shape(cranks, (2,), "cranks", LARGEST)
     directions = np.stack([np.sin(theta), -np.cos(theta)], axis=-1)
     return np.asarray(bar.motors + bar.cranks[:, None] * directions, dtype=np.float64)
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
-
-
-def point_array(value: ArrayLike, what: str) -> Array:
-    """Return (..., 2) numbers.
-
-    Raises:
-        ShapeError: the last axis is not 2 long.
-    """
-    array = floats(value, what, LARGEST)
-    if array.ndim == 0 or array.shape[-1] != 2:
-        raise ShapeError(f"{what}: expected two numbers on the last axis, got shape {array.shape}")
-    return array
-
-
-def link_angles(value: ArrayLike) -> Array:
-    """Return (..., 4) angles θ1 to θ4.
-
-    Raises:
-        ShapeError: the last axis is not 4 long.
-    """
-    array = floats(value, "angles", LARGEST)
-    if array.ndim == 0 or array.shape[-1] != 4:
-        raise ShapeError(f"angles: expected four on the last axis, θ1 to θ4, got shape {array.shape}")
-    return array
 
 
 def _vector(points: Array) -> Vec2:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arrays import Array, ArrayLike, of_shape
 from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError
 
 
 class Link(NamedTuple):
@@ -95,9 +95,7 @@ def configuration(linkage: Linkage, angles: ArrayLike) -> Array:
         InvalidValueError: it is no five-bar.
         ShapeError: there are not four angles on the last axis.
     """
-    parts, theta = parts_of(linkage), floats(angles, "angles")
-    if theta.shape[-1:] != (4,):
-        raise ShapeError(f"angles: expected four on the last axis, θ1 to θ4, got shape {theta.shape}")
+    parts, theta = parts_of(linkage), of_shape(angles, (4,), "angles θ1 to θ4")
     lead = theta.shape[:-1]
     values: dict[tuple[str, str], Array] = {}
     for motor, arm in ((parts.motors[0], (0, 1)), (parts.motors[1], (3, 2))):

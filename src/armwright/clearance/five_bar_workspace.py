@@ -15,8 +15,8 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array, ArrayLike, Flags
-from armwright.clearance.five_bar import MODES, FiveBar, elbows, link_angles, point_array
+from armwright.arrays import LARGEST, Array, ArrayLike, Flags, of_shape
+from armwright.clearance.five_bar import MODES, FiveBar, elbows
 from armwright.errors import InvalidValueError
 
 CurveKind: TypeAlias = Literal["serial", "parallel"]
@@ -29,37 +29,6 @@ _ON_CIRCLE = 1e-9
 _IN_LINE = 1e-12
 # The largest number of cells along a side of the grid of the workspace.
 _MAX_CELLS = 4000
-
-
-class Singularity(NamedTuple):
-    """The distance of a configuration from singularities; the sines change their sign there.
-
-    Attributes:
-        serial: (..., 2) sin(θ2 - θ1) and sin(θ3 - θ4), of the left and the right elbow.
-        parallel: (...) sin(θ2 - θ3), of the pin that joins the rods.
-        elbow_angles: (..., 2) rotation of each elbow until its arm is stretched or folded [rad].
-        tip_angle: (...) rotation between the rods until they are in one line [rad].
-    """
-
-    serial: Array
-    parallel: Array
-    elbow_angles: Array
-    tip_angle: Array
-
-
-class Transmission(NamedTuple):
-    """The transmission from the motors to the tip.
-
-    Attributes:
-        gains: (..., 2) the largest and the smallest speed of the tip for a speed of 1 of both motors together [m/rad].
-        condition: (...) their ratio: 1 where the tip moves alike in all directions, infinite at a singularity.
-        angles: (..., 3) transmission angles, at left elbow, tip and right elbow: between their two links, 0 to π/2
-            [rad]; near 0 little force is transmitted.
-    """
-
-    gains: Array
-    condition: Array
-    angles: Array
 
 
 class Curve(NamedTuple):
@@ -96,11 +65,6 @@ class Workspace:
         """(j, i) whether the tip reaches the middle of a cell."""
         return np.asarray(self.distance >= 0)
 
-    @property
-    def area(self) -> float:
-        """The area of the reachable cells [m²]."""
-        return float(self.reachable.sum() * (self.x[1] - self.x[0]) * (self.y[1] - self.y[0]))
-
 
 def boundary_distance(bar: FiveBar, tip: ArrayLike) -> Array:
     """Return the distances of points from the border of the workspace.
@@ -112,7 +76,7 @@ def boundary_distance(bar: FiveBar, tip: ArrayLike) -> Array:
     Returns:
         (...) distances [m], below 0 for points out of reach; minus infinity for an empty workspace.
     """
-    points = point_array(tip, "tip")
+    points = of_shape(tip, (2,), "tip", LARGEST)
     distances = np.array(_margin(bar, points))
     outside = distances < 0
     if np.any(outside):
@@ -140,11 +104,17 @@ def workspace(bar: FiveBar, cells: int = 200) -> Workspace:
     return Workspace(x=x, y=y, distance=boundary_distance(bar, grid))
 
 
-def singularity(angles: ArrayLike) -> Singularity:
-    """Return the distances of configurations from singularities, for angles (..., 4) θ1 to θ4 [rad]."""
-    between = _angles_between_links(angles)
-    sines, bends = np.sin(between), _bends(between)
-    return Singularity(sines[..., [0, 2]], sines[..., 1], bends[..., [0, 2]], bends[..., 1])
+def singularity_sines(angles: ArrayLike) -> Array:
+    """Return the sines of the angles between links, which change their sign at a singularity.
+
+    Args:
+        angles: (..., 4) θ1 to θ4 [rad].
+
+    Returns:
+        (..., 3) at the left elbow sin(θ2 - θ1) and at the right elbow sin(θ3 - θ4), first and last: 0 at a serial
+        singularity; between them sin(θ2 - θ3) at the tip: 0 at a parallel one.
+    """
+    return np.asarray(np.sin(_angles_between_links(angles)), dtype=np.float64)
 
 
 def jacobian(bar: FiveBar, angles: ArrayLike) -> Array:
@@ -160,7 +130,7 @@ def jacobian(bar: FiveBar, angles: ArrayLike) -> Array:
     Raises:
         InvalidValueError: the rods are in one line, a parallel singularity.
     """
-    theta = link_angles(angles)
+    theta = of_shape(angles, (4,), "angles θ1 to θ4", LARGEST)
     between = _angles_between_links(theta)
     across = np.sin(between[..., 1])
     if np.any(np.abs(across) < _IN_LINE):
@@ -173,16 +143,23 @@ def jacobian(bar: FiveBar, angles: ArrayLike) -> Array:
     return np.asarray(normals * (sines / across[..., None])[..., None, :], dtype=np.float64)
 
 
-def transmission(bar: FiveBar, angles: ArrayLike) -> Transmission:
-    """Return the transmission from the motors to the tip, for angles (..., 4) θ1 to θ4 [rad].
+def condition_number(bar: FiveBar, angles: ArrayLike) -> Array:
+    """Return the condition number of the transmission from the motors to the tip.
+
+    Args:
+        bar: the five-bar.
+        angles: (..., 4) θ1 to θ4 [rad].
+
+    Returns:
+        (...) the largest by the smallest speed of the tip for a speed of 1 of both motors together: 1 where the tip
+        moves alike in all directions, infinite at a serial singularity.
 
     Raises:
         InvalidValueError: the rods are in one line, a parallel singularity.
     """
     gains = np.asarray(np.linalg.svd(jacobian(bar, angles), compute_uv=False), dtype=np.float64)
     with np.errstate(divide="ignore"):
-        condition = gains[..., 0] / gains[..., 1]
-    return Transmission(gains, condition, _bends(_angles_between_links(angles)))
+        return np.asarray(gains[..., 0] / gains[..., 1], dtype=np.float64)
 
 
 def singular_curves(bar: FiveBar) -> list[Curve]:
@@ -224,13 +201,8 @@ def _circle(centre: Array, radius: float, angles: Array) -> Array:
 
 def _angles_between_links(angles: ArrayLike) -> Array:
     """Return (..., 3) angles between links: left elbow θ2 - θ1, tip θ2 - θ3, right elbow θ3 - θ4."""
-    theta = link_angles(angles)
+    theta = of_shape(angles, (4,), "angles θ1 to θ4", LARGEST)
     return np.asarray(theta[..., [1, 1, 2]] - theta[..., [0, 2, 3]], dtype=np.float64)
-
-
-def _bends(between: Array) -> Array:
-    """Return the distances of angles between links from the nearest multiple of π [rad]."""
-    return np.asarray(np.abs(np.remainder(between + math.pi / 2, math.pi) - math.pi / 2), dtype=np.float64)
 
 
 def _margin(bar: FiveBar, points: Array) -> Array:

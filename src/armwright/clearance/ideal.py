@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arrays import Array, ArrayLike, floats, of_shape
 from armwright.clearance.equations import drive_weights, free_forces, mass_matrix
 from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.placement import Placement, Point
@@ -263,13 +263,11 @@ def _gap(placement: Placement, number: int) -> Point:
 
 def _goal(linkage: Linkage, *, tip: ArrayLike | None, drives: ArrayLike | None) -> Array:
     """Return the goal: (..., 2) position of the tip, or (..., d) driven coordinates."""
-    if (tip is None) == (drives is None):
+    if drives is not None and tip is None:
+        return of_shape(drives, (len(linkage.drives),), "drives")
+    if tip is None or drives is not None:
         raise ShapeError("expected either the position of the tip, or the driven coordinates")
-    goal = floats(tip if tip is not None else drives, "tip" if tip is not None else "drives")  # type: ignore[arg-type]
-    size = 2 if tip is not None else len(linkage.drives)
-    if goal.ndim == 0 or goal.shape[-1] != size:
-        raise ShapeError(f"expected {size} numbers on the last axis, got shape {goal.shape}")
-    return goal
+    return of_shape(tip, (2,), "tip")
 
 
 def _residuals(placement: Placement, goal: Array, *, by_tip: bool) -> Array:

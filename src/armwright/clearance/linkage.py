@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 import attrs
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, number
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, not_negative, number, of_shape, positive
 from armwright.errors import InvalidValueError, UnknownNameError, one_of
 
 # The name of what stands still.
@@ -35,18 +35,6 @@ def _points(value: Mapping[str, ArrayLike]) -> dict[str, Array]:
 
 def _parts(value: Iterable[Any]) -> tuple[Any, ...]:
     return tuple(value)
-
-
-def not_negative(value: float, what: str, *, zero: bool = True) -> float:
-    """Return a number that is finite and not below 0, or above 0 where ``zero`` is not allowed.
-
-    Raises:
-        InvalidValueError: it is not.
-    """
-    checked = number(value, what)
-    if not 0 <= checked <= LARGEST or (checked == 0 and not zero):
-        raise InvalidValueError(f"{what}: expected a number {'not below' if zero else 'above'} 0, got {checked:g}")
-    return checked
 
 
 class BodyPoint(NamedTuple):
@@ -139,7 +127,7 @@ class ClearancePin:
     def __attrs_post_init__(self) -> None:
         """Check the radii."""
         not_negative(self.clearance, f"pin {self.name}: clearance")
-        not_negative(self.journal_radius, f"pin {self.name}: journal radius", zero=False)
+        positive(self.journal_radius, f"pin {self.name}: journal radius")
 
 
 @attrs.frozen(kw_only=True)
@@ -186,7 +174,7 @@ class Material:
 
     def __attrs_post_init__(self) -> None:
         """Check the ranges."""
-        not_negative(self.young, "young", zero=False)
+        positive(self.young, "young")
         not_negative(self.friction, "friction")
         if not -1 < number(self.poisson, "poisson") <= 0.5:
             raise InvalidValueError(f"poisson: expected a ratio above -1, at most 0.5, got {self.poisson:g}")
@@ -319,6 +307,16 @@ class Linkage:
     def clearances(self) -> dict[str, float]:
         """The clearance of each pin [m]."""
         return {pin.name: pin.clearance for pin in self.pins}
+
+    def clearance_array(self, clearances: ArrayLike | None) -> Array:
+        """Return clearances (..., p) as an array; those of the pins where none are given [m].
+
+        Raises:
+            ShapeError: they are not one per pin.
+        """
+        own = self.clearances
+        values = list(own.values()) if clearances is None else clearances
+        return of_shape(values, (len(own),), f"clearances of {', '.join(own) or 'no pins'}")
 
     def with_clearances(self, clearances: Mapping[str, float]) -> Linkage:
         """Return the same linkage with other clearances at some pins [m].

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 from armwright.clearance.linkage import (
     GRAVITY,
@@ -54,33 +55,23 @@ def read_linkage(path: Path) -> Linkage:
         FileFormatError: it is missing or broken, or says what cannot be.
     """
     top = Document.read(path).root
-    ground = Body(name=GROUND, points=_points(top.table("ground", required=True)))
-    bodies = tuple(_body(table) for table in top.tables("body", "bodies"))
-    joints = tuple(_joint(table) for table in top.tables("joint", "bodies"))
-    pins = tuple(_clearance_pin(table) for table in top.tables("play", "bodies"))
-    drives = tuple(_drive(table) for table in top.tables("drive", "bodies"))
-    loads = tuple(_load(table) for table in (top.tables("load", "bodies") if "load" in top else ()))
-    material = _material(top.table("material"))
-    name = top.text("name", default=path.stem)
-    zero = math.radians(top.number("zero_deg", default=0.0))
-    assembly = _assembly(top.table("assembly"))
-    gravity, tip = top.vector("gravity", 2, default=GRAVITY), _body_point(top, "tip")
+    fields: dict[str, Any] = {
+        "ground": Body(name=GROUND, points=_points(top.table("ground", required=True))),
+        "bodies": [_body(table) for table in top.tables("body", "bodies")],
+        "joints": [_joint(table) for table in top.tables("joint", "bodies")],
+        "pins": [_clearance_pin(table) for table in top.tables("play", "bodies")],
+        "drives": [_drive(table) for table in top.tables("drive", "bodies")],
+        "loads": [_load(table) for table in (top.tables("load", "bodies") if "load" in top else ())],
+        "material": _material(top.table("material")),
+        "name": top.text("name", default=path.stem),
+        "zero": math.radians(top.number("zero_deg", default=0.0)),
+        "assembly": _assembly(top.table("assembly")),
+        "gravity": top.vector("gravity", 2, default=GRAVITY),
+        "tip": _body_point(top, "tip"),
+    }
     top.finish()
     try:
-        return Linkage(
-            name=name,
-            bodies=bodies,
-            ground=ground,
-            joints=joints,
-            pins=pins,
-            drives=drives,
-            loads=loads,
-            tip=tip,
-            gravity=gravity,
-            zero=zero,
-            material=material,
-            assembly=assembly,
-        )
+        return Linkage(**fields)
     except ArmwrightError as error:
         raise top.error(None, str(error)) from error
 

@@ -16,7 +16,7 @@ import numpy as np
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.ideal import balance, closed, gaps_of, tip_of
 from armwright.clearance.linkage import Linkage
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError
 
 _MAX_ITERATIONS = 60
 # The iteration ends when no coordinate changes by more [rad, m].
@@ -60,10 +60,7 @@ def at_rest(
         ShapeError: an array does not fit.
     """
     start = floats(ideal, "ideal")
-    own = list(linkage.clearances.values())
-    c = floats(own if clearances is None else clearances, "clearances")
-    if c.shape[-1:] != (len(own),):
-        raise ShapeError(f"clearances: expected {len(own)} on the last axis, one per pin, got shape {c.shape}")
+    c = linkage.clearance_array(clearances)
     if np.any(c < 0):
         raise InvalidValueError(f"clearances: expected none below 0, got {c.min() * 1e3:g} mm")
     K = np.inf if stiffness is None else floats(stiffness, "stiffness")

@@ -7,11 +7,11 @@ from typing import Literal, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, not_negative, positive
 from armwright.clearance.contact import FRICTION_LAWS, IMPACT_LAWS, ImpactLaw, deepest, stiffness
 from armwright.clearance.equations import SLIP_SPEEDS, FrictionModel
 from armwright.clearance.kernel import CONTROLS, INTEGRATORS, Control, Integrator
-from armwright.clearance.linkage import Linkage, not_negative
+from armwright.clearance.linkage import Linkage
 from armwright.errors import InvalidValueError, one_of
 
 Start: TypeAlias = Literal["rest", "rigid", "centred"]
@@ -56,7 +56,7 @@ class Settings:
     def __attrs_post_init__(self) -> None:
         """Check names and ranges."""
         for what in ("step", "threshold", "sample"):
-            not_negative(getattr(self, what), what, zero=False)
+            positive(getattr(self, what), what)
         if len(self.gains) != 2:
             raise InvalidValueError(f"gains: expected stiffness and damping, got {len(self.gains)} numbers")
         for gain in self.gains:

@@ -150,11 +150,7 @@ def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Arra
 
 def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: ArrayLike | None) -> tuple[Array, Array]:
     """Return clearances (..., p) and frictions (...), broadcast together."""
-    own = list(linkage.clearances.values())
-    c = floats(own if clearances is None else clearances, "clearances")
-    if c.ndim == 0 or c.shape[-1] != len(own):
-        names = ", ".join(linkage.clearances)
-        raise ShapeError(f"clearances: expected {len(own)} on the last axis ({names}), got shape {c.shape}")
+    c = linkage.clearance_array(clearances)
     if not np.all(c > 0):
         raise InvalidValueError(f"clearances: contact needs them above 0, got {c.min() * 1e3:g} mm")
     mu = floats(linkage.material.friction if frictions is None else frictions, "frictions")
@@ -164,7 +160,7 @@ def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: Array
         lead = np.broadcast_shapes(c.shape[:-1], mu.shape)
     except ValueError as error:
         raise ShapeError(f"leading axes must fit together, got {c.shape[:-1]} and {mu.shape}") from error
-    return np.broadcast_to(c, (*lead, len(own))), np.broadcast_to(mu, lead)
+    return np.broadcast_to(c, (*lead, c.shape[-1])), np.broadcast_to(mu, lead)
 
 
 def _run(scenario: Scenario, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:

@@ -8,7 +8,13 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.five_bar import MODES, FiveBar, Mode, elbows, inverse, inverse_all
 from armwright.clearance.five_bar_parts import configuration
-from armwright.clearance.five_bar_workspace import Workspace, singular_curves, singularity, transmission, workspace
+from armwright.clearance.five_bar_workspace import (
+    Workspace,
+    condition_number,
+    singular_curves,
+    singularity_sines,
+    workspace,
+)
 from armwright.clearance.ideal import tip_of
 from armwright.clearance.scenario import Scenario
 from armwright.errors import InvalidValueError, one_of
@@ -82,8 +88,8 @@ def _evenness(bar: FiveBar, space: Workspace, mode: Mode) -> Array:
     positions = np.stack(np.meshgrid(space.x, space.y), axis=-1)[inside]
     angles = inverse(bar, positions, mode)
     values = np.zeros(len(positions))
-    bent = np.abs(singularity(angles).parallel) > _IN_LINE
-    values[bent] = 1.0 / transmission(bar, angles[bent]).condition
+    bent = np.abs(singularity_sines(angles)[:, 1]) > _IN_LINE
+    values[bent] = 1.0 / condition_number(bar, angles[bent])
     evenness[inside] = values
     return evenness
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
+from armwright.clearance.estimation import measurement_file
 from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement, read_measured
 from armwright.clearance.estimation.static import rest_offsets
 from armwright.clearance.features import features_of
@@ -109,13 +110,14 @@ def test_pick_and_place(tmp_path: Path) -> None:
     assert measurement.times["pick-and-place"][-1] == pytest.approx(0.5)
 
 
-def test_noise_of_features(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_noise_of_features(tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     """What noise of the samples does to the features is what many noisy runs show."""
     measurement = read_measured(written(tmp_path / "paths.csv", path_rows()))
     assert isinstance(measurement, PathMeasurement)
     names, noise = ("y1_intercept", "y1_slope", "y1_offset_x"), 10e-6
 
-    covariance = measurement.feature_covariance(names, noise, draws=800)
+    monkeypatch.setattr(measurement_file, "_DRAWS", 800)
+    covariance = measurement.feature_covariance(names, noise)
 
     error = measurement.errors["y1"]
     many = features_of(measurement.times["y1"], error + noise * rng.standard_normal((800, *error.shape)))
@@ -139,14 +141,14 @@ def changed(row: int, old: str, new: str) -> list[str]:
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        ([], "the file is empty; its first line should name the columns"),
+        ([], "the file is empty; expected column names in its first line"),
         (["", "  "], "the file is empty"),
-        (REST_ROWS[:1], ": no rows below the names of the columns"),
+        (REST_ROWS[:1], ": no rows after the column names"),
         (
             changed(0, "x_mm,y_mm", "x_m,y_m"),
             ":1: x_m: lengths have one unit in a file, and commanded",
         ),
-        (changed(0, ",y_mm", ",y_m"), ":1: y_m: lengths have one unit in a file, and commanded_x_mm has another"),
+        (changed(0, ",y_mm", ",y_m"), ":1: y_m: lengths must have one unit in a file, but commanded_x_mm has another"),
         (
             changed(0, "commanded_x_mm", "comanded_x_mm"),
             "no such column. Did you mean 'commanded_x_mm'? Known: ",
@@ -160,15 +162,15 @@ def changed(row: int, old: str, new: str) -> list[str]:
             ":1: pose: expected a column pose or a column path",
         ),
         (["a,b", "1,2"], ":1: a: no such column. Known: pose, path, t_s, commanded_x_mm"),
-        (changed(2, ",150.1", ""), ":3: expected 5 values, as there are columns, got 4"),
-        (changed(1, "-150.1", "-150,1"), ":2: expected 5 values, as there are columns, got 6; is there a comma"),
+        (changed(2, ",150.1", ""), ":3: expected 5 values, one per column, got 4"),
+        (changed(1, "-150.1", "-150,1"), ":2: expected 5 values, one per column, got 6; is there a comma"),
         (changed(2, "150.1", "nan"), ":3: x_mm: every number must be finite and no larger than 1e+100, got nan"),
         (changed(2, "150.1", "inf"), ":3: x_mm: every number must be finite and no larger than 1e+100, got inf"),
         (changed(2, "150.1", "-"), ":3: x_mm: expected a number, got '-'"),
         ([*REST_ROWS, "P1,-140,-700,-140.1,-700.5"], ":2: P1: this pose is commanded at different positions"),
         ([row.replace("_mm", "_m") for row in REST_ROWS], "is 509.9 m from its commanded position"),
         (changed(2, "150.1", "-150.1"), ":3: P2: the tip is 300.1 mm from its commanded position; are"),
-        (changed(1, "P1", ""), ":2: pose: empty; expected a word"),
+        (changed(1, "P1", ""), ":2: pose: empty; expected a name"),
         ([*REST_ROWS, "P1," + "7" * 200_000 + ",0,0,0"], "not valid CSV: field larger than field limit"),
     ],
 )
@@ -222,7 +224,7 @@ def test_mistakes_on_paths(rows: list[str], message: str, tmp_path: Path) -> Non
 
 
 def test_no_such_file(tmp_path: Path) -> None:
-    """A file that is not there is said not to be."""
+    """A file that does not exist is said not to be."""
     with pytest.raises(FileFormatError, match="no such file"):
         read_measured(tmp_path / "none.csv")
 
@@ -251,7 +253,7 @@ def test_tracker_export(tmp_path: Path) -> None:
     rows += [row.replace(",", ";").replace(".", ",") for row in [*REST_ROWS[1:], "P2,150,-700,,-700.5"]]
 
     with pytest.warns(
-        IncompleteRowsWarning, match=r"1 row left out for empty cells, 2 read: X measured \[mm\] in line 4"
+        IncompleteRowsWarning, match=r"1 row omitted because of empty cells, 2 read: X measured \[mm\] in line 4"
     ):
         measurement = read_measured(written(tmp_path / "rest.csv", rows), columns={"pkt": "pose"}, skip_incomplete=True)
 

@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, positive
 from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement
 from armwright.clearance.estimation.misfit import refuse_contradiction
 from armwright.clearance.estimation.model_errors import ModelError, model_errors
@@ -19,7 +19,7 @@ from armwright.clearance.estimation.on_paths import SweepSurrogate, surrogate_fr
 from armwright.clearance.estimation.posterior import Posterior, posterior
 from armwright.clearance.estimation.static import Estimate
 from armwright.clearance.linkage import Linkage
-from armwright.errors import FileFormatError, InvalidValueError, TooFewError
+from armwright.errors import FileFormatError, TooFewError
 from armwright.files.inputs import read_text
 from armwright.files.result_table import ResultTable
 
@@ -143,7 +143,7 @@ def assess_rest(linkage: Linkage, measured: RestMeasurement, noise: float | None
         TooFewError: the poses do not determine all clearances.
     """
     if noise is not None:
-        _check_noise(noise)
+        positive(noise, "noise", "m")
     estimate = measured.estimate(linkage, noise)
     noise_is_known = bool(noise or measured.noise)
     largest = float(estimate.values.max())
@@ -201,7 +201,7 @@ def assess_paths(
         FileFormatError: the folder has no results of a sweep.
         ContradictionError: no clearances explain the features.
     """
-    _check_noise(noise)
+    positive(noise, "noise", "m")
     sweep = surrogate_from_sweep(folder, linkage, tuple(measured.times), _FEATURES, progress)
     names = sweep.surrogate.features
     covariance = measured.feature_covariance(names, noise)
@@ -260,11 +260,6 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
             f"unknown clearance: measure more poses or paths, or give --clearance"
         )
     return np.maximum(draws, _SMALLEST)
-
-
-def _check_noise(noise: float) -> None:
-    if not 0 < noise < math.inf:
-        raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise * 1e6:g} µm")
 
 
 def _parameters(fit: Estimate | Posterior, mean: Array, identifiable: Mapping[str, bool]) -> dict[str, dict[str, Any]]:

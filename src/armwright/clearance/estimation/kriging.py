@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
-from armwright.arrays import Array, ArrayLike, floats, one_core
+from armwright.arrays import Array, ArrayLike, exact_shape, floats, one_core
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 from armwright.extras import import_extra
 
@@ -148,8 +148,6 @@ def learn(
     *,
     spreads: ArrayLike | None = None,
     ranges: ArrayLike | None = None,
-    seed: int = 0,
-    restarts: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> Surrogate:
     """Learn features from simulations.
@@ -162,8 +160,6 @@ def learn(
         spreads: (m, f) their standard deviations over indistinguishable runs, which a single measured run has too;
             none when left out.
         ranges: (k, 2) of the design; by default those of the points, which are a little narrower.
-        seed: of the choice of points where there are more than ``MAX_POINTS``.
-        restarts: how often the length scales are fitted again from another start.
         progress: called with the name of each feature before it is learnt.
 
     Raises:
@@ -179,7 +175,7 @@ def learn(
         )
     if deviations is not None and deviations.shape != y.shape:
         raise ShapeError(f"spreads: expected {y.shape}, as the values, got {deviations.shape}")
-    rows = _training_rows(y, 4 * (len(parameters) + 1), seed)
+    rows = _training_rows(y, 4 * (len(parameters) + 1))
     lower, upper = _ranges(x[rows], ranges)
     for name, low, high in zip(parameters, lower, upper, strict=True):
         if not low < high:
@@ -189,7 +185,7 @@ def learn(
     for i, name in enumerate(features):
         if progress is not None:
             progress(name)
-        processes.append(_fitted(unit, y[rows, i], seed, restarts))
+        processes.append(_fitted(unit, y[rows, i]))
     correlation = np.atleast_2d(np.corrcoef(np.stack([process.leave_one_out() for process in processes])))
     return Surrogate(
         parameters=tuple(parameters),
@@ -214,9 +210,7 @@ def solve_features(surrogate: Surrogate, measured: ArrayLike, weights: ArrayLike
     Raises:
         ShapeError: the features are not f.
     """
-    goal = floats(measured, "measured")
-    if goal.shape != (len(surrogate.features),):
-        raise ShapeError(f"measured: expected {len(surrogate.features)} features, got shape {goal.shape}")
+    goal = exact_shape(measured, (len(surrogate.features),), "measured features")
     width = surrogate.upper - surrogate.lower
     middle = (surrogate.lower + surrogate.upper)[None] / 2
     scale = surrogate.predict(middle)[1][0] if weights is None else floats(weights, "weights")
@@ -240,7 +234,7 @@ def solve_features(surrogate: Surrogate, measured: ArrayLike, weights: ArrayLike
     return np.asarray(surrogate.lower + best.x * width, dtype=np.float64)
 
 
-def _training_rows(y: Array, least: int, seed: int) -> npt.NDArray[np.intp]:
+def _training_rows(y: Array, least: int) -> npt.NDArray[np.intp]:
     """Return the numbers of the rows (m, f) to learn from: those without NaN, at most ``MAX_POINTS``.
 
     Raises:
@@ -250,7 +244,7 @@ def _training_rows(y: Array, least: int, seed: int) -> npt.NDArray[np.intp]:
     if len(rows) < least:
         raise TooFewError(f"points: expected {least} or more simulations that finished, got {len(rows)}")
     if len(rows) > MAX_POINTS:
-        rows = np.sort(np.random.default_rng(seed).choice(rows, MAX_POINTS, replace=False))
+        rows = np.sort(np.random.default_rng(0).choice(rows, MAX_POINTS, replace=False))
     return rows
 
 
@@ -264,9 +258,7 @@ def _ranges(x: Array, ranges: ArrayLike | None) -> tuple[Array, Array]:
     low, high = x.min(axis=0), x.max(axis=0)
     if ranges is None:
         return low, high
-    ends = floats(ranges, "ranges")
-    if ends.shape != (x.shape[1], 2):
-        raise ShapeError(f"ranges: expected shape {(x.shape[1], 2)}, got {ends.shape}")
+    ends = exact_shape(ranges, (x.shape[1], 2), "ranges")
     if np.any(low < ends[:, 0]) or np.any(high > ends[:, 1]):
         raise InvalidValueError("ranges: a point lies outside of them")
     return ends[:, 0], ends[:, 1]
@@ -281,7 +273,7 @@ def check_extra() -> None:
     import_extra("sklearn.gaussian_process", "learning from simulations", "clearance", "scikit-learn")
 
 
-def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
+def _fitted(unit: Array, y: Array) -> Process:
     check_extra()
     from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - an extra
     from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
@@ -290,7 +282,7 @@ def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
     kernel = ConstantKernel(10.0, _AMPLITUDE) * RBF([1.0] * unit.shape[1], _LENGTHS) + WhiteKernel(1e-5, _NOISE)
     # Scaled here, since the predictions scale back here too.
     mean, scale = float(y.mean()), float(y.std()) or 1.0
-    process = GaussianProcessRegressor(kernel, n_restarts_optimizer=restarts, random_state=seed)
+    process = GaussianProcessRegressor(kernel, random_state=0)
     with warnings.catch_warnings(), one_core():
         # A length at its bound is a feature that hardly depends on a parameter.
         warnings.simplefilter("ignore", ConvergenceWarning)

@@ -43,6 +43,8 @@ _LARGEST = 0.02
 LEAST_NOISE = 1e-6
 # The smallest number of samples of a measured path, and the part of the path that they must cover.
 _MIN_COUNT, _COVERAGE = 20, 0.99
+# How often noise is drawn for the covariance of features.
+_DRAWS = 200
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -119,19 +121,17 @@ class PathMeasurement:
         curves = self.features()
         return np.array([getattr(curves[path], feature) for path, feature in (name.split("_", 1) for name in names)])
 
-    def feature_covariance(self, names: tuple[str, ...], noise: float, *, draws: int = 200, seed: int = 0) -> Array:
+    def feature_covariance(self, names: tuple[str, ...], noise: float) -> Array:
         """Return the covariance (f, f) of features ``path_feature`` that the noise of the samples causes.
 
         Args:
             names: of the features.
             noise: standard deviation of one coordinate of a sample [m].
-            draws: how often noise is drawn.
-            seed: of the draws.
         """
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(0)
         columns: dict[str, Array] = {}
         for path, error in self.errors.items():
-            drawn = features_of(self.times[path], error + noise * rng.standard_normal((draws, *error.shape)))
+            drawn = features_of(self.times[path], error + noise * rng.standard_normal((_DRAWS, *error.shape)))
             columns |= {f"{path}_{feature}": values for feature, values in drawn._asdict().items()}
         table = np.stack([columns[name] for name in names], axis=-1)
         return np.atleast_2d(np.cov(table, rowvar=False))

@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 from scipy.optimize import nnls
 
-from armwright.arrays import Array, ArrayLike, Flags, floats
+from armwright.arrays import Array, ArrayLike, Flags, floats, positive
 from armwright.clearance.estimation.misfit import p_value, widening
 from armwright.clearance.ideal import closed, ideal_motion, sensitivity, tip_of
 from armwright.clearance.linkage import Linkage
@@ -182,8 +182,7 @@ def estimate_at_rest(
         raise ShapeError(
             f"expected (k, 2) poses and as many offsets, got shapes {positions.shape} and {measured.shape}"
         )
-    if not 0 < noise < np.inf:
-        raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
+    positive(noise, "noise", "m")
     counts = np.broadcast_to(floats(readings, "readings"), len(positions))
     if not np.all(counts >= 1):
         raise InvalidValueError(f"readings: expected at least 1 of each pose, got {counts.min():g}")
