@@ -2,12 +2,13 @@
 
 import json
 import tomllib
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from hypothesis import given, strategies as st
 
-from armwright.files.lines import Keys, TwinKeyError, json_lines, toml_lines
+from armwright.files.lines import Keys, Line, TwinKeyError, json_lines, toml_lines
 
 # Names that need quotes, name nothing or look like something else; a number makes each unique.
 WORDS = ("mass_kg", "a-b", "12", "true", "", "a b", "x.y", "[t]", "k = 1", "#no", "it's", 'say "q"', "tab\t", "é", "\\")
@@ -35,6 +36,16 @@ SCALARS = (
     "{}",
     "[]",
 )
+
+
+def every_line(tree: Line, keys: Keys = ()) -> Iterator[tuple[Keys, int]]:
+    """Give the way to every value with its line."""
+    for key, below in tree.below.items():
+        if isinstance(below, Line):
+            yield (*keys, key), below.line
+            yield from every_line(below, (*keys, key))
+        else:
+            yield (*keys, key), below
 
 
 class Writer:
@@ -147,7 +158,7 @@ def test_lines_of_toml(data: st.DataObject) -> None:
         writer.section()
     writer.blank()
 
-    found = dict(toml_lines(writer.text).all())
+    found = dict(every_line(toml_lines(writer.text)))
 
     assert found == writer.lines
     assert set(found) == set(entries(tomllib.loads(writer.text)))
@@ -166,7 +177,7 @@ def test_arm_file() -> None:
     """A table below the second of two [[joint]] belongs to that one."""
     text = 'title = "two"\n\n[[joint]]\nd_m = 1\n[joint.link]\nmass_kg = 1\n[[joint]]\n[joint.link]\nmass_kg = 2\n'
 
-    lines = dict(toml_lines(text).all())
+    lines = dict(every_line(toml_lines(text)))
 
     assert lines["joint", 0] == 3
     assert lines["joint", 0, "link", "mass_kg"] == 6
@@ -203,13 +214,13 @@ def test_lines_of_json(value: dict[str, Any], indent: int, ascii_only: bool) -> 
     lines: dict[Keys, int] = {}
     one_entry_a_line(value, (), 1, lines)
 
-    assert dict(json_lines(json.dumps(value, indent=indent, ensure_ascii=ascii_only)).all()) == lines
+    assert dict(every_line(json_lines(json.dumps(value, indent=indent, ensure_ascii=ascii_only)))) == lines
 
 
 @given(st.dictionaries(st.text(), json_values, max_size=5))
 def test_json_in_one_line(value: dict[str, Any]) -> None:
     """Everything in a JSON text of one line stands in line 1."""
-    assert dict(json_lines(json.dumps(value)).all()) == dict.fromkeys(entries(value), 1)
+    assert dict(every_line(json_lines(json.dumps(value)))) == dict.fromkeys(entries(value), 1)
 
 
 def test_twin_keys() -> None:

@@ -30,7 +30,7 @@ class TwinKeyError(Exception):
 
     def __init__(self, keys: Keys, line: int) -> None:
         """Keep the way to the key, and the line of the second."""
-        super().__init__(f"{keys} is given twice, again in line {line}")
+        super().__init__(f"{keys} occurs twice, again in line {line}")
         self.keys, self.line = keys, line
 
 
@@ -69,15 +69,6 @@ class Line:
         if not isinstance(found, Line):
             found = self.below[key] = Line(line if found is None else found)
         return found
-
-    def all(self, keys: Keys = ()) -> Iterator[tuple[Keys, int]]:
-        """Give every way from here with its line."""
-        for key, below in self.below.items():
-            if isinstance(below, int):
-                yield (*keys, key), below
-            else:
-                yield (*keys, key), below.line
-                yield from below.all((*keys, key))
 
 
 def longest_dotted_key(text: str) -> int:
