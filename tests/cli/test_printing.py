@@ -9,7 +9,8 @@ import typer
 from rich.console import Console
 
 from armwright.cli.numbers import named_numbers, numbers, within
-from armwright.cli.output import command_line, print_json, print_table, table
+from armwright.cli.output import command_line, print_json, print_result_table
+from armwright.files.result_table import ResultTable
 
 TEXT = {"name": "Gelenk für die Hand", "µm": [1.5, None]}
 
@@ -37,7 +38,9 @@ def test_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_numbers_stay_whole(width: int) -> None:
     """On a narrow terminal a table is folded between words, and every number and every word stands in one piece."""
     console = Console(file=io.StringIO(), width=width, markup=False, highlight=False)
-    print_table(console, table(("joint", "N m", "of its limit"), [("left shoulder", "123456789.5", "± 97.25")]))
+    row = ("left shoulder", "123456789.5", "± 97.25")
+    heads = ("joint", "N m", "of its limit")
+    print_result_table(console, ResultTable(title="", heads=heads, rows=[row], numbers=(1, 2)))
 
     shown = console.file.getvalue()
     words = ("joint", "left", "shoulder", "123456789.5", "97.25", "limit")
@@ -48,7 +51,8 @@ def test_numbers_stay_whole(width: int) -> None:
 def test_words_left_numbers_right() -> None:
     """Words begin at the left, numbers end at the right."""
     console = Console(file=io.StringIO(), width=80, markup=False, highlight=False)
-    console.print(table(("pose", "mm"), [("A", "1.5"), ("station", "10.25")]))
+    rows = [("A", "1.5"), ("station", "10.25")]
+    print_result_table(console, ResultTable(title="", heads=("pose", "mm"), rows=rows, numbers=(1,)))
 
     rows = [line.rstrip() for line in console.file.getvalue().splitlines() if "." in line]
     assert [row.split() for row in rows] == [["A", "1.5"], ["station", "10.25"]]

@@ -104,7 +104,7 @@ def _assessed(
         assessment = assess(tests, few=few, band=None if band_mm is None else band_mm * 1e-3, corners=corners_mm * 1e-3)
         return assessment.within({symbol: _in_si(assessment, *bound) for symbol, bound in bounds.items()})
     except TooFewError as error:
-        raise TooFewError(str(error).replace("few=True takes", "--few takes")) from error
+        raise TooFewError(str(error).replace("few=True", "--few")) from error
 
 
 def _bounds(texts: list[str]) -> dict[str, Named]:

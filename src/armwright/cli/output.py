@@ -1,8 +1,9 @@
 """Output of the commands: JSON, tables, and the command line for the record."""
 
+import itertools
 import json
 import sys
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from armwright.cli.terminal import console
@@ -11,8 +12,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
 
     from armwright.files.result_table import Result, ResultTable
 
@@ -38,9 +37,9 @@ def print_json(data: Any) -> None:
     print(json.dumps(data, indent=2, ensure_ascii=not is_unicode))
 
 
-def plain_console() -> "Console":
-    """Return a console that does not highlight."""
-    return console(highlight=False)
+def plain_console(**settings: Any) -> "Console":
+    """Return a console that does not highlight; its arguments are those of ``console``."""
+    return console(highlight=False, **settings)
 
 
 def print_result(
@@ -70,64 +69,33 @@ def print_result(
         console = plain_console()
         for shown in result.tables():
             if shown.rows:
-                _print_result_table(console, shown)
+                print_result_table(console, shown)
         for note in result.notes:
             console.print(note, soft_wrap=not wrap)
         if output is not None:
             print(f"{file.partition('.')[0]}: {output / file}")
 
 
-def _print_result_table(console: "Console", result: "ResultTable") -> None:
-    from rich.text import Text
-
-    words = [i for i in range(len(result.heads)) if i not in result.numbers]
-    rows = [
-        [Text(text, style="bold red" if (i, k) in result.exceeded else "") for k, text in enumerate(row)]
-        for i, row in enumerate(result.rows)
-    ]
-    shown = table(result.heads, rows, title=result.title or None, words=words)
-    for row, mark in zip(shown.rows, result.marks, strict=False):
-        row.style = "bold red" if mark == "over" else None
-    for i in result.section_ends:
-        shown.rows[i].end_section = True
-    print_table(console, shown)
-    if result.remark:
-        console.print(result.remark)
-
-
-def print_table(console: "Console", shown: "Table") -> None:
+def print_result_table(console: "Console", result: "ResultTable") -> None:
     """Print a table; on a narrow terminal its cells are folded between words, but never within a number.
 
     A wider table exceeds the width of the terminal, which then breaks the lines; in a file they stay unbroken.
     """
-    room = console.options.update(max_width=_WIDEST)
-    for column in shown.columns:
-        longest = max(console.measure(text, options=room).minimum for text in (column.header, *column.cells))
-        column.min_width = max(longest, column.min_width or 0)
-    console.print(shown, crop=False)
-
-
-def table(
-    columns: Sequence[str],
-    rows: "Iterable[Sequence[str | Text]]" = (),
-    *,
-    title: str | None = None,
-    words: Collection[int] = (0,),
-) -> "Table":
-    """Return a table for a terminal, to be printed by ``print_table``.
-
-    Args:
-        columns: names of the columns.
-        rows: texts of each row.
-        title: title above the table.
-        words: indices of columns with words; the others hold numbers and are aligned right.
-    """
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
-    made = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    for index, name in enumerate(columns):
-        made.add_column(name, justify="left" if index in words else "right", overflow="fold")
-    for row in rows:
-        made.add_row(*row)
-    return made
+    table = Table(
+        title=result.title or None, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False
+    )
+    for index, head in enumerate(result.heads):
+        table.add_column(head, justify="right" if index in result.numbers else "left", overflow="fold")
+    for i, (row, mark) in enumerate(itertools.zip_longest(result.rows, result.marks)):
+        cells = [Text(text, style="bold red" if (i, k) in result.exceeded else "") for k, text in enumerate(row)]
+        table.add_row(*cells, style="bold red" if mark == "over" else None, end_section=i in result.section_ends)
+    room = console.options.update(max_width=_WIDEST)
+    for column in table.columns:
+        column.min_width = max(console.measure(text, options=room).minimum for text in (column.header, *column.cells))
+    console.print(table, crop=False)
+    if result.remark:
+        console.print(result.remark)

@@ -8,24 +8,21 @@ import typer
 
 from armwright.cli.numbers import within
 from armwright.cli.options import Json, OutputFolder, QuietButWarnings
-from armwright.cli.output import command_line, plain_console, print_json, print_table, table
+from armwright.cli.output import command_line, plain_console, print_json, print_result, print_result_table
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, read_cell_option
 from armwright.cli.progress import waiting
-from armwright.errors import ExitStatus, counted
+from armwright.errors import ExitStatus
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from rich.table import Table
-    from rich.text import Text
 
     from armwright.cell.model import Cell
     from armwright.program import Source
     from armwright.program.bytecode.instructions import Code
     from armwright.program.language.diagnostic import Diagnostic
     from armwright.program.vm.interpreter import Limits, RunError
-    from armwright.program.vm.recording import Effect, Recording, RunStage
+    from armwright.program.vm.recording import Recording
     from armwright.report.files import Origin
 
 
@@ -121,30 +118,28 @@ def _finish(
     from armwright.cli.results import write_results
     from armwright.program.vm.excerpt import KEPT, NOT_KEPT
     from armwright.program.vm.interpreter import warnings
-    from armwright.report.files import ending, left_out, result_files, run_record, summary
+    from armwright.report.files import left_out, result_files, run_record
+    from armwright.report.run_summary import RunSummary, frame_table
 
     failed = () if error is None else (error.diagnostic,)
     diagnostics = (*compiler_diagnostics, *warnings(recording.stages, recording.cell), *failed)
+    result = RunSummary(recording=recording, diagnostics=diagnostics, hint=KEPT if output else NOT_KEPT)
     notes = left_out(recording, origin.motion_rows) if output is not None else ()
     if output is not None:
         results = (recording, diagnostics, origin)
         write_results(output, result_files(*results), run_record(*results))
     if as_json:
-        data = summary(recording, diagnostics, KEPT if output else NOT_KEPT)
         folder = {"output": str(output)} if output else {}
         frames = {"time": error.time, "frames": _frame_positions(error)} if error else {}
-        print_json({**ending(recording), **data, **folder, "left_out": notes, **frames})
+        print_json({**result.as_data(), **folder, "left_out": notes, **frames})
     else:
         if diagnostics:
             print_diagnostics(diagnostics, recording.code.source)
         for note in notes:
             print(f"armwright: {note}", file=sys.stderr)
+        print_result(result, as_json=False, quiet=quiet)
         if error is not None:
-            if not quiet:
-                print_table(plain_console(), _trace_table(recording, KEPT if output else NOT_KEPT))
-            _print_frames(error, recording.code)
-        elif not quiet:
-            _print_summary(recording, KEPT if output else NOT_KEPT)
+            print_result_table(plain_console(stderr=True), frame_table(error, recording.code))
         if output is not None and (error is not None or not quiet):
             # On a line of its own and not wrapped, so that it can be clicked or copied.
             print(f"report{' up to the failure' if error else ''}: {output / 'report.html'}")
@@ -226,93 +221,3 @@ def _frame_positions(error: "RunError") -> dict[str, list[float] | None]:
     """Return the positions of all frames in the world [m] when a program failed; None for a frame without a value."""
     tree = error.tree
     return {name: tree.world(name)[:3, 3].tolist() if tree.has_value(name) else None for name in tree}
-
-
-def _print_summary(recording: "Recording", hint: str) -> None:
-    from armwright.program.vm.excerpt import ON_A_TERMINAL, listed
-
-    console = plain_console()
-    print_table(console, _trace_table(recording, hint))
-    if recording.stages:
-        print_table(console, _stage_table(recording, hint))
-    slowed = [
-        f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.to[-1]} runs {run.stage.slowed}"
-        for run in recording.stages
-        if run.stage.slowed
-    ]
-    for text in listed(slowed, ON_A_TERMINAL, hint):
-        console.print(text)
-    moves = sum(effect.kind == "MOVE" for effect in recording.effects)
-    console.print(
-        f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {counted(moves, 'move')}, "
-        f"{counted(len(recording.stages), 'stage')}, "
-        f"{counted(len(recording.streams[0].t) if recording.streams else 0, 'servo tick')}"
-    )
-    console.print("Collisions are not checked.")
-
-
-def _trace_table(recording: "Recording", hint: str) -> "Table":
-    from rich.text import Text
-
-    from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more, one_line
-
-    several = len(recording.processes) > 1
-
-    def row(effect: "Effect") -> "tuple[str | Text, ...]":
-        line = Text(str(recording.code.source.line(effect.span.start)), style="dim")
-        end = f"{effect.t1:.3f}" if effect.t1 > effect.t0 else ""
-        return (line, f"{effect.t0:.3f}", end, *((effect.process,) if several else ()), one_line(effect.text, hint))
-
-    effects = excerpt([effect for effect in recording.effects if effect.kind != "PLACE"], ON_A_TERMINAL)
-    names = ("line", "from s", "to s", *(("process",) if several else ()), "effect")
-    omitted = (*[""] * (len(names) - 1), more(effects.left_out, hint))
-    return table(names, effects.mapped(row).joined(omitted), words=range(3, len(names)))
-
-
-def _stage_table(recording: "Recording", hint: str) -> "Table":
-    from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
-
-    def row(stage: "RunStage") -> "tuple[str | Text, ...]":
-        deviation = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
-        line = str(recording.code.source.line(stage.span.start))
-        title = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}{', stopped' if stage.stopped else ''}"
-        start, duration, length = f"{stage.t0:.3f}", f"{stage.duration:.3f}", f"{stage.length * 1e3:.0f}"
-        return (line, title, start, duration, length, deviation, *_peaks(stage, recording))
-
-    stages = excerpt(recording.stages, ON_A_TERMINAL).mapped(row)
-    names = ("line", "stage", "from s", "s", "mm", "deviation mm", "peak speed", "peak effort")
-    return table(names, stages.joined(("", more(stages.left_out, hint), *[""] * 6)), words=(1,))
-
-
-def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
-    """Return the largest shares of the limits of speed and effort, with the joints that have them."""
-    from rich.text import Text
-
-    arm = recording.cell.arms[stage.arm].arm
-    shares = stage.motion.peaks(1) / arm.limits.speed, stage.peak_effort / arm.limits.effort
-    texts = []
-    for share in shares:
-        joint = int(share.argmax())
-        over = share[joint] > 1 + 1e-9
-        texts.append(Text(f"{share[joint] * 100:.0f} % j{joint + 1}", style="bold red" if over else ""))
-    return texts
-
-
-def _print_frames(error: "RunError", code: "Code") -> None:
-    """Print the positions of all frames when a program failed."""
-    from armwright.cell.frames import WORLD
-    from armwright.cli.terminal import console
-    from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
-
-    def row(name: str) -> tuple[str, ...]:
-        parent = (error.tree.parent(name) or WORLD).removesuffix(".BASE")
-        position = "no value yet"
-        if error.tree.has_value(name):
-            position = ", ".join(f"{x * 1e3:z.1f}" for x in error.tree.world(name)[:3, 3])
-        return code.spelled(name), "its base" if parent == name else code.spelled(parent), position
-
-    frames = excerpt([name for name in error.tree if name != WORLD and not name.endswith(".BASE")], ON_A_TERMINAL)
-    omitted = (more(frames.left_out, "all in frames.json of `-o FOLDER`"), "", "")
-    columns = ("frame", "parent", "x, y, z in the world, mm")
-    shown = table(columns, frames.mapped(row).joined(omitted), title=f"frames at {error.time:.3f} s", words=(0, 1))
-    console(stderr=True).print(shown)

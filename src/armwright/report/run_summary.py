@@ -1,0 +1,123 @@
+"""The summary of a run: its trace, its stages, and where the frames were when it failed."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import attrs
+
+from armwright.cell.frames import WORLD
+from armwright.errors import counted
+from armwright.files.result_table import ResultTable
+from armwright.program.bytecode.instructions import Code
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.vm.excerpt import ON_A_TERMINAL, Excerpt, excerpt, listed, more, one_line
+from armwright.program.vm.interpreter import RunError
+from armwright.program.vm.recording import Effect, Recording, RunStage
+from armwright.report.files import ending, summary
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class RunSummary:
+    """The summary of a run, also of one that failed.
+
+    Attributes:
+        recording: the recording of the run.
+        diagnostics: diagnostics of compilation and run, with the error that ended it.
+        hint: note on the omitted lines of a trace that is too long.
+    """
+
+    recording: Recording
+    diagnostics: Sequence[Diagnostic]
+    hint: str
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The stages that were slowed, and the numbers of the run; none if it failed."""
+        recording = self.recording
+        if recording.failure is not None:
+            return ()
+        slowed = [
+            f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.to[-1]} runs "
+            f"{run.stage.slowed}"
+            for run in recording.stages
+            if run.stage.slowed
+        ]
+        moves = sum(effect.kind == "MOVE" for effect in recording.effects)
+        ticks = len(recording.streams[0].t) if recording.streams else 0
+        numbers = (
+            f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, "
+            f"{counted(moves, 'move')}, {counted(len(recording.stages), 'stage')}, {counted(ticks, 'servo tick')}"
+        )
+        return (*listed(slowed, ON_A_TERMINAL, self.hint), numbers, "Collisions are not checked.")
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the summary as plain data in SI units."""
+        return {**ending(self.recording), **summary(self.recording, self.diagnostics, self.hint)}
+
+    def tables(self) -> Iterator[ResultTable]:
+        """Yield the trace and, of a run that finished, its stages."""
+        yield self._trace()
+        if self.recording.failure is None:
+            yield self._stages()
+
+    def _trace(self) -> ResultTable:
+        recording = self.recording
+        several = len(recording.processes) > 1
+
+        def row(effect: Effect) -> tuple[str, ...]:
+            end = f"{effect.t1:.3f}" if effect.t1 > effect.t0 else ""
+            times = str(recording.code.source.line(effect.span.start)), f"{effect.t0:.3f}", end
+            return (*times, *((effect.process,) if several else ()), one_line(effect.text, self.hint))
+
+        effects = excerpt([effect for effect in recording.effects if effect.kind != "PLACE"], ON_A_TERMINAL)
+        heads = ("line", "from s", "to s", *(("process",) if several else ()), "effect")
+        omitted = (*[""] * (len(heads) - 1), more(effects.left_out, self.hint))
+        return ResultTable(title="", heads=heads, rows=effects.mapped(row).joined(omitted), numbers=(0, 1, 2))
+
+    def _stages(self) -> ResultTable:
+        stages: Excerpt[RunStage | None] = excerpt(self.recording.stages, ON_A_TERMINAL)
+        rows: list[tuple[str, ...]] = []
+        exceeded: list[tuple[int, int]] = []
+        for run in stages.joined(None):
+            if run is None:
+                rows.append(("", more(stages.left_out, self.hint), *[""] * 6))
+                continue
+            stage, limits = run.stage, self.recording.cell.arms[run.arm].arm.limits
+            peaks = []
+            for column, shares in ((6, run.motion.peaks(1) / limits.speed), (7, run.peak_effort / limits.effort)):
+                joint = int(shares.argmax())
+                peaks.append(f"{shares[joint] * 100:.0f} % j{joint + 1}")
+                if shares[joint] > 1 + 1e-9:
+                    exceeded.append((len(rows), column))
+            title = f"{run.arm} {stage.kind} {' '.join(run.to)}{', stopped' if run.stopped else ''}"
+            numbers = f"{run.t0:.3f}", f"{run.duration:.3f}", f"{run.length * 1e3:.0f}"
+            deviation = "" if stage.deviation is None else f"{stage.deviation * 1e3:.3f}"
+            line = str(self.recording.code.source.line(run.span.start))
+            rows.append((line, title, *numbers, deviation, *peaks))
+        return ResultTable(
+            title="",
+            heads=("line", "stage", "from s", "s", "mm", "deviation mm", "peak speed", "peak effort"),
+            rows=rows,
+            numbers=(0, 2, 3, 4, 5, 6, 7),
+            exceeded=exceeded,
+        )
+
+
+def frame_table(error: RunError, code: Code) -> ResultTable:
+    """Return the positions of all frames when a program failed [mm]."""
+
+    def row(name: str) -> tuple[str, ...]:
+        parent = (error.tree.parent(name) or WORLD).removesuffix(".BASE")
+        position = "no value yet"
+        if error.tree.has_value(name):
+            position = ", ".join(f"{x * 1e3:z.1f}" for x in error.tree.world(name)[:3, 3])
+        return code.spelled(name), "its base" if parent == name else code.spelled(parent), position
+
+    frames = excerpt([name for name in error.tree if name != WORLD and not name.endswith(".BASE")], ON_A_TERMINAL)
+    omitted = (more(frames.left_out, "all in frames.json of `-o FOLDER`"), "", "")
+    return ResultTable(
+        title=f"frames at {error.time:.3f} s",
+        heads=("frame", "parent", "x, y, z in the world, mm"),
+        rows=frames.mapped(row).joined(omitted),
+        numbers=(2,),
+    )
