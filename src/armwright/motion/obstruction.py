@@ -14,7 +14,8 @@ from armwright.kinematics.inverse_kinematics.solution import InverseSolution, Ou
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.singularity_analysis import singularities
-from armwright.motion.chain import Step, missed, on_one_branch, step_by_step
+from armwright.motion.chain import Step, chain, missed, on_one_branch, step_by_step
+from armwright.motion.path import Path
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 
@@ -71,8 +72,8 @@ class Obstruction(NamedTuple):
         time: when, on the motion of the tool that is followed [s].
         joint: number of the joint, from 1; None where it is no single one.
         reason: what happens there, in words.
-        velocity_ratio: how many times as fast as it may the joint would have to move; None where something else stops
-            it.
+        velocity_ratio: how many times as fast as its limit the joint would have to move; None where something else
+            stops it.
         near: the singularity that makes it so fast.
         blamed: numbers of all joints that it makes fast, in parts of their limits.
     """
@@ -124,8 +125,8 @@ def cause_of(solution: InverseSolution) -> Cause:
 
 
 def too_fast(arm: Arm, joint: int, ratio: float) -> str:
-    """Say that a joint, from 1, would have to move so many times as fast as it may."""
-    how = "at once" if ratio > _AT_ONCE else f"{ratio:.0f} times as fast as it may"
+    """Say that a joint, from 1, would have to move so many times as fast as its limit."""
+    how = "at once" if ratio > _AT_ONCE else f"{ratio:.0f} times as fast as its limit"
     return f"{arm.called(joint - 1)} would have to move {how}"
 
 
@@ -136,7 +137,7 @@ def singular(arm: Arm, q: Array, times: Array, ratios: Array) -> Obstruction:
         arm: the arm, with n joints.
         q: (2, n) the configurations.
         times: (2,) when they are passed [s].
-        ratios: (n,) how many times as fast as it may each joint would have to move from one to the other.
+        ratios: (n,) how many times as fast as its limit each joint would have to move from one to the other.
     """
     index = int(np.argmin([singularities(arm, each).singular_values[-1] for each in q]))
     joint, ratio, near = int(ratios.argmax()) + 1, float(ratios.max()), nearest_singularity(arm, q[index])
@@ -221,3 +222,19 @@ def _idlest(arm: Arm, q: Array) -> int:
     speed = arm.limit("speed")
     idle = np.linalg.svd(jacobian(arm, q))[2][-1]
     return int((np.abs(idle) / np.where(np.isfinite(speed), speed, 1.0)).argmax()) + 1
+
+
+def check_ends(solver: Solver, path: Path, q_start: Array) -> None:
+    """Refuse a path to a pose that no joint configuration reaches, with ``fraction`` 1 of the path that leads there.
+
+    Raises:
+        PathError: a pose is out of reach, or has no configuration inside the joint limits.
+    """
+    arm = solver.arm
+    q, failed = chain(solver, path.poses, q_start)
+    for segment, X in enumerate(path.poses[1:]):
+        if (failed is None or segment + 1 < failed) and not violations(arm, q[segment + 1]):
+            continue
+        solution = inverse(arm, X)
+        if not solution.allowed:
+            raise PathError(cause_of(solution), segment, 1.0, solution.explain())

@@ -15,8 +15,7 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified_motion import joined
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
-from armwright.motion.ends import check_ends
-from armwright.motion.obstruction import Cause, PathError, cause_of
+from armwright.motion.obstruction import Cause, PathError, cause_of, check_ends
 from armwright.motion.path import Path
 from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.rounded_corners import rounded_move

@@ -25,10 +25,9 @@ from armwright.motion.blends import MISS
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified_motion import CertifiedMotion, certificate_of, joined, standstill
 from armwright.motion.chain import chain
+from armwright.motion.deviation import farthest_from_legs
 from armwright.motion.efforts import slowing_for_efforts
-from armwright.motion.ends import check_ends
-from armwright.motion.leg_distance import farthest_from_legs
-from armwright.motion.obstruction import MAX_SLOWDOWN, PathError
+from armwright.motion.obstruction import MAX_SLOWDOWN, PathError, check_ends
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import COARSE, coarse_line
@@ -279,7 +278,7 @@ def _tightened(task: _Task, most: float) -> tuple[CertifiedMotion, float]:
 
     Args:
         task: what is to be planned.
-        most: how many times as fast as it may a joint may have to be at the full speed of the tool.
+        most: how many times as fast as its limit a joint may have to be at the full speed of the tool.
     """
     for attempt in range(_TRIES):
         widths = task.widths / _TIGHTER**attempt

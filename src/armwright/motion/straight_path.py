@@ -22,13 +22,15 @@ from armwright.motion.deviation import (
 )
 from armwright.motion.path import NEGLIGIBLE, Path, place_knots
 from armwright.motion.polynomials import derivative, evaluate
-from armwright.motion.s_curve import s_curve
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.poses import position_text
 from armwright.spatial.rotations import rotation_vector
 
 SegmentNumbers: TypeAlias = npt.NDArray[np.intp]
+
+# The acceleration rises during this part of a ramp, and falls during as much of it.
+_RISE = 0.2
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -181,6 +183,30 @@ def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> 
         numbers=(0,),
         near=near,
     )
+
+
+def s_curve(duration: float, ramp: float) -> Trajectory:
+    """Return the fraction of a line over time, from rest to rest, with continuous acceleration.
+
+    Args:
+        duration: [s].
+        ramp: which part of it gathers speed, and which part again loses it: 0.5 at most.
+    """
+    rising = ramp * duration
+    rise = _RISE * rising
+    v = 1 / (duration - rising)
+    a = v / (rising - rise)
+    lengths = np.array([rise, rising - 2 * rise, rise, duration - 2 * rising, rise, rising - 2 * rise, rise])
+    jerks = np.array([1, 0, -1, 0, -1, 0, 1]) * a / rise
+    accelerations, speeds = np.array([0, a, a, 0, 0, -a, -a]), np.zeros(7)
+    speeds[1:] = np.cumsum((accelerations + jerks * lengths / 2) * lengths)[:-1]
+    ways = ((jerks * lengths / 6 + accelerations / 2) * lengths + speeds) * lengths
+    starts = np.concatenate([[0.0], np.cumsum(ways)[:-1]])
+    there = lengths > 1e-9 * duration  # a line of two ramps has nothing between them
+    times = np.concatenate([[0.0], np.cumsum(lengths[there])])
+    times[-1] = duration
+    terms = np.stack([starts, speeds, accelerations / 2, jerks / 6], axis=1)
+    return Trajectory(times=times, coefficients=terms[there][..., None])
 
 
 def report_path(arm: Arm, path: Path, *, deviation: float, speed: float, finer: int = 1) -> StraightPath:

@@ -7,9 +7,8 @@ import numpy as np
 from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike
 from armwright.motion.certified_motion import CertifiedMotion, slowed_alike, standstill
-from armwright.motion.ends import check_ends
 from armwright.motion.moves import exact_poses
-from armwright.motion.obstruction import PathError
+from armwright.motion.obstruction import PathError, check_ends
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import coarse_deviations

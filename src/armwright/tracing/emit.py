@@ -3,7 +3,7 @@
 Inputs and outputs are passed row-major, one row per configuration. For many, blocks of ``LANES`` configurations are
 transposed so that each quantity lies in a row of its own; the loop over the lanes is what the compiler
 vectorises. Nothing is left to the compiler that would change a bit: no operation is reordered, and where a
-multiplication and an addition become one instruction is written down (``fuse``). So a configuration has the same bits
+multiplication and an addition become one instruction is written down (``fused``). So a configuration has the same bits
 alone, in any batch and inside other compiled code.
 """
 
