@@ -95,7 +95,7 @@ def test_kinds(text: str, expected: ExpressionType) -> None:
     ("text", "code", "message", "help_"),
     [
         ("f * g", "E221", "`*` has no meaning between a FRAME and a FRAME", "write `INV(f) * g`"),
-        ("t * f", "E221", "`*` has no meaning between a TRANS and a FRAME", "write `f * t`"),
+        ("t * f", "E221", "`*` has no meaning between a TRANS and a FRAME", "applies: `f * t`"),
         ("f + t", "E221", "`+` has no meaning between a FRAME and a TRANS", "write `f * t`"),
         ("f - t", "E221", "`-` has no meaning between a FRAME and a TRANS", "write `f * INV(t)`"),
         ("f - g", "E221", "`-` has no meaning between a FRAME and a FRAME", "write `INV(g) * f`"),

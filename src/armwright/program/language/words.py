@@ -65,6 +65,11 @@ ABSENT = {
     "RETURN": "a procedure returns at its END, without a value",
 }
 
+COMPARISONS = ("<", "<=", "=", "<>", ">=", ">")
+# How tightly operations bind; NOT stands between AND and the comparisons.
+PRECEDENCE = {"OR": 1, "AND": 2, **dict.fromkeys(COMPARISONS, 4), "+": 5, "-": 5, "*": 6, "/": 6}
+PRECEDENCE_OF_NOT = 3
+
 # What opens and closes a stretch of statements in RLO-2.
 OPENING = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
 CLOSING = frozenset(("END", "COEND", "UNTIL"))

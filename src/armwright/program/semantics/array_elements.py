@@ -41,14 +41,9 @@ def element(names: Names, node: tree.Index, sorts: Sequence[ExpressionType | Non
             names.report("E222", text, node.span, "no array", secondary=names.where_declared(name.key), advice=advice)
         return None
     if len(node.indices) != len(kind.sizes):
-        names.report(
-            "E222",
-            f"`{name.text}` has {_indices(len(kind.sizes))}, not {len(node.indices)}",
-            node.span,
-            f"{_indices(len(node.indices))} here",
-            secondary=names.where_declared(name.key),
-            note=f"it is an {kind}",
-        )
+        text = f"`{name.text}` has {_indices(len(kind.sizes))}, not {len(node.indices)}"
+        label, here = f"{_indices(len(node.indices))} here", names.where_declared(name.key)
+        names.report("E222", text, node.span, label, secondary=here, note=f"it is an {kind}")
         return OF_KIND[kind.kind]
     for index, sort, size in zip(node.indices, sorts, kind.sizes, strict=True):
         _index(names, name, index, sort, size)

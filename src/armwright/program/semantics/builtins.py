@@ -91,15 +91,9 @@ def _axis(names: Names, node: tree.Expression) -> None:
 
 
 def _misfit(names: Names, node: tree.Function, argument: tree.Expression, sort: ExpressionType) -> None:
-    what = is_what(argument, sort)
-    takes = FUNCTIONS[node.name.key].takes
     if sort is ExpressionType.EVENT:
         events.refuse(names, argument)
         return
-    names.report(
-        "E220",
-        f"{node.name.key} takes {takes}, but {called(argument)} is {what}",
-        argument.span,
-        bare(what),
-        secondary=names.where_declared(argument.key) if isinstance(argument, tree.Name) else (),
-    )
+    what, takes = is_what(argument, sort), FUNCTIONS[node.name.key].takes
+    text = f"{node.name.key} takes {takes}, but {called(argument)} is {what}"
+    names.report("E220", text, argument.span, bare(what), secondary=names.where_declared(*plain_keys(argument)))

@@ -2,7 +2,7 @@
 
 import attrs
 
-from armwright.program.language.diagnostic import Fix, Label
+from armwright.program.language.diagnostic import Fix, Label, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
 from armwright.program.language.words import ABSENT, ELSEWHERE
@@ -76,15 +76,12 @@ class Calls:
             )
             if changed is None or not fixed:
                 continue
-            called_so, parameter = passed_.procedure.node.name.text, _text(passed_.procedure, passed_.parameter)
-            self._names.report(
-                "E220",
-                f"`{called_so}` changes its parameter `{parameter}`, and `{argument.text}` cannot be changed",
-                argument.span,
-                "an arm" if isinstance(argument, tree.ArmName) else "the root of all frames",
-                secondary=(Label(changed, "changed here"),),
-                note="a FRAME is passed by reference: the procedure changes the frame itself",
-            )
+            procedure, parameter = passed_.procedure.node.name.text, _text(passed_.procedure, passed_.parameter)
+            text = f"`{procedure}` changes its parameter `{parameter}`, and `{argument.text}` cannot be changed"
+            label = "an arm" if isinstance(argument, tree.ArmName) else "the root of all frames"
+            here = labels(changed, "changed here")
+            note = "a FRAME is passed by reference: the procedure changes the frame itself"
+            self._names.report("E220", text, argument.span, label, secondary=here, note=note)
 
     def _follow(self) -> None:
         """A parameter that is handed on to where it is changed is changed too."""
@@ -136,19 +133,14 @@ def _text(procedure: ProcedureSymbols, parameter: str) -> str:
 
 
 def _wrong_count(names: Names, node: tree.Call, procedure: ProcedureSymbols) -> None:
-    name, takes, argument_type = node.name, len(procedure.parameters), len(node.arguments)
+    takes, given = len(procedure.parameters), len(node.arguments)
     listed = ", ".join(
         f"{', '.join(name.text for name in declaration.names)} : {declaration.type.text}"
         for declaration in procedure.node.parameters
     )
-    names.report(
-        "E220",
-        f"`{name.text}` takes {takes} argument{'s' * (takes != 1)}, not {argument_type}",
-        node.span,
-        f"{argument_type} given here",
-        secondary=(Label(procedure.node.head, "declared here"),),
-        advice=f"its parameters are ({listed})" if takes else "",
-    )
+    text = f"`{node.name.text}` takes {takes} argument{'s' * (takes != 1)}, not {given}"
+    head, advice = labels(procedure.node.head, "declared here"), f"its parameters are ({listed})" if takes else ""
+    names.report("E220", text, node.span, f"{given} given here", secondary=head, advice=advice)
 
 
 def _unknown(names: Names, node: tree.Call) -> None:

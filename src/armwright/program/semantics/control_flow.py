@@ -76,14 +76,8 @@ def wait(context: Context, node: tree.Wait) -> None:
 
 def _event(names: Names, node: tree.Variable, who: str) -> None:
     """Check what SIGNAL or WAIT is about."""
-    need(
-        names,
-        node,
-        ExpressionType.EVENT,
-        "E223",
-        f"{who} needs an EVENT",
-        advice=lambda _: "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`",
-    )
+    advice = "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`"
+    need(names, node, ExpressionType.EVENT, "E223", f"{who} needs an EVENT", advice=lambda _: advice)
 
 
 def pause(context: Context, node: tree.Pause) -> None:

@@ -11,11 +11,5 @@ def refuse(names: Names, node: tree.Expression, what: str = "computed with") -> 
     """Say once that an EVENT is no value."""
     keys = plain_keys(node)
     if names.first("E223", *keys):
-        names.report(
-            "E223",
-            f"{called(node)} is an EVENT and cannot be {what}",
-            node.span,
-            "EVENT",
-            secondary=tuple(label for key in keys for label in names.where_declared(key)),
-            note=_NOTE,
-        )
+        text = f"{called(node)} is an EVENT and cannot be {what}"
+        names.report("E223", text, node.span, "EVENT", secondary=names.where_declared(*keys), note=_NOTE)

@@ -3,15 +3,15 @@
 import enum
 
 from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.words import COMPARISONS, PRECEDENCE, PRECEDENCE_OF_NOT
 from armwright.program.syntax import tree
 
 # A longer expression is not repeated in a message; its pose is marked anyway.
 _MAX_SHOWN_LENGTH = 32
 # In advice it is repeated up to here.
 _MAX_WRITTEN_LENGTH = 100
-# How tightly operations bind; comparisons stand between.
-_STRENGTH = {"OR": 1, "AND": 2, "+": 5, "-": 5, "*": 6, "/": 6}
-_COMPARISON, _NOT, _MINUS, _ATOM = 4, 3, 7, 8
+# A minus in front binds tighter than all operations, and what is no operation tighter still.
+_MINUS, _ATOM = 7, 8
 
 
 class ExpressionType(enum.Enum):
@@ -84,15 +84,15 @@ def _written(node: tree.Expression) -> tuple[str, int]:
     """Return the text and how tightly its outermost operation binds."""
     match node:
         case tree.Unary(operation=operation, operand=operand):
-            strength, gap = (_NOT, " ") if operation == "NOT" else (_MINUS, "")
+            strength, gap = (PRECEDENCE_OF_NOT, " ") if operation == "NOT" else (_MINUS, "")
             return f"{operation}{gap}{_inside(operand, strength)}", strength
         case tree.Binary():
             first, chain = tree.chain(node)
             text, own = _written(first)
-            for node_ in chain:
-                strength = _STRENGTH.get(node_.operation, _COMPARISON)
-                left_text = text if own >= strength + (strength == _COMPARISON) else f"({text})"
-                text, own = f"{left_text} {node_.operation} {_inside(node_.right, strength + 1)}", strength
+            for link in chain:
+                strength = PRECEDENCE[link.operation]
+                left_text = text if own >= strength + (link.operation in COMPARISONS) else f"({text})"
+                text, own = f"{left_text} {link.operation} {_inside(link.right, strength + 1)}", strength
             return text, own
         case _:
             return _atom(node), _ATOM

@@ -82,13 +82,8 @@ def affix(context: Context, node: tree.Affix) -> None:
         context.changes(node.parent, node.link)
     whence = written(node.parent)
     swap = isinstance(node.child, tree.ArmName) and isinstance(node.parent, tree.Name | tree.Index)
-    _child(
-        names,
-        node.child,
-        "AFFIX hangs",
-        "affixed to a frame",
-        did_you_mean(f"AFFIX {whence} TO {written(node.child)}" if swap else None),
-    )
+    swapped = f"AFFIX {whence} TO {written(node.child)}" if swap else None
+    _child(names, node.child, "AFFIX hangs", "affixed to a frame", did_you_mean(swapped))
     need(names, node.parent, ExpressionType.FRAME, "E215", "AFFIX ... TO needs a FRAME or an arm")
     if node.at is None:
         return
@@ -98,15 +93,8 @@ def affix(context: Context, node: tree.Affix) -> None:
         is_place = actual is ExpressionType.FRAME and not (is_arm and names.symbols.std is Standard.RLO_83)
         return f"for the transformation from {whence} to {where} write `AT INV({whence}) * {where}`" if is_place else ""
 
-    need(
-        names,
-        node.at,
-        ExpressionType.TRANS,
-        "E210",
-        "AT needs a TRANS",
-        note="a FRAME is a pose in the cell; a TRANS is the transformation from one frame to another",
-        advice=advice,
-    )
+    note = "a FRAME is a pose in the cell; a TRANS is the transformation from one frame to another"
+    need(names, node.at, ExpressionType.TRANS, "E210", "AT needs a TRANS", note=note, advice=advice)
 
 
 def unfix(context: Context, node: tree.Unfix) -> None:

@@ -1,6 +1,6 @@
 """Names, types and clauses of one MOVE."""
 
-from armwright.program.language.diagnostic import Label
+from armwright.program.language.diagnostic import labels
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType, written
@@ -9,29 +9,13 @@ from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.type_check import condition, need, quantity
 from armwright.program.syntax import tree
 
-_WORDS: dict[type, str] = {
-    tree.Directly: "DIRECTLY",
-    tree.Straightly: "STRAIGHTLY",
-    tree.Via: "VIA",
-    tree.Approach: "APPROACH",
-    tree.Departure: "DEPARTURE",
-    tree.Speed: "SPEED",
-    tree.Blend: "BLEND",
-    tree.Duration: "DURATION",
-}
-_CLAUSE_NAMES: dict[type, str] = {
-    tree.Straightly: "a straight line asked for here",
-    tree.Via: "via points given here",
-    tree.Approach: "approach point given here",
-    tree.Departure: "departure point given here",
-    tree.Blend: "rounded corners asked for here",
-}
-_NOT_ASKED: dict[type, str] = {
-    tree.Straightly: "requests one motion of the joints to the goal",
-    tree.Via: "allows no via points",
-    tree.Approach: "allows no approach point",
-    tree.Departure: "allows no departure point",
-    tree.Blend: "has no corners",
+# What a clause gives, and what stands against it where DIRECTLY is given.
+_NOT_DIRECTLY: dict[type, tuple[str, str]] = {
+    tree.Straightly: ("a straight line asked for here", "requests one motion of the joints to the goal"),
+    tree.Via: ("via points given here", "allows no via points"),
+    tree.Approach: ("approach point given here", "allows no approach point"),
+    tree.Departure: ("departure point given here", "allows no departure point"),
+    tree.Blend: ("rounded corners asked for here", "has no corners"),
 }
 SPEED_NOTE = "100 is the normal speed and 120 the maximum of the arm"
 
@@ -88,7 +72,7 @@ def _speed(names: Names, node: tree.Expression) -> None:
 
 def _amount(names: Names, clause: tree.Blend | tree.Duration) -> None:
     wants: Dimension = "length" if isinstance(clause, tree.Blend) else "time"
-    what = _WORDS[type(clause)]
+    what = tree.clause_word(type(clause))
     if quantity(names, clause.value, wants, f"{what} needs a {wants}"):
         in_range(names, clause.value, f"a {what}", zero=False)
 
@@ -101,8 +85,8 @@ def _combination(names: Names, clauses: tuple[tree.Clause, ...]) -> None:
         if isinstance(clause, tree.On):
             continue
         if (earlier := first.setdefault(type(clause), clause)) is not clause:
-            text = f"{_WORDS[type(clause)]} is given twice in one MOVE"
-            names.report("E213", text, clause.span, "second", secondary=(Label(earlier.span, "first"),))
+            text = f"{tree.clause_word(type(clause))} is given twice in one MOVE"
+            names.report("E213", text, clause.span, "second", secondary=labels(earlier.span, "first"))
     if len(first) > 1 or tree.Blend in first:
         _ways(names, first)
         _times(names, first)
@@ -111,24 +95,15 @@ def _combination(names: Names, clauses: tuple[tree.Clause, ...]) -> None:
 def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
     direct, straight, blend = first.get(tree.Directly), first.get(tree.Straightly), first.get(tree.Blend)
     for kind, clause in first.items():
-        if direct and kind in _NOT_ASKED:
-            names.report(
-                "E208",
-                f"DIRECTLY cannot be combined with {_WORDS[kind]}",
-                clause.span,
-                _CLAUSE_NAMES[kind],
-                secondary=(Label(direct.span, _NOT_ASKED[kind]),),
-                advice="remove one of the two",
-            )
+        if direct and kind in _NOT_DIRECTLY:
+            label, against = _NOT_DIRECTLY[kind]
+            text, here = f"DIRECTLY cannot be combined with {tree.clause_word(kind)}", labels(direct.span, against)
+            names.report("E208", text, clause.span, label, secondary=here, advice="remove one of the two")
         elif straight and kind in (tree.Via, tree.Approach, tree.Departure):
-            names.report(
-                "E209",
-                f"STRAIGHTLY cannot be combined with {_WORDS[kind]}",
-                clause.span,
-                _CLAUSE_NAMES[kind],
-                secondary=(Label(straight.span, "requests one straight line"),),
-                advice="write one `MOVE ... STRAIGHTLY` for each leg",
-            )
+            text, (label, _) = f"STRAIGHTLY cannot be combined with {tree.clause_word(kind)}", _NOT_DIRECTLY[kind]
+            here = labels(straight.span, "requests one straight line")
+            advice = "write one `MOVE ... STRAIGHTLY` for each leg"
+            names.report("E209", text, clause.span, label, secondary=here, advice=advice)
     if blend and not direct and tree.Via not in first:
         text = "BLEND rounds the corners at via points, but there is no VIA"
         names.report("E226", text, blend.span, "no corners to round", advice="add `VIA ( ... )`, or leave BLEND out")
@@ -138,16 +113,10 @@ def _times(names: Names, first: dict[type, tree.Clause]) -> None:
     speed, duration = first.get(tree.Speed), first.get(tree.Duration)
     if speed and duration:
         earlier, later = sorted((speed, duration), key=lambda clause: clause.span.start)
-        words = _WORDS[type(later)], _WORDS[type(earlier)]
-        names.report(
-            "E230",
-            "SPEED cannot be combined with DURATION",
-            later.span,
-            f"{words[0]} given here",
-            secondary=(Label(earlier.span, f"{words[1]} given here"),),
-            note="each of them determines the duration of the motion",
-            advice="remove one of the two",
-        )
+        first_word, word = tree.clause_word(type(earlier)), tree.clause_word(type(later))
+        text, here = "SPEED cannot be combined with DURATION", labels(earlier.span, f"{first_word} given here")
+        note, advice = "each of them determines the duration of the motion", "remove one of the two"
+        names.report("E230", text, later.span, f"{word} given here", secondary=here, note=note, advice=advice)
 
 
 CHECKS: Checks = {tree.Move: move}

@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping
 
+from armwright.program.language.words import COMPARISONS
 from armwright.program.semantics import events
 from armwright.program.semantics.expression_types import ExpressionType, bare, is_what, written
 from armwright.program.semantics.scopes import Names
 from armwright.program.syntax import tree
 
-_ARITHMETIC = frozenset("+-*/")
-_COMPARISONS = frozenset(("<", "<=", "=", "<>", ">=", ">"))
 _PRODUCTS: Mapping[tuple[ExpressionType, ExpressionType], ExpressionType] = {
     (ExpressionType.FRAME, ExpressionType.TRANS): ExpressionType.FRAME,
     (ExpressionType.FRAME, ExpressionType.MATRIX): ExpressionType.FRAME,
@@ -28,7 +27,7 @@ def result(
 ) -> ExpressionType | None:
     """Return what an operation other than AND and OR gives; say that it has no meaning between these two."""
     operation = node.operation
-    comparison = operation in _COMPARISONS
+    comparison = operation in COMPARISONS
     if left is ExpressionType.SCALAR and right is ExpressionType.SCALAR:
         return ExpressionType.CONDITION if comparison else ExpressionType.SCALAR
     if left is None or right is None:
@@ -48,15 +47,10 @@ def negative(names: Names, node: tree.Unary, sort: ExpressionType | None) -> Exp
     if sort is ExpressionType.EVENT:
         events.refuse(names, node.operand)
     elif sort not in (None, ExpressionType.SCALAR):
-        turned = sort in (ExpressionType.TRANS, ExpressionType.FRAME, ExpressionType.MATRIX)
-        _say(
-            names,
-            node,
-            f"`-` takes a number, but this is {is_what(node.operand, sort)}",
-            bare(is_what(node.operand, sort)),
-            f"for the inverse transformation write `INV({written(node.operand)})`" if turned else "",
-        )
-    return None if sort is not ExpressionType.SCALAR else ExpressionType.SCALAR
+        what, is_pose = is_what(node.operand, sort), sort in _POSES | _STEPS
+        advice = f"for the inverse transformation write `INV({written(node.operand)})`" if is_pose else ""
+        _say(names, node, f"`-` takes a number, but this is {what}", bare(what), advice)
+    return sort if sort is ExpressionType.SCALAR else None
 
 
 def _refuse(names: Names, node: tree.Binary, left: ExpressionType, right: ExpressionType) -> None:
@@ -72,7 +66,7 @@ def _say(names: Names, node: tree.Unary | tree.Binary, message: str, label: str,
     variables = [operand.key for operand in operands if isinstance(operand, tree.Name)]
     if not names.first("E221", *variables):
         return
-    secondary = tuple(label for key in dict.fromkeys(variables) for label in names.where_declared(key))
+    secondary = names.where_declared(*dict.fromkeys(variables))
     names.report("E221", message, node.span, label, secondary=secondary, advice=help_)
 
 
@@ -81,7 +75,7 @@ def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> s
     left_text, other = written(node.left), written(node.right)
     if ExpressionType.CONDITION in (left, right):
         return "a condition is not a number; combine conditions with AND and OR"
-    if node.operation in _COMPARISONS:
+    if node.operation in COMPARISONS:
         return f"for their distance write `DIST({left_text}, {other})`" if {left, right} <= _POSES else ""
     if node.operation in ("*", "/"):
         return _advice_on_product(node, left, right)

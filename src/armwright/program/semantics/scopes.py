@@ -95,9 +95,9 @@ class Names:
 
     # ---- words for messages ----------------------------------------------------------------------------------------
 
-    def where_declared(self, key: str) -> tuple[Label, ...]:
-        """Return a label on the declaration of a name, if it has one."""
-        return self._scope.where_declared(key)
+    def where_declared(self, *keys: str) -> tuple[Label, ...]:
+        """Return labels on the declarations of names that have one."""
+        return tuple(label for key in keys for label in self._scope.where_declared(key))
 
     def arms(self) -> list[str]:
         """Return the arms there are, as far as is known; at least one."""

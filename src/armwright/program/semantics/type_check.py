@@ -40,7 +40,7 @@ def declared(names: Names, node: tree.Expression) -> tuple[Label, ...]:
     """Return where a variable is declared."""
     if isinstance(node, tree.Index):
         node = node.name
-    return tuple(label for key in plain_keys(node) for label in names.where_declared(key))
+    return names.where_declared(*plain_keys(node))
 
 
 def is_world(node: tree.Expression) -> bool:
@@ -103,7 +103,7 @@ def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
         f"{what}, but {called(node)} is {is_one}",
         node.span,
         bare(is_one),
-        secondary=tuple(label for key in plain_keys(node) for label in names.where_declared(key)),
+        secondary=names.where_declared(*plain_keys(node)),
         note=note,
         advice=advice(actual) if advice else "",
     )

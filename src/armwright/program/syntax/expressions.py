@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from armwright.program.language.diagnostic import Fix
 from armwright.program.language.source import Span
+from armwright.program.language.words import PRECEDENCE, PRECEDENCE_OF_NOT
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.token_stream import MAX_DEPTH, Tokens, shown
@@ -18,15 +19,6 @@ _NAME, _NUMBER, _ARM, _STRING = TokenKind.NAME, TokenKind.NUMBER, TokenKind.ARM,
 _CLOSING = {"(": ")", "[": "]"}
 _OPERANDS = (_NAME, _NUMBER, _ARM, _STRING)
 
-# How strongly an operation holds its operands together; NOT stands between AND and the comparisons.
-_OR, _AND, _NOT, _COMPARISON, _SUM, _PRODUCT = range(1, 7)
-_STRENGTH = {
-    "OR": _OR,
-    "AND": _AND,
-    **dict.fromkeys(("<", "<=", "=", "<>", ">=", ">"), _COMPARISON),
-    **dict.fromkeys(("+", "-"), _SUM),
-    **dict.fromkeys(("*", "/"), _PRODUCT),
-}
 # What other languages write.
 FOREIGN = {"==": "=", ":=": "=", "!=": "<>", "=<": "<=", "=>": ">=", "&&": "AND", "||": "OR"}
 # What may stand behind a name, so that a reserved word in front of it was meant as one.
@@ -36,7 +28,7 @@ _NEVER_A_NAME = frozenset(("BEGIN", "END", "DIRECTLY", "STRAIGHTLY", "WITH", "VI
 
 # expr = conj { "OR" conj } ;   conj = nega { "AND" nega } ;   rel = sum [ ( "<" | "<=" | "=" | ... ) sum ] ;
 # sum  = term { ( "+" | "-" ) term } ;   term = unary { ( "*" | "/" ) unary } ;
-def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowest: int = _OR) -> tree.Expression:
+def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowest: int = 1) -> tree.Expression:
     """Read an expression.
 
     Args:
@@ -53,11 +45,11 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
         tokens.asked = wants, where
     left_operand = _unary(tokens, wants, where, lowest)
     last = 0
-    while (strength := _STRENGTH.get(tokens.now.key, 0)) >= lowest or (tokens.now.key in FOREIGN and _foreign(tokens)):
-        strength = strength or _STRENGTH[tokens.now.key]
+    while (strength := PRECEDENCE.get(tokens.now.key, 0)) >= lowest or (tokens.now.key in FOREIGN and _foreign(tokens)):
+        strength = strength or PRECEDENCE[tokens.now.key]
         if strength < lowest:
             break
-        chained = strength == last == _COMPARISON
+        chained = strength == last == PRECEDENCE["="]
         if chained:
             _chained(tokens, start)
         # A sum of many terms is long and not deep: only what is nested counts.
@@ -110,7 +102,7 @@ def _unary(tokens: Tokens, wants: str, where: str, lowest: int) -> tree.Expressi
     if token.key not in ("-", "+", "NOT"):
         tokens.want(*tokens.asked)
         return _no_value(tokens, wants, where)
-    misplaced = token.key == "NOT" and lowest > _NOT
+    misplaced = token.key == "NOT" and lowest > PRECEDENCE_OF_NOT
     if misplaced:
         text = f"NOT needs parentheses after `{tokens.before.text}`"
         tokens.say_once("E122", text, token.span, "put `( )` around NOT and what follows")
@@ -118,7 +110,7 @@ def _unary(tokens: Tokens, wants: str, where: str, lowest: int) -> tree.Expressi
         tokens.say_once("E113", "a value has no `+` in front", token.span, "leave it out", fixes=(Fix(token.span, ""),))
     tokens.take()
     tokens.enter()
-    operand = expression(tokens, "a value", "", _NOT if token.key == "NOT" else _PRODUCT + 1)
+    operand = expression(tokens, "a value", "", PRECEDENCE_OF_NOT if token.key == "NOT" else PRECEDENCE["*"] + 1)
     tokens.depth -= 1
     tokens.height += 1
     if token.key == "+":

@@ -50,7 +50,7 @@ def move(tokens: Tokens) -> tree.Move:
 
 def _words(clauses: list[tree.Clause]) -> frozenset[str]:
     """Return the words by which clauses begin, behind WITH."""
-    return frozenset(type(clause).__name__.upper() for clause in clauses)
+    return frozenset(tree.clause_word(type(clause)) for clause in clauses)
 
 
 def _starts_clause(tokens: Tokens) -> bool:

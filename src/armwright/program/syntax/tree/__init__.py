@@ -31,6 +31,7 @@ from armwright.program.syntax.tree.move import (
     Speed,
     Straightly,
     Via,
+    clause_word,
 )
 from armwright.program.syntax.tree.output import Print
 from armwright.program.syntax.tree.program import Declaration, Header, Import, Procedure, Program, TypeName, Units
@@ -54,7 +55,7 @@ from armwright.program.syntax.tree.values import (
     chain,
 )
 
-__all__ = ["Statement", "chain", "dump", "walk"]
+__all__ = ["Statement", "chain", "clause_word", "dump", "walk"]
 __all__ += ["Declaration", "Header", "Import", "Procedure", "Program", "TypeName", "Units"]
 __all__ += ["Affix", "Assign", "Unfix"]
 __all__ += ["Grasp", "Open", "Operate", "ReadSystem", "ReadVisions"]

@@ -75,6 +75,11 @@ class On(Node):
 Clause: TypeAlias = Directly | Straightly | Via | Approach | Departure | Speed | Blend | Duration | On
 
 
+def clause_word(kind: type) -> str:
+    """Return the word by which the clauses of a kind begin, behind WITH."""
+    return kind.__name__.upper()
+
+
 @attrs.frozen
 class Move(Node):
     """``MOVE moved TO goal clauses``."""
