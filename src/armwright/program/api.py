@@ -46,11 +46,13 @@ class Compilation:
         tree: what it says.
         symbols: its names.
         imports: what its IMPORTs brought.
-        flow: the arms of its statements; None where the syntax is wrong.
+        flow: the arms of its statements; None where the syntax is wrong, or where only names were requested.
         diagnostics: what is wrong or odd, in the order of the text.
-        code: the intermediate code; None where the program has errors or no code was requested.
+        code: the intermediate code; None where the program has errors, or where only names were requested.
         cell: the cell that it was compiled for, or the first that it IMPORTs and that has arms, with all frames that
             it imports; None where there is none, or only its names are known.
+        known: what was known of the cell when the program was checked.
+        strict: whether an AFFIX that is only implied is an error.
     """
 
     source: Source
@@ -64,6 +66,8 @@ class Compilation:
     diagnostics: tuple[Diagnostic, ...]
     code: Code | None
     cell: Cell | None = None
+    known: KnownCell | None = None
+    strict: bool = False
 
 
 class ProgramError(ArmwrightError, ValueError):
@@ -91,7 +95,7 @@ def compile(  # noqa: A001 - what a translator does
     strict: bool = False,
     std: Standard = Standard.RLO_2,
     read_import: ReadImport | None = None,
-    generate_code: bool = True,
+    names_only: bool = False,
 ) -> Compilation:
     """Compile a program.
 
@@ -103,7 +107,7 @@ def compile(  # noqa: A001 - what a translator does
         std: the language: RLO-2, or RLO-83 with nothing more than the report has.
         read_import: how to read what an IMPORT names; of a file, the files beside it unless something else is given;
             of a text, imports stay unknown without it.
-        generate_code: whether to generate intermediate code; all diagnostics come from the analysis before it.
+        names_only: whether to stop when syntax, names and types have been checked; ``with_flow`` goes on from there.
 
     Returns:
         Tree, diagnostics and, where there are no errors, code. A wrong program raises nothing.
@@ -118,7 +122,8 @@ def compile(  # noqa: A001 - what a translator does
         source, read_import = Source(path.name, read_program(path)), read_import or import_reader(path.parent)
     model = read_cell(Path(cell)) if isinstance(cell, str | Path) else cell
     with no_collection():
-        return _compile(source, model, strict=strict, std=std, read_import=read_import, generate_code=generate_code)
+        compiled = _with_names(source, model, strict=strict, std=std, read_import=read_import)
+        return compiled if names_only else _with_code(with_flow(compiled))
 
 
 def run(
@@ -229,15 +234,10 @@ def _imported_cell(program: tree.Program, read_import: ReadImport) -> Cell | Non
     return None
 
 
-def _compile(
-    source: Source,
-    cell: Cell | KnownCell | None,
-    *,
-    strict: bool,
-    std: Standard,
-    read_import: ReadImport | None,
-    generate_code: bool,
+def _with_names(
+    source: Source, cell: Cell | KnownCell | None, *, strict: bool, std: Standard, read_import: ReadImport | None
 ) -> Compilation:
+    """Return a program with its syntax, names and types checked."""
     text, diagnostics = without_numbers(source)
     scanned = scan(source, text, std)
     program, syntax_errors = parse(source, scanned.tokens, std)
@@ -246,17 +246,10 @@ def _compile(
         cell = _imported_cell(program, read_import) if cell is None else cell
     known = known_cell(cell) if isinstance(cell, Cell) else cell
     symbols, name_errors, imports = check.check(program, known, std=std, read_import=read_import)
-    spelling = {token.key: token.text for token in reversed(scanned.tokens) if token.kind is TokenKind.NAME}
     diagnostics += [*scanned.diagnostics, *syntax_errors]
     guessed = any(diagnostic.is_syntax for diagnostic in diagnostics)
-    # Where the parser had to guess, a name may seem unused, and the effect of the statements is unknown.
+    # Where the parser had to guess, a name may seem unused.
     diagnostics += [error for error in name_errors if not (guessed and error.code == "L304")]
-    code = flow = None
-    if not guessed:
-        flow, flow_errors = analysis.check(program, symbols, spelling, known, strict=strict, source=source)
-        diagnostics += flow_errors
-        if generate_code and not any(diagnostic.is_error for diagnostic in diagnostics):
-            code = attrs.evolve(generate(source, program, symbols, flow, spelling), standard=std)
     return Compilation(
         source=source,
         standard=std,
@@ -265,8 +258,38 @@ def _compile(
         tree=program,
         symbols=symbols,
         imports=imports,
-        flow=flow,
+        flow=None,
         diagnostics=in_order(diagnostics),
-        code=code,
+        code=None,
         cell=with_imports(cell, imports) if isinstance(cell, Cell) else None,
+        known=known,
+        strict=strict,
     )
+
+
+def with_flow(compiled: Compilation) -> Compilation:
+    """Return a program whose names have been checked with its flow analysed, and with all diagnostics.
+
+    Where the parser had to guess, the effect of the statements is unknown, and there is no flow.
+    """
+    if any(diagnostic.is_syntax for diagnostic in compiled.diagnostics):
+        return compiled
+    source, known, strict = compiled.source, compiled.known, compiled.strict
+    with no_collection():
+        flow, diagnostics = analysis.check(
+            compiled.tree, compiled.symbols, _spelling(compiled), known, strict=strict, source=source
+        )
+    return attrs.evolve(compiled, flow=flow, diagnostics=in_order((*compiled.diagnostics, *diagnostics)))
+
+
+def _with_code(compiled: Compilation) -> Compilation:
+    """Return a program with its intermediate code, unless it has errors."""
+    if compiled.flow is None or any(diagnostic.is_error for diagnostic in compiled.diagnostics):
+        return compiled
+    code = generate(compiled.source, compiled.tree, compiled.symbols, compiled.flow, _spelling(compiled))
+    return attrs.evolve(compiled, code=attrs.evolve(code, standard=compiled.standard))
+
+
+def _spelling(compiled: Compilation) -> dict[str, str]:
+    """Return how a program first writes each of its names."""
+    return {token.key: token.text for token in reversed(compiled.tokens) if token.kind is TokenKind.NAME}

@@ -9,6 +9,7 @@ from lsprotocol import types as lsp
 
 from armwright.errors import InvalidValueError
 from armwright.program import KnownCell, Source, compile as translate
+from armwright.program.api import with_flow
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.text_edits import Edit, apply_edits
@@ -259,11 +260,11 @@ def test_rename_keeps_the_code() -> None:
     assert "first = 1 ; act (first)" in text
 
 
-def test_analysis_without_code_has_all_diagnostics() -> None:
-    """A program that is only analysed has the diagnostics of the compiled program, and no intermediate code."""
+def test_analysis_has_all_diagnostics() -> None:
+    """A program that is analysed in two steps has the diagnostics of the compiled program, and no intermediate code."""
     for path in ACCEPTED:
         source = Source(path.name, path.read_text())
-        analysed = translate(source, generate_code=False)
+        analysed = with_flow(translate(source, names_only=True))
 
         assert analysed.code is None
         assert analysed.diagnostics == translate(source).diagnostics

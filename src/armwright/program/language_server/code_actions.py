@@ -37,7 +37,7 @@ def code_actions(
     actions = []
     if _wanted(lsp.CodeActionKind.QuickFix.value, context):
         actions += quickfixes(analysis, uri, range_, context.diagnostics)
-    certain = all_fixes(analysis.compiled.diagnostics)
+    certain = all_fixes(analysis.complete.diagnostics)
     if certain and _wanted(FIX_ALL, context):
         edit = _workspace_edit(analysis, uri, certain)
         actions.append(lsp.CodeAction("apply all certain fixes", kind=FIX_ALL, edit=edit))
@@ -57,7 +57,7 @@ def quickfixes(
     """Return the cures of what is wrong in a stretch of text: those that are certain, and names that were meant."""
     source, span = analysis.compiled.source, span_of(analysis.codec, range_)
     actions = []
-    for diagnostic in analysis.compiled.diagnostics:
+    for diagnostic in analysis.complete.diagnostics:
         cured = _meant(diagnostic, source)
         if not any(_touch(part, span) for part in (cured.span, *(fix.span for fix in cured.fixes)) if cured.fixes):
             continue

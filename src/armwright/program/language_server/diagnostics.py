@@ -16,7 +16,7 @@ def diagnostics(analysis: Analysis, uri: str, *, related: bool) -> list[lsp.Diag
         uri: of its document.
         related: whether the editor shows other locations beside the first.
     """
-    found = analysis.compiled.diagnostics
+    found = analysis.complete.diagnostics
     return [_diagnostic(diagnostic, analysis.codec, uri, related=related) for diagnostic in found]
 
 

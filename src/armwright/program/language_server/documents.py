@@ -20,6 +20,7 @@ PAUSE, PAUSE_LONG = 0.02, 0.5
 
 
 Analyse: TypeAlias = "Callable[[Document], Analysis]"
+Publish: TypeAlias = "Callable[[Document, Analysis], None]"
 
 
 class Document:
@@ -33,15 +34,18 @@ class Document:
         last: the analysis of the text, or of one before; None before the first.
     """
 
-    def __init__(self, uri: str, codec: PositionCodec, version: int | None, analyse: "Analyse") -> None:
-        """Take up a text; it is analysed when somebody asks, or soon."""
+    def __init__(
+        self, uri: str, codec: PositionCodec, version: int | None, analyse: "Analyse", publish: "Publish"
+    ) -> None:
+        """Take up a text; it is analysed when somebody asks, or soon, and soon what is wrong with it is published."""
         self.uri, self.codec, self.version = uri, codec, version
         path = to_fs_path(uri) if uri.startswith("file:") else None
         self.path = None if path is None else Path(path)
         self.last: Analysis | None = None
-        self._analyse = analyse
+        self._analyse, self._publish = analyse, publish
+        self._outdated = True
         self._timer: asyncio.TimerHandle | None = None
-        self._analysed = asyncio.Event()
+        self._published = asyncio.Event()
         self.outdate()
 
     @property
@@ -71,28 +75,34 @@ class Document:
 
     def outdate(self) -> None:
         """Take the analysis for old: the text has changed, or what it depends on."""
-        self._analysed.clear()
+        self._outdated = True
+        self._published.clear()
         self._stop_timer()
         pause = PAUSE if self.is_short else PAUSE_LONG
-        self._timer = asyncio.get_running_loop().call_later(pause, self.analyse)
+        self._timer = asyncio.get_running_loop().call_later(pause, self.publish)
 
     def analyse(self) -> Analysis:
-        """Analyse the text as it is now."""
-        self._stop_timer()
-        self.last = self._analyse(self)
-        self._analysed.set()
+        """Return the analysis of the text as it is now."""
+        if self._outdated or self.last is None:
+            self.last, self._outdated = self._analyse(self), False
         return self.last
 
-    def close(self) -> None:
-        """Analyse nothing more."""
+    def publish(self) -> None:
+        """Publish what is wrong with the text as it is now."""
         self._stop_timer()
-        self._analysed.set()
+        self._publish(self, self.analyse())
+        self._published.set()
+
+    def close(self) -> None:
+        """Analyse and publish nothing more."""
+        self._stop_timer()
+        self._published.set()
 
     async def analysis(self) -> Analysis:
         """Return the analysis of the text as it is now; that of a long program comes when nothing more is typed."""
         if not self.is_short:
-            await self._analysed.wait()
-        return self.last if self.last is not None and self._analysed.is_set() else self.analyse()
+            await self._published.wait()
+        return self.analyse()
 
     def _stop_timer(self) -> None:
         if self._timer is not None:

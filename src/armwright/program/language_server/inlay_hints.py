@@ -33,7 +33,7 @@ def _of(analysis: Analysis, statement: tree.Move | tree.Call | tree.Grasp) -> It
         case tree.Move():
             yield from _move(analysis, statement)
         case tree.Grasp(arm=None):
-            flow = analysis.compiled.flow
+            flow = analysis.complete.flow
             arm = None if flow is None else flow.arms.get(statement.span.start)
             if arm:
                 yield _hint(analysis, statement.span.end, arm, "the arm that was named or moved last")
@@ -56,7 +56,7 @@ def _hint(analysis: Analysis, offset: int, text: str, tooltip: str, *, names_par
 def _move(analysis: Analysis, move: tree.Move) -> Iterator[lsp.InlayHint]:
     if isinstance(move.moved, tree.Poison) or any(isinstance(node, tree.Poison) for node in tree.walk(move)):
         return
-    source, flow = analysis.compiled.source, analysis.compiled.flow
+    source, flow = analysis.compiled.source, analysis.complete.flow
     text = stages_text(form_of(move, lambda node: " ".join(source.slice(node.span).split())))
     tooltip = "the stages of this motion: PTP all joints at once, LINE straight, SPLINE and BLEND past poses"
     arm = None if flow is None else flow.arms.get(move.span.start)

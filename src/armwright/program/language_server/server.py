@@ -120,25 +120,34 @@ class RloServer(LanguageServer):
             document.outdate()
 
     def analyse(self, document: Document) -> Analysis:
-        """Analyse a document as it is now, and tell the editor what is wrong with it."""
+        """Analyse a document as it is now."""
         folder = None if document.path is None else document.path.parent
         try:
-            analysis = analyse(document.name, document.codec, folder, self.cells, self.settings)
+            return analyse(document.name, document.codec, folder, self.cells, self.settings)
         except Exception as error:  # noqa: BLE001 - a conversation goes on, whatever happens in it
-            text = f"armwright: this should not happen: {type(error).__name__}: {error}"
-            self.window_log_message(lsp.LogMessageParams(lsp.MessageType.Error, text))
+            self._log(error)
             # Of a program without words nothing is known, and nothing is wrong with what is known.
             return analyse(document.name, PositionCodec("", self.encoding), None, self.cells, Settings())
+
+    def publish(self, document: Document, analysis: Analysis) -> None:
+        """Tell the editor what is wrong with a document."""
         if self.documents.get(document.uri, document) is not document:
-            return analysis
+            return
         related = bool(self.can("text_document", "publish_diagnostics", "related_information"))
-        published = diagnostics(analysis, document.uri, related=related)
+        try:
+            published = diagnostics(analysis, document.uri, related=related)
+        except Exception as error:  # noqa: BLE001 - as above
+            self._log(error)
+            published = []
         params = lsp.PublishDiagnosticsParams(document.uri, published, document.version)
         self.text_document_publish_diagnostics(params)
         if analysis.problem and analysis.problem != self._last_problem:
             self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {analysis.problem}"))
         self._last_problem = analysis.problem
-        return analysis
+
+    def _log(self, error: Exception) -> None:
+        text = f"armwright: this should not happen: {type(error).__name__}: {error}"
+        self.window_log_message(lsp.LogMessageParams(lsp.MessageType.Error, text))
 
     # ---- settings
 
@@ -232,7 +241,7 @@ def _conversation(server: RloServer) -> None:
         if (before := server.documents.get(item.uri)) is not None:
             before.close()
         codec = PositionCodec(item.text, server.encoding)
-        server.documents[item.uri] = Document(item.uri, codec, item.version, server.analyse)
+        server.documents[item.uri] = Document(item.uri, codec, item.version, server.analyse, server.publish)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
     def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
@@ -267,7 +276,7 @@ def _surroundings(server: RloServer) -> None:
         # Others may depend on what has been saved beside them.
         server.outdate()
         if (document := server.documents.get(params.text_document.uri)) is not None:
-            document.analyse()
+            document.publish()
 
     @server.feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
     def did_change_watched_files(_: lsp.DidChangeWatchedFilesParams) -> None:
