@@ -195,8 +195,7 @@ def for_(tokens: Tokens) -> tree.For:
     """Read one FOR."""
     start = tokens.take()
     counter = _counter(tokens)
-    if not tokens.accept("="):
-        equals(tokens, "the variable of FOR", tokens.before.text)
+    equals(tokens, "the variable of FOR", tokens.before.text)
     first = part(tokens, "a number", "after `=`", "TO", "STEP", "DO")
     if tokens.sees_word(_DOWNWARDS) or tokens.sees(",", ":"):
         advice = "write `TO ... STEP -1`" if tokens.sees_word(_DOWNWARDS) else "write `TO`"

@@ -15,11 +15,8 @@ def assign(tokens: Tokens) -> tree.Assign:
     """Read ``name = value``."""
     token = tokens.now
     target = mobile(tokens, "a name", "here")
-    if tokens.now.key == "=":
-        tokens.take()
-    else:
-        written = tokens.source.slice(tokens.since(token))
-        equals(tokens, f"`{written}`", written)
+    written = tokens.source.slice(tokens.since(token))
+    equals(tokens, f"`{written}`", written)
     tokens.target = token.key
     value = expression(tokens, "a value", "")
     return tree.Assign(tokens.since(token), target, value)
@@ -36,14 +33,9 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
     elif tokens.done or tokens.sees(";", ",", ")", "END") or token.kind is TokenKind.KEYWORD:
         tokens.lost(f"{what} needs `=` and a value", "expected `=` and a value here", code="E109")
     elif not token.damaged:
-        tokens.report(
-            "E109",
-            f"{what} needs `=` before its value",
-            token.span,
-            "expected `=` before this",
-            advice=f"write `{written} = {token.text}`" if token.text != "(" else f"write `{written} = (...`",
-            fixes=(Fix(Span(token.start, token.start), "= "),),
-        )
+        text, fix = f"{what} needs `=` before its value", Fix(Span(token.start, token.start), "= ")
+        advice = f"write `{written} = (...`" if token.text == "(" else f"write `{written} = {token.text}`"
+        tokens.report("E109", text, token.span, "expected `=` before this", advice=advice, fixes=(fix,))
 
 
 # affix = "AFFIX" mobile "TO" mobile [ "AT" expr ] [ "RIGIDLY" | "NONRIGIDLY" ] ;
@@ -54,9 +46,7 @@ def affix(tokens: Tokens) -> tree.Affix:
     tokens.expect("TO", "after the frame that follows")
     parent = mobile(tokens, "the name of a FRAME or an arm", "after TO")
     link = tokens.since(start)
-    position = None
-    if tokens.accept("AT"):
-        position = expression(tokens, "a TRANS", "after AT")
+    position = expression(tokens, "a TRANS", "after AT") if tokens.accept("AT") else None
     rigid = tokens.accept("RIGIDLY", "NONRIGIDLY")
     return tree.Affix(tokens.since(start), link, child, parent, position, rigid is not None and rigid.key == "RIGIDLY")
 

@@ -240,12 +240,8 @@ class _Scanner:
         if key not in self._refused:
             self._refused.add(key)
             odd = next(character for character in word if not character.isascii())
-            self._report(
-                "E101",
-                f"a name cannot contain `{odd}`",
-                Span(start, end),
-                "names are made of the letters A to Z, digits and `_`",
-            )
+            label = "names are made of the letters A to Z, digits and `_`"
+            self._report("E101", f"a name cannot contain `{odd}`", Span(start, end), label)
         return Token(TokenKind.NAME, word, key, start, end, damaged=True)
 
     def _number(self, word: str, start: int, end: int, *, odd: bool) -> Token:
@@ -254,11 +250,11 @@ class _Scanner:
         if (match or not odd) and math.isfinite(float(digits)):
             return Token(TokenKind.NUMBER, word, digits, start, end)
         why = "too large" if _is_number(digits) else "not a number"
-        advice, fixes, span = "", list[Fix](), Span(start, end)
+        advice, fixes, span = "", tuple[Fix, ...](), Span(start, end)
         if _is_number(word) and "." in (word[0], word[-1]):
             cured = f"0{word}" if word[0] == "." else f"{word}0"
-            why, advice, fixes = "a digit is missing next to the decimal point", f"write `{cured}`", [Fix(span, cured)]
-        self._report("E113", f"`{word}` is not a number of RLO", span, why, advice=advice, fixes=tuple(fixes))
+            why, advice, fixes = "a digit is missing next to the decimal point", f"write `{cured}`", (Fix(span, cured),)
+        self._report("E113", f"`{word}` is not a number of RLO", span, why, advice=advice, fixes=fixes)
         return Token(TokenKind.NUMBER, word, "0", start, end, damaged=True)
 
     def _string(self, start: int, end: int) -> Token:
@@ -321,16 +317,13 @@ class _Scanner:
         """Say once what a character is that does not belong to the language, and in how many places it stands."""
         meant = LOOK_ALIKES.get(ord(character))
         shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
-        name = "a blank" if meant == " " else f"`{meant}`"
-        self._report(
-            "E101",
-            f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs"),
-            spans[0],
-            f"looks like {name}" if meant else _HINTS.get(character, "has no meaning here"),
-            note=f"it occurs in {count} places" if count > 1 else "",
-            advice=f"write {name}" if meant else "",
-            fixes=tuple(Fix(span, meant) for span in spans) if meant else (),
-        )
+        text = f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs")
+        note = f"it occurs in {count} places" if count > 1 else ""
+        if meant is None:
+            self._report("E101", text, spans[0], _HINTS.get(character, "has no meaning here"), note=note)
+            return
+        name, fixes = "a blank" if meant == " " else f"`{meant}`", tuple(Fix(span, meant) for span in spans)
+        self._report("E101", text, spans[0], f"looks like {name}", note=note, advice=f"write {name}", fixes=fixes)
 
     def _count(self, characters: str, start: int) -> None:
         """Count characters that mean nothing."""

@@ -132,14 +132,9 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
     offered = tokens.offered.with_clauses
     expected = f"expected {', '.join(offered[:-1])} or {offered[-1]}"
     if tokens.sees(*plain):
-        tokens.report(
-            "E116",
-            f"{token.key} is written without WITH",
-            start.span,
-            "WITH does not belong here",
-            advice=f"write `{token.key}` alone",
-            fixes=(Fix(Span(start.start, token.start), ""),),
-        )
+        text, advice = f"{token.key} is written without WITH", f"write `{token.key}` alone"
+        fix = Fix(Span(start.start, token.start), "")
+        tokens.report("E116", text, start.span, "WITH does not belong here", advice=advice, fixes=(fix,))
         tokens.take()
         return _plain(tokens, token, token.key)
     key: str | None = token.key if tokens.sees(*with_words) else None
@@ -156,10 +151,7 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
 
 
 def _assigned(tokens: Tokens, start: Token, key: str) -> tree.Clause:
-    if tokens.now.key == "=":
-        tokens.take()
-    else:
-        equals(tokens, f"`WITH {key}`", f"WITH {key}")
+    equals(tokens, f"`WITH {key}`", f"WITH {key}")
     value = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a pose", f"after {key} =")
     return _VALUES[key](tokens.since(start), value)
 
@@ -175,16 +167,11 @@ def _guard(tokens: Tokens) -> tree.On:
     word = tokens.now
     action = nested(tokens, "DO", *_ACTION_WORDS)
     if not isinstance(action, _ACTIONS):
-        opening, closing = Span(word.start, word.start), tokens.gap()
+        text, advice = f"{word.text} cannot be the action of ON", f"write `DO BEGIN {word.text} ... END`"
+        label = "expected a block, `=`, a call, HALT, SIGNAL or PRINT"
         certain = not isinstance(action, tree.Move) or not action.clauses
-        tokens.report(
-            "E121",
-            f"{word.text} cannot be the action of ON",
-            word.span,
-            "expected a block, `=`, a call, HALT, SIGNAL or PRINT",
-            advice=f"write `DO BEGIN {word.text} ... END`",
-            fixes=(Fix(opening, "BEGIN "), Fix(closing, " END")) if certain else (),
-        )
+        fixes = (Fix(Span(word.start, word.start), "BEGIN "), Fix(tokens.gap(), " END")) if certain else ()
+        tokens.report("E121", text, word.span, label, advice=advice, fixes=fixes)
     return tree.On(tokens.since(start), head, condition, action)
 
 

@@ -140,14 +140,9 @@ def _ends(tokens: Tokens) -> bool:
     elif tokens.done or (tokens.sees(";") and tokens.ahead().kind is TokenKind.END):
         if not tokens.now.damaged:
             semicolon = tokens.accept(";")
-            tokens.report(
-                "E110",
-                "the program does not end with `.`",
-                gap,
-                "expected `.` here",
-                note="the last END of an RLO program is written `END.`",
-                fixes=(Fix(gap.to(semicolon.span) if semicolon else gap, "."),),
-            )
+            text, note = "the program does not end with `.`", "the last END of an RLO program is written `END.`"
+            fix = Fix(gap.to(semicolon.span) if semicolon else gap, ".")
+            tokens.report("E110", text, gap, "expected `.` here", note=note, fixes=(fix,))
     else:
         text, advice = "END closes the program, but more follows", "leave it out, or write BEGIN before what it ends"
         tokens.report("E114", text, end.span, "the program would end here", advice=advice)

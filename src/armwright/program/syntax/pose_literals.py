@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import attrs
 
-from armwright.program.language.diagnostic import Diagnostic, Fix, Severity
+from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.units import LENGTHS, UnitSystem
 from armwright.program.syntax import tree
 from armwright.spatial.rotations import nearest_rotation
@@ -21,27 +21,29 @@ _ROW_WISE = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
 _COLUMNS_OF_16 = (0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14)
 
 
-def check(matrix: tree.Matrix, units: UnitSystem | None = None) -> Diagnostic | None:
+def check(matrix: tree.Matrix, units: UnitSystem) -> Diagnostic | None:
     """Return what is wrong with a matrix; None if nothing is, or if its rotation is known only at run time.
 
     Args:
         matrix: of numbers and other expressions.
-        units: what the last three count; metres when left out.
+        units: what the last three count.
     """
     values = [item.value for item in matrix.items if isinstance(item, tree.Number)]
     # A number that was reported before is NaN.
     if any(math.isnan(value) for value in values):
         return None
-    diagnostic = None
     if len(matrix.items) != 12:
         diagnostic = _wrong_count(matrix, values)
-    elif all(isinstance(item, tree.Number) for item in matrix.items[:9]):
-        error = rotation_error(tuple(values[:9]))
-        diagnostic = _not_exact(matrix, values, error) if error > EXACT else None
-    if diagnostic is None or diagnostic.code != "E206":
+    else:
+        certain = all(isinstance(item, tree.Number) for item in matrix.items[:9])
+        error = rotation_error(tuple(values[:9])) if certain else 0.0
+        if error <= EXACT:
+            return None
+        diagnostic = _not_exact(matrix, values, error)
+    if not diagnostic.is_error:
         return diagnostic
-    lengths = LENGTHS[units.length if units else "M"]
-    note = f"the numbers are the columns n, o, a, p in this order: n, o, a are the axes, p is the position in {lengths}"
+    order = "the numbers are the columns n, o, a, p in this order"
+    note = f"{order}: n, o, a are the axes, p is the position in {LENGTHS[units.length]}"
     return attrs.evolve(diagnostic, notes=(note, *diagnostic.notes))
 
 
@@ -49,7 +51,6 @@ def _not_exact(matrix: tree.Matrix, values: Sequence[float], error: float) -> Di
     if error <= REPAIRABLE:
         return Diagnostic(
             code="W206",
-            severity=Severity.WARNING,
             message="the axes of this matrix are not quite of length 1 and at right angles",
             span=matrix.span,
             label=f"off by {error:.1g}; the nearest rotation is taken",
@@ -61,7 +62,7 @@ def _not_exact(matrix: tree.Matrix, values: Sequence[float], error: float) -> Di
         return _fault(
             matrix, "this matrix is a mirror image, not a rotation", "n, o, a are left-handed", "a must be n times o"
         )
-    return _fault(matrix, "the first nine numbers are not a rotation", _why(values))
+    return _fault(matrix, "the first nine numbers are not a rotation", _fault_of_axes(values))
 
 
 def constant(matrix: tree.Matrix) -> tuple[float, ...]:
@@ -130,7 +131,7 @@ def _fault(matrix: tree.Matrix, message: str, label: str, help_: str = "") -> Di
     return Diagnostic(code="E206", message=message, span=matrix.span, label=label, helps=(help_,) if help_ else ())
 
 
-def _why(values: Sequence[float]) -> str:
+def _fault_of_axes(values: Sequence[float]) -> str:
     """Name the first axis that is not of length 1, or the first two that are not at right angles."""
     axes = {"n": values[0:3], "o": values[3:6], "a": values[6:9]}
     for name, axis in axes.items():

@@ -173,14 +173,9 @@ class _Visitor:
         if name.key not in self._declared:
             return self._none(node, f"the call of `{name.text}`", name.span, "RLO-83 has no procedures")
         bracket = self._tokens[self._at(name.span) + 1]
-        self.report(
-            "E109",
-            f"`{name.text}` needs `=` before its value",
-            bracket.span,
-            "expected `=` before this",
-            advice=f"write `{name.text} = (...`",
-            fixes=(Fix(Span(bracket.start, bracket.start), "= "),),
-        )
+        text, advice = f"`{name.text}` needs `=` before its value", f"write `{name.text} = (...`"
+        fix = Fix(Span(bracket.start, bracket.start), "= ")
+        self.report("E109", text, bracket.span, "expected `=` before this", advice=advice, fixes=(fix,))
         value = tree.Matrix(Span(bracket.start, node.span.end), node.arguments)
         return self._assign(tree.Assign(node.span, name, value))
 

@@ -38,7 +38,7 @@ def joined(
     inside, names = _declarations(tokens, frozenset(pairs))
     names |= set(declared)
     imports = any(token.key == "IMPORT" and token.kind is _KEYWORD for token in tokens)
-    kept: list[Token] = []
+    joined_tokens: list[Token] = []
     findings = DiagnosticList()
     done = 0
     for pair in pairs:
@@ -52,18 +52,13 @@ def joined(
         if not (declared_here or torn or device or guessed):
             continue
         text = f"{first.text}{number.text}"
-        kept += [*tokens[done : pair - 1], Token(_NAME, text, key, first.start, number.end)]
+        joined_tokens += [*tokens[done : pair - 1], Token(_NAME, text, key, first.start, number.end)]
         done = pair + 1
         span = Span(first.start, number.end)
-        findings.report(
-            "E106",
-            f"`{' '.join(source.slice(span).split())}` is not one name",
-            span,
-            "no blanks in a name",
-            advice=f"write `{text}`",
-            fixes=(Fix(span, text),) if declared_here or torn or device else (),
-        )
-    return [*kept, *tokens[done:]], findings
+        message = f"`{' '.join(source.slice(span).split())}` is not one name"
+        fixes = (Fix(span, text),) if declared_here or torn or device else ()
+        findings.report("E106", message, span, "no blanks in a name", advice=f"write `{text}`", fixes=fixes)
+    return [*joined_tokens, *tokens[done:]], findings
 
 
 def _is_pair(source: Source, tokens: Sequence[Token], index: int) -> bool:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NoReturn, TypeVar
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Fix, Label, did_you_mean
+from armwright.program.language.diagnostic import Fix, did_you_mean, labels
 from armwright.program.language.source import Span
 from armwright.program.language.words import ABSENT, CLOSING, ELSEWHERE, OPENING
 from armwright.program.syntax import tree
@@ -265,14 +265,10 @@ def close(tokens: Tokens, key: str, opening: Token) -> Span | None:
             return token.span
     # An END that nothing else waits for was meant to be this word.
     instead = key not in ("END", "RECOVER") and tokens.sees("END") and tokens.more_ends()
-    tokens.say_once(
-        "E115",
-        f"{opening.text} has no {key}",
-        token.span if instead else tokens.gap(),
-        f"expected `{key}` here",
-        secondary=(Label(opening.span, "opened here"),),
-        fixes=(Fix(token.span, key),) if instead and key == "COEND" else (),
-    )
+    span, here = token.span if instead else tokens.gap(), labels(opening.span, "opened here")
+    fixes = (Fix(token.span, key),) if instead and key == "COEND" else ()
+    text, label = f"{opening.text} has no {key}", f"expected `{key}` here"
+    tokens.say_once("E115", text, span, label, secondary=here, fixes=fixes)
     if instead:
         tokens.take()
     tokens.hush()
@@ -290,15 +286,9 @@ def _separator(tokens: Tokens) -> None:
     if token.kind is _NAME and _misspelt_end(tokens):
         return
     if _starts_statement(tokens):
-        gap = tokens.gap()
-        tokens.say_once(
-            "E104",
-            "missing `;` between two statements",
-            gap,
-            "expected `;` here",
-            secondary=(Label(token.span, "a new statement starts here"),),
-            fixes=(Fix(gap, ";"),),
-        )
+        text, gap = "missing `;` between two statements", tokens.gap()
+        here = labels(token.span, "a new statement starts here")
+        tokens.say_once("E104", text, gap, "expected `;` here", secondary=here, fixes=(Fix(gap, ";"),))
         return
     advice = ABSENT.get(token.key, "")
     tokens.lost(f"{shown(token)} does not belong here", "expected `;`", code="E117", advice=advice)
