@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.features import UNITS, Features, features, features_of, spectrum
+from armwright.clearance.features import Features, features, features_of, spectrum
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.clearance.scenario import prepare
@@ -103,11 +103,6 @@ def test_many_curves(rng: np.random.Generator) -> None:
         assert getattr(together, name).shape == (2, 3)
         alone = getattr(features_of(TIME, curves[1, 2]), name)
         assert getattr(together, name)[1, 2] == pytest.approx(alone, rel=1e-12)
-
-
-def test_units() -> None:
-    """Every feature has its unit."""
-    assert set(UNITS) == set(Features._fields)
 
 
 def test_simulation_starts_where_it_rests(five_bar: Linkage) -> None:

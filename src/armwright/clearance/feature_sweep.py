@@ -6,7 +6,6 @@ and their spread is the part of it that is chance.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -15,7 +14,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, Flags, integer
-from armwright.clearance.features import UNITS, features
+from armwright.clearance.features import features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS, thesis_path
 from armwright.clearance.predictability import APART, MAX_REPLICATES, perturbed, together_until
@@ -25,17 +24,16 @@ from armwright.clearance.simulation import Status, simulate
 from armwright.errors import InvalidValueError, one_of
 from armwright.sweep.task import FAILURE, Axis, Output
 
-# The meaning of a path's features and largest force, and their units.
-_MEANING = {
-    "slope": "slope of the straight part of the error",
-    "intercept": "intercept of the straight part of the error",
-    "amp_dc": "twice the mean error",
-    "amp_ac": "largest amplitude of a wave of the error",
-    "offset_x": "error at the start, along x",
-    "offset_y": "error at the start, along y",
-    "peak": "largest force in a pin",
+# The units of a path's features and largest force, and their meaning.
+_QUANTITIES = {
+    "slope": ("m/s", "slope of the straight part of the error"),
+    "intercept": ("m", "intercept of the straight part of the error"),
+    "amp_dc": ("m", "twice the mean error"),
+    "amp_ac": ("m", "largest amplitude of a wave of the error"),
+    "offset_x": ("m", "error at the start, along x"),
+    "offset_y": ("m", "error at the start, along y"),
+    "peak": ("N", "largest force in a pin"),
 }
-_UNITS = {**UNITS, "peak": "N"}
 # Replicates in a sweep: with so few a spread is known to 40 %, and the mean spread of some neighbours well.
 DEFAULT_REPLICATES = 3
 
@@ -96,7 +94,7 @@ class FeatureSweep:
     def settings(self) -> Mapping[str, Any]:
         """The other inputs of the results."""
         return {
-            "linkage": _plain(self.linkage),
+            "linkage": self.linkage.as_data(),
             "paths": list(self.paths),
             "simulation": attrs.asdict(self.simulation_settings),
             "with_friction": self.with_friction,
@@ -110,12 +108,12 @@ class FeatureSweep:
         runs = f"{self.replicates + 1} runs with clearances a nanometre apart at most"
         mean = f", mean over {runs}" if self.replicates else ""
         for path in self.paths:
-            for name, meaning in _MEANING.items():
+            for name, (unit, meaning) in _QUANTITIES.items():
                 what = f"{meaning}, path {path}"
-                outputs[f"{path}_{name}"] = Output(description=what + mean, units=_UNITS[name])
+                outputs[f"{path}_{name}"] = Output(description=what + mean, units=unit)
                 if self.replicates:
                     text = f"standard deviation over these runs: {what}"
-                    outputs[f"{path}_{name}_spread"] = Output(description=text, units=_UNITS[name])
+                    outputs[f"{path}_{name}_spread"] = Output(description=text, units=unit)
             if self.replicates:
                 text = f"time until which these runs stay within {APART * 1e6:g} um of the first, path {path}"
                 outputs[f"{path}_until"] = Output(description=text, units="s")
@@ -141,7 +139,7 @@ class FeatureSweep:
         for path, task in zip(self.paths, self.tasks, strict=True):
             runs = [_simulated(task, row, frictions) for row in rows]
             diverged |= np.any([run.diverged for run in runs], axis=0)
-            for name in _MEANING:
+            for name in _QUANTITIES:
                 # The runs of a point are adjacent in memory: their sums then round alike, whatever the other points.
                 values = np.stack([run.features[name] for run in runs], axis=-1)
                 with np.errstate(invalid="ignore", over="ignore"):
@@ -185,7 +183,7 @@ def is_sweep_of(settings: Mapping[str, Any], linkage: Linkage) -> bool:
     """Whether a sweep is one of a linkage; its own clearances, which each run replaces, do not count."""
     swept, own = (
         {**plain, "pins": [{**pin, "clearance": None} for pin in plain.get("pins", [])]}
-        for plain in (settings.get("linkage", {}), _plain(linkage))
+        for plain in (settings.get("linkage", {}), linkage.as_data())
     )
     return swept == own
 
@@ -196,9 +194,3 @@ def _simulated(task: Scenario, clearances: Array, frictions: Array | None) -> _R
     run = simulate(task, clearances, frictions=frictions, threads=1)
     values = {**features(run)._asdict(), "peak": run.peaks.max(axis=-1)}
     return _Runs(values, run.time, run.error, np.asarray(run.status != Status.FINISHED))
-
-
-def _plain(linkage: Linkage) -> dict[str, Any]:
-    """Return a linkage as JSON holds it."""
-    plain: dict[str, Any] = json.loads(json.dumps(attrs.asdict(linkage), default=np.ndarray.tolist))
-    return plain

@@ -39,10 +39,6 @@ class Features(NamedTuple):
     offset_y: Array
 
 
-# The unit of each feature.
-UNITS = {"slope": "m/s", "intercept": "m", "amp_dc": "m", "amp_ac": "m", "offset_x": "m", "offset_y": "m"}
-
-
 def features(simulation: Simulation) -> Features:
     """Return the features of the error curves of a simulation; see ``features_of``."""
     return features_of(simulation.time, simulation.error)

@@ -5,6 +5,7 @@ A run keeps its bits whatever runs beside it: no lane reads another.
 
 from __future__ import annotations
 
+import json
 import textwrap
 from collections.abc import Sequence
 from inspect import isfunction
@@ -16,7 +17,7 @@ import attrs
 
 from armwright.clearance import event_location, simulation_loop
 from armwright.clearance.equations import WORKS, Contact, ContactMemory, FrictionModel, State, rates
-from armwright.clearance.linkage import Linkage
+from armwright.clearance.linkage import Linkage, Material
 from armwright.tracing.emit import LANES, function_source, head, kernel_body
 from armwright.tracing.scalar import Scalar
 
@@ -38,9 +39,15 @@ _COMPILED = '@njit(error_model="numpy")'
 _INLINED = '@njit(error_model="numpy", forceinline=True)'
 
 
+def _kernel_key(linkage: Linkage) -> str:
+    """Return what the kernels of two linkages share, whatever their names, clearances and materials."""
+    pins = [attrs.evolve(pin, clearance=0.0) for pin in linkage.pins]
+    return json.dumps(attrs.evolve(linkage, name="", pins=pins, material=Material(), assembly={}).as_data())
+
+
 @attrs.frozen(kw_only=True)
 class Layout:
-    """The layout of the numbers of a simulation.
+    """The layout of the numbers of a simulation; two are equal where their kernels are.
 
     Attributes:
         linkage: that moves.
@@ -49,7 +56,7 @@ class Layout:
         located: whether impacts are located within a step; see ``event_location``.
     """
 
-    linkage: Linkage
+    linkage: Linkage = attrs.field(eq=_kernel_key)
     friction: FrictionModel
     control: Control
     located: bool = False

@@ -7,11 +7,13 @@ ground points along x.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 import attrs
+import numpy as np
 
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, not_negative, number, of_shape, positive
 from armwright.errors import InvalidValueError, UnknownNameError, one_of
@@ -329,6 +331,11 @@ class Linkage:
             one_of("pin", name, self.clearances)
         pins = tuple(attrs.evolve(pin, clearance=clearances.get(pin.name, pin.clearance)) for pin in self.pins)
         return attrs.evolve(self, pins=pins)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the linkage as JSON holds it."""
+        data: dict[str, Any] = json.loads(json.dumps(attrs.asdict(self), default=np.ndarray.tolist))
+        return data
 
     def rotation_carrier(self, body: str) -> str | None:
         """Return the body whose angle the drive of a body acts against; None where its joint is no pin.

@@ -174,35 +174,15 @@ def _run(scenario: Scenario, layout: Layout, start: Array, contacts: Array, thre
         peaks=np.zeros((runs, pins)),
     )
     gains = np.tile(scenario.settings.gains, (runs, len(scenario.linkage.drives) if layout.gains else 0))
-    key = (_key_of(layout.linkage), layout.friction, layout.control, layout.located)
-    run = _compiled(_Simulated(key, layout), scenario.settings.integrator)
+    run = _compiled(layout, scenario.settings.integrator)
     lengths = scenario.lengths[:rows]
     inputs = (start, contacts, gains, scenario.table, lengths, samples, *record)
     on_cores_for_long(lambda first, last, cancelled: run(first, last, *inputs, cancelled), runs, threads)
     return record
 
 
-def _key_of(linkage: Linkage) -> tuple[Any, ...]:
-    """Return what the compiled simulations of two linkages share, whatever their clearances and materials."""
-    bodies = (linkage.ground, *linkage.bodies)
-    points = tuple((name, *p) for b in bodies for name, p in b.points.items())
-    masses = tuple((b.name, b.mass, b.inertia, len(b.points), *b.centre) for b in bodies)
-    pins = tuple((pin.bearing, pin.journal, pin.journal_radius) for pin in linkage.pins)
-    loads = tuple((load.point, *load.force) for load in linkage.loads)
-    return points, masses, pins, loads, linkage.joints, linkage.drives, linkage.tip, *linkage.gravity, linkage.zero
-
-
-@attrs.frozen
-class _Simulated:
-    """The layout of a simulation, of which the key alone is compared."""
-
-    key: tuple[Any, ...]
-    layout: Layout = attrs.field(eq=False)
-
-
 @cache
-def _compiled(simulated: _Simulated, integrator: Integrator) -> Any:
-    layout = simulated.layout
+def _compiled(layout: Layout, integrator: Integrator) -> Any:
     return compiled(emit_simulation(layout, integrator), "simulate", f"the simulation of {layout.linkage.name}")
 
 
