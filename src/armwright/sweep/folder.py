@@ -29,6 +29,7 @@ import attrs
 import numpy as np
 import scipy
 
+from armwright.arrays import Array
 from armwright.errors import FileFormatError, KindError, OutputError, shown
 from armwright.files.inputs import read_text, regular
 from armwright.files.output import reason
@@ -61,16 +62,16 @@ def identity(task: Task, design: Design) -> dict[str, Any]:
         "task": task.name,
         "settings": dict(task.settings),
         "outputs": {name: attrs.asdict(output) for name, output in task.outputs.items()},
-        "axes": {name: attrs.asdict(axis, value_serializer=_hashed) for name, axis in task.axes.items()},
-        "design": attrs.asdict(design, value_serializer=_hashed),
+        "axes": {name: attrs.asdict(axis) for name, axis in task.axes.items()},
+        "design": attrs.asdict(design),
     }
-    as_read: dict[str, Any] = json.loads(json.dumps(fields))
+    as_read: dict[str, Any] = json.loads(json.dumps(fields, default=_hashed))
     return as_read
 
 
-def _hashed(_owner: object, _field: object, value: Any) -> Any:
-    """Return the shape and the SHA-256 hash of an array, and anything else as it is."""
-    return [*value.shape, hashlib.sha256(value.tobytes()).hexdigest()] if isinstance(value, np.ndarray) else value
+def _hashed(array: Array) -> list[int | str]:
+    """Return the shape and the SHA-256 hash of an array."""
+    return [*array.shape, hashlib.sha256(array.tobytes()).hexdigest()]
 
 
 @attrs.frozen(kw_only=True)
