@@ -180,7 +180,7 @@ def test_bad_input(five_bar: Linkage) -> None:
         ShapeError, match=r"expected \(k, 2\) poses and as many offsets, got shapes \(3, 2\) and \(2, 2"
     ):
         estimate_at_rest(five_bar, STARTS, offsets[:2])
-    with pytest.raises(InvalidValueError, match="noise: expected a standard deviation above 0, got 0"):
+    with pytest.raises(InvalidValueError, match="noise: expected more than 0 m, got 0"):
         estimate_at_rest(five_bar, STARTS, offsets, 0.0)
     with pytest.raises(InvalidValueError, match="the loops do not close"):
         rest_offsets(five_bar, [(0.0, -2.0)], ARM_A)
