@@ -226,7 +226,7 @@ OTHER: list[tuple[Fall, Callable[[Design], Design], str]] = [
         "design.units.speed is 'm/s' there, 'km/h' here",
     ),
     (Fall(), lambda design: attrs.evolve(design, points=design.points + 1), r"design.points is \[40, 1, '"),
-    (Fall(samples=9), lambda _: full_factorial({"v": [1]}), "; and 5 more. Give this one a folder of its own"),
+    (Fall(samples=9), lambda _: full_factorial({"v": [1]}), "; and 6 more. Give this one a folder of its own"),
 ]
 
 

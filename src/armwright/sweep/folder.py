@@ -63,7 +63,7 @@ def identity(task: Task, design: Design) -> dict[str, Any]:
         "settings": dict(task.settings),
         "outputs": {name: attrs.asdict(output) for name, output in task.outputs.items()},
         "axes": {name: attrs.asdict(axis) for name, axis in task.axes.items()},
-        "design": attrs.asdict(design),
+        "design": {"runs": len(design), **attrs.asdict(design)},
     }
     as_read: dict[str, Any] = json.loads(json.dumps(fields, default=_hashed))
     return as_read
