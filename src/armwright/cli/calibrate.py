@@ -6,13 +6,13 @@ from typing import Annotated
 import typer
 
 from armwright.cli.failures import outcome
-from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
 from armwright.cli.options import ArmName, Json, OutputFolder, Quiet
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
+from armwright.cli.tool_options import MeasuredPoint, with_tool
 from armwright.errors import DoubtfulError
 
 

@@ -29,16 +29,7 @@ DEBUG = "ARMWRIGHT_DEBUG"
 _CallError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 _OUTPUTS = ("-o", "--output")
 # Errors of a standard output that cannot be written; they name no file.
-_OUTPUT_FAILS = {
-    errno.EPIPE,
-    errno.ENOSPC,
-    errno.EDQUOT,
-    errno.EFBIG,
-    errno.EIO,
-    errno.EBADF,
-    errno.ENXIO,
-    errno.EINVAL,
-}
+_UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF, errno.ENXIO, errno.EINVAL}
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # Delay after which a signal that was lost is sent again [s].
 _AGAIN = 0.02
@@ -153,7 +144,7 @@ def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
         error: BaseException = raised.error
     except (Exception, Interrupted) as other:  # noqa: BLE001 - unforeseen errors are reported as defects
         error = other
-    if isinstance(error, OSError) and error.filename is None and error.errno in _OUTPUT_FAILS:
+    if isinstance(error, OSError) and error.filename is None and error.errno in _UNWRITABLE:
         raise error
     status, message = _status_and_message(error)
     # The document of a failed check or a doubtful result has been printed with its result.

@@ -37,11 +37,6 @@ def print_json(data: Any) -> None:
     print(json.dumps(data, indent=2, ensure_ascii=not is_unicode))
 
 
-def plain_console(**settings: Any) -> "Console":
-    """Return a console that does not highlight; its arguments are those of ``console``."""
-    return console(highlight=False, **settings)
-
-
 def print_result(
     result: "Result",
     *,
@@ -66,12 +61,12 @@ def print_result(
     if as_json:
         print_json({**(head or {}), **result.as_data()})
     elif not quiet:
-        console = plain_console()
+        terminal = console()
         for shown in result.tables():
             if shown.rows:
-                print_result_table(console, shown)
+                print_result_table(terminal, shown)
         for note in result.notes:
-            console.print(note, soft_wrap=not wrap)
+            terminal.print(note, soft_wrap=not wrap)
         if output is not None:
             print(f"{file.partition('.')[0]}: {output / file}")
 

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
 from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_result
 from armwright.cli.shell_completion import one_of
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
+from armwright.cli.tool_options import MeasuredPoint, with_tool
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm

@@ -8,7 +8,7 @@ import typer
 
 from armwright.cli.numbers import within
 from armwright.cli.options import Json, OutputFolder, QuietButWarnings
-from armwright.cli.output import command_line, plain_console, print_json, print_result, print_result_table
+from armwright.cli.output import command_line, print_json, print_result, print_result_table
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, read_cell_option
 from armwright.cli.progress import waiting
 from armwright.errors import ExitStatus
@@ -116,6 +116,7 @@ def _finish(
     """Write and print the results of a run, also of one that failed."""
     from armwright.cli.programs import print_diagnostics
     from armwright.cli.results import write_results
+    from armwright.cli.terminal import console
     from armwright.program.vm.excerpt import KEPT, NOT_KEPT
     from armwright.program.vm.interpreter import warnings
     from armwright.report.files import left_out, result_files, run_record
@@ -139,7 +140,7 @@ def _finish(
             print(f"armwright: {note}", file=sys.stderr)
         print_result(result, as_json=False, quiet=quiet)
         if error is not None:
-            print_result_table(plain_console(stderr=True), frame_table(error, recording.code))
+            print_result_table(console(stderr=True), frame_table(error, recording.code))
         if output is not None and (error is not None or not quiet):
             # On a line of its own and not wrapped, so that it can be clicked or copied.
             print(f"report{' up to the failure' if error else ''}: {output / 'report.html'}")

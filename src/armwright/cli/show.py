@@ -31,7 +31,7 @@ def show(arm: ArmName, as_json: Json = False) -> None:
     if as_json:
         print_json(as_data(model))
         return
-    console = clean_console(highlight=False, emoji=False)
+    console = clean_console(emoji=False)
     console.print(f"{model.name}: {model.title}" if model.title else model.name, style="bold")
     if model.source:
         console.print(model.source, style="dim")
@@ -42,7 +42,7 @@ def show(arm: ArmName, as_json: Json = False) -> None:
             table = _compact(result)
             # A narrow terminal wraps lines; it must not truncate numbers.
             width = console.measure(table, options=console.options.update(max_width=_WIDEST)).maximum
-            clean_console(highlight=False, width=max(width, console.width)).print(table)
+            clean_console(width=max(width, console.width)).print(table)
     console.print()
     grid = Table.grid(padding=(0, 2))
     for fact in facts(model):

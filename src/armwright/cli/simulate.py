@@ -4,11 +4,11 @@ from typing import Annotated, Literal
 
 import typer
 
-from armwright.cli.load import Load
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, OutputFolder
 from armwright.cli.output import print_result
 from armwright.cli.results import write_results
+from armwright.cli.tool_options import Load, read_payload
 
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -38,7 +38,6 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
-    from armwright.cli.load import read_payload
     from armwright.dynamics.payloads import payload
     from armwright.report.motion_table import motion_csv
     from armwright.simulation.controllers import gravity_compensation, no_effort

@@ -124,7 +124,7 @@ def print_verbatim(text: str) -> None:
 
 
 def console(*, stderr: bool = False, **settings: Any) -> "Console":
-    """Return a console of Rich that cleans its texts and does not interpret markup, unless ``markup`` is true.
+    """Return a console of Rich that cleans its texts, does not interpret markup, and does not highlight.
 
     Args:
         stderr: whether it writes to the error output.
@@ -143,4 +143,4 @@ def console(*, stderr: bool = False, **settings: Any) -> "Console":
                 else:
                     yield segment
 
-    return CleanConsole(stderr=stderr, **{"markup": False, **settings})
+    return CleanConsole(stderr=stderr, **{"markup": False, "highlight": False, **settings})

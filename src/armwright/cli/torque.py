@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.load import Load
 from armwright.cli.options import ArmName, Json
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
+from armwright.cli.tool_options import Load, read_payload
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -45,7 +45,6 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
 
     from armwright.arm.load import load_arm
     from armwright.arm.model import Link
-    from armwright.cli.load import read_payload
     from armwright.cli.numbers import numbers
     from armwright.dynamics.equation_of_motion import terms
 

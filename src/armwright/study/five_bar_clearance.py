@@ -8,7 +8,7 @@ The sliding velocity of friction is that of the joints' centres, with the thresh
 (spec of the clearance, 0.2); the velocity of the surfaces, which is physically right, is used for comparison.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -154,26 +154,21 @@ def run_sweep(progress: Callable[[str, float], None] | None = None, *, levels: S
         MissingExtraError: scikit-learn is not installed.
     """
     check_extra()  # before the simulations, which take a minute
+    report = progress or (lambda _task, _part: None)
     points = np.array(list(product(levels, repeat=3)))
     task, block, parts = feature_sweep(), 96, []
     for first in range(0, len(points), block):
         parts.append(task(points[first : first + block]))
-        if progress is not None:
-            task_name = f"simulating {len(points)} linkages on {len(PATHS)} paths"
-            progress(task_name, min(1.0, (first + block) / len(points)))
+        report(f"simulating {len(points)} linkages on {len(PATHS)} paths", min(1.0, (first + block) / len(points)))
     values = {name: np.concatenate([part[name] for part in parts]) for name in task.outputs}
     names = [f"{path}_{feature}" for path in PATHS for feature in FEATURES]
-    done: list[str] = []
 
     def report_feature(name: str) -> None:
-        if progress is not None:
-            progress("learning nine features", len(done) / len(names))
-        done.append(name)
+        report("learning nine features", names.index(name) / len(names))
 
     table = feature_vector(values, PATHS, FEATURES)
     surrogate = learn(task.parameters, points, names, table, progress=report_feature)
-    if progress is not None:
-        progress("learning nine features", 1.0)
+    report("learning nine features", 1.0)
     return SweepResult(points=points, values=values, surrogate=surrogate)
 
 
@@ -193,13 +188,10 @@ def estimate_table(swept: SweepResult) -> list[EstimateRow]:
     """Return tables 5.5 to 5.8, with two further methods that are better."""
     rows = []
     for name, true in ARMS.items():
-        measured = _measured_features(name)
-        for feature in FEATURES:
-            part = [f"{path}_{feature}" for path in PATHS]
-            solution = solve_features(swept.surrogate.select(part), _selected(measured, part))
-            rows.append(_estimate(name, feature, solution))
-        solution = solve_features(swept.surrogate, _selected(measured, swept.surrogate.features))
-        rows.append(_estimate(name, "all nine", solution))
+        kinds = {feature: [f"{path}_{feature}" for path in PATHS] for feature in FEATURES}
+        for method, selected in (*kinds.items(), ("all nine", list(swept.surrogate.features))):
+            solution = solve_features(swept.surrogate.select(selected), _measured_features(name, selected))
+            rows.append(_estimate(name, method, solution))
         rested = estimate_at_rest(arm(), POSES, rest_offsets(arm(), POSES, true))
         rows.append(_estimate(name, "at rest", rested.values))
     return rows
@@ -290,14 +282,10 @@ def _cycles(clearances: Array, rng: np.random.Generator) -> Array:
     return tip_of(linkage, closed(linkage, equilibrium.q, drives=drives, gaps=gaps))
 
 
-def _measured_features(name: str) -> dict[str, float]:
-    return {
-        f"{path}_{feature}": float(x) for path in PATHS for feature, x in features(run_of(name, path))._asdict().items()
-    }
-
-
-def _selected(measured: Mapping[str, float], names: tuple[str, ...] | list[str]) -> Array:
-    return np.array([measured[name] for name in names])
+def _measured_features(name: str, selected: Iterable[str]) -> Array:
+    """Return features of an arm by ``path_feature``, SI."""
+    parts = (feature.split("_", 1) for feature in selected)
+    return np.array([float(getattr(features(run_of(name, path)), feature)) for path, feature in parts])
 
 
 def _estimate(name: str, method: str, ours: Array) -> EstimateRow:

@@ -1,15 +1,20 @@
-"""The payload as an option: a point mass in kilograms and millimetres, or a file with its inertia."""
+"""Options about the tool: its payload, and the measured point where it is not the tool of the arm file."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-if TYPE_CHECKING:
-    from armwright.arm.model import Link
+from armwright.cli.numbers import numbers
 
-Load = Annotated[
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm, Link
+
+Load: TypeAlias = Annotated[
     str | None,
     typer.Option("--load", help="Payload in the tool frame: MASS,X,Y,Z in kg and mm, or a TOML file with its inertia."),
+]
+MeasuredPoint: TypeAlias = Annotated[
+    str | None, typer.Option("--tool-mm", help="Measured point in the frame of the last link, in mm, as in 0,0,31.")
 ]
 
 
@@ -22,7 +27,6 @@ def read_payload(text: str) -> "Link":
     """
     from armwright.arm.load import is_path, read_load
     from armwright.arm.model import Link
-    from armwright.cli.numbers import numbers
 
     if is_path(text):
         return read_load(text)
@@ -33,3 +37,15 @@ def read_payload(text: str) -> "Link":
     if mass < 0:
         raise typer.BadParameter(f"expected a mass of 0 kg or more, got {mass:g}", param_hint="--load")
     return Link(mass=mass, com=[x * 1e-3 for x in position])
+
+
+def with_tool(model: "Arm", text: str | None) -> "Arm":
+    """Return an arm whose tool is a point of its last link; the same arm without a text."""
+    import attrs
+    import numpy as np
+
+    from armwright.spatial.poses import homogeneous
+
+    if text is None:
+        return model
+    return attrs.evolve(model, tool=homogeneous(np.eye(3), np.array(numbers(text, 3, "--tool-mm")) * 1e-3))
