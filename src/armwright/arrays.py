@@ -102,11 +102,11 @@ def integer(value: int, what: str, *, least: int) -> int:
     try:
         result = operator.index(value)
     except TypeError as error:
-        raise KindError(f"{what}: expected a whole number, got {shown(value)}") from error
+        raise KindError(f"{what}: expected an integer, got {shown(value)}") from error
     if isinstance(value, bool):
-        raise KindError(f"{what}: expected a whole number, got {value}")
+        raise KindError(f"{what}: expected an integer, got {value}")
     if result < least:
-        raise InvalidValueError(f"{what}: expected a whole number not below {least}, got {result}")
+        raise InvalidValueError(f"{what}: expected an integer of at least {least}, got {result}")
     return result
 
 

@@ -74,7 +74,9 @@ def test_the_seeds_configurations(puma: CompiledArm) -> None:
 
 def test_the_seeds_poses_as_printed(puma: CompiledArm) -> None:
     """Of printed rotations the nearest are taken, with a warning each; beside a singularity that is a degree."""
-    with pytest.warns(RotationWarning, match=r"pose \d: its rotation is none, by 0\.00\d+; the nearest") as caught:
+    with pytest.warns(
+        RotationWarning, match=r"pose \d: its rotation matrix is not orthonormal \(error 0\.00\d+\); the nearest"
+    ) as caught:
         move = joint_move(puma, SEED_POSES, SEED_TIMES, blend=SEED_BLEND, ends="running")
 
     assert [str(one.message)[5] for one in caught] == ["1", "2", "3"]
@@ -87,7 +89,8 @@ def test_the_seeds_poses_as_printed(puma: CompiledArm) -> None:
 def test_the_seeds_cartesian_move_has_no_branch(puma: CompiledArm, orientation: str) -> None:
     """The seed never solved its Cartesian move: the only branch inside the limits at A meets the wrist before C."""
     with pytest.raises(
-        PathError, match=r"no branch carries the tool to its last pose. left, down, no-flip: at"
+        PathError,
+        match=r"no single branch of the inverse kinematics can be followed to the last pose. left, down, no-flip: at",
     ) as stop:
         cartesian_move(puma, SEED_POSES, SEED_TIMES, blend=SEED_BLEND, ends="running", orientation=orientation)  # type: ignore[arg-type]
 
@@ -200,7 +203,7 @@ def test_times_by_the_tool(puma: CompiledArm) -> None:
     assert move.certificate is not None
     assert move.certificate.holds
     assert move.certificate.factor > 1
-    assert "times slower than the tool speed has it, for the acceleration of joint" in str(move.certificate)
+    assert "times slower than the tool speed requires, limited by the acceleration of joint" in str(move.certificate)
 
 
 def test_a_certificate_that_does_not_hold(puma: CompiledArm) -> None:
@@ -279,7 +282,7 @@ def test_one_branch_where_there_is_one(seed: int) -> None:
 def test_poses_that_are_none(puma: CompiledArm) -> None:
     """Each wrong pose is named by its number."""
     X = forward(puma.arm, SEED_Q).copy()
-    with pytest.raises(ShapeError, match=r"poses: expected two or more, shape \(k, 4, 4\), got \(1, 4, 4\)"):
+    with pytest.raises(ShapeError, match=r"poses: expected two or more poses, shape \(k, 4, 4\), got \(1, 4, 4\)"):
         joint_move(puma, X[:1])
     with pytest.raises(ShapeError, match=r"poses: .*got \(4, 4\)"):
         joint_move(puma, X[0])
@@ -307,15 +310,15 @@ def test_poses_that_are_none(puma: CompiledArm) -> None:
 def test_times_and_blends_that_are_none(puma: CompiledArm) -> None:
     """Times must rise, blends must fit between them, and whatever else is asked for must exist."""
     X = forward(puma.arm, SEED_Q)
-    with pytest.raises(InvalidValueError, match=r"times must rise, got 1 s and then 0\.5 s at point 2"):
+    with pytest.raises(InvalidValueError, match=r"times must increase, got 1 s and then 0\.5 s at point 2"):
         joint_move(puma, X, [0, 1, 0.5])
     with pytest.raises(ShapeError, match=r"times: expected 3, one per pose, got shape \(2,\)"):
         joint_move(puma, X, [0, 1])
-    with pytest.raises(InvalidValueError, match="blends overlap on the path from point 1 to point 2"):
+    with pytest.raises(InvalidValueError, match="blends overlap on the segment from point 1 to point 2"):
         cartesian_move(puma, X, [0, 0.5, 1], blend=0.4)
     with pytest.raises(ShapeError, match=r"blend: expected one number, or 3, one per pose"):
         joint_move(puma, X, [0, 0.5, 1], blend=[0.1, 0.1])
-    with pytest.raises(InvalidValueError, match="blend: only with times"):
+    with pytest.raises(InvalidValueError, match="blend: allowed only with times"):
         joint_move(puma, X, blend=0.1)
     with pytest.raises(UnknownNameError, match="orientation"):
         cartesian_move(puma, X, [0, 1, 2], orientation="euler")  # type: ignore[arg-type]
@@ -323,10 +326,10 @@ def test_times_and_blends_that_are_none(puma: CompiledArm) -> None:
         InvalidValueError, match="deviation: expected 1e-09 m or more, the closest that can be certified, got"
     ):
         cartesian_move(puma, X, [0, 1, 2], deviation=0.0)
-    with pytest.raises(InvalidValueError, match=r"poses 1 and 2 are the same; leave one out, or give times"):
+    with pytest.raises(InvalidValueError, match=r"poses 1 and 2 coincide; omit one, or specify times"):
         cartesian_move(puma, X[[0, 0, 1]])
     slow_tool = attrs.evolve(puma.arm, tool_speed=np.inf)
-    with pytest.raises(InvalidValueError, match="times are needed, as its tool has no speed"):
+    with pytest.raises(InvalidValueError, match="times are needed, since its tool speed is unknown"):
         cartesian_move(slow_tool, X)
 
 
@@ -363,5 +366,5 @@ def test_stops_at_one_and_the_same_place(puma: CompiledArm) -> None:
     """Poses that are all the same leave no way on which to stop."""
     X = forward(puma.arm, [[0.6, 0.2, 0.6, 0.3, 0.9, 0.1]] * 3)
 
-    with pytest.raises(InvalidValueError, match="all of them are the same, so there is no path to go"):
+    with pytest.raises(InvalidValueError, match="all of them coincide, so there is no path"):
         stopping_move(puma, X)

@@ -123,7 +123,7 @@ def test_bad_knots_are_refused() -> None:
         finish(np.append(state[:-1], -1.0))
     with pytest.raises(InvalidValueError, match="step: expected more than 0 s, got -1"):
         xspline_kernel(2).function("push")(state, [1.0, 2.0], [-1.0])
-    with pytest.raises(InvalidValueError, match="joints: expected 1 or more, got 0"):
+    with pytest.raises(InvalidValueError, match="joints: expected an integer of at least 1, got 0"):
         xspline_kernel(0)
-    with pytest.raises(KindError, match=r"joints: expected a whole number from 1, got 2\.5"):
+    with pytest.raises(KindError, match=r"joints: expected an integer, got 2\.5"):
         xspline_kernel(2.5)  # type: ignore[arg-type]

@@ -171,9 +171,8 @@ class _Clock:
         """Return the first and second derivative of the motion; beyond its segment the polynomial goes on."""
         segment = self._segment
         local = np.array([[tau - self._times[segment]]])
-        return evaluate(self._first[segment : segment + 1], local)[0], evaluate(
-            self._second[segment : segment + 1], local
-        )[0]
+        first, second = (evaluate(terms[segment : segment + 1], local)[0] for terms in (self._first, self._second))
+        return first, second
 
     def _skip(self) -> None:
         """Go to the segment that begins or goes on at the present time."""

@@ -6,7 +6,6 @@ largest u that stays below them. Standing still, x = u = 0, keeps all bounds, so
 
 from __future__ import annotations
 
-import importlib
 import logging
 import math
 from types import SimpleNamespace
@@ -15,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.errors import ArmwrightError, MissingExtraError
+from armwright.errors import ArmwrightError
+from armwright.extras import import_extra
 
 # The largest x there is, where nothing binds. The solver of toppra loses its path among numbers so far apart.
 UNBOUNDED = 1e12
@@ -124,12 +124,9 @@ def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array
         ArmwrightError: its solver gives up, as it does for some problems that have a solution.
         MissingExtraError: toppra is not installed.
     """
-    try:
-        algorithm, constraint = (importlib.import_module(f"toppra.{name}") for name in ("algorithm", "constraint"))
-    except ImportError as error:
-        raise MissingExtraError(
-            "method='toppra' needs toppra; install it by: pip install 'armwright[optimal]'"
-        ) from error
+    algorithm, constraint = (
+        import_extra(f"toppra.{name}", "method='toppra'", "optimal") for name in ("algorithm", "constraint")
+    )
     logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what goes wrong is reported by errors
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     rows = bounds.a.shape[1]
@@ -151,7 +148,7 @@ def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array
         _, sd, _ = run.compute_parameterization(math.sqrt(sets[0, 1]) if rests[0] else 0.0, 0.0)
     if sd is None or np.isnan(sd).any():
         raise ArmwrightError(
-            "toppra's solver of linear programs gave up, as it does for some problems that have a solution: leave "
-            "method= out, or ask for another number of intervals"
+            "toppra's solver of linear programs failed, as it does for some feasible problems: omit method=, or use "
+            "another number of intervals"
         )
     return np.asarray(sd**2, dtype=np.float64)

@@ -120,17 +120,19 @@ def joint_move(
     configurations = configurations_through(solver.arm, X, _near(solver.arm, near))
     q = np.array([configuration.q for configuration in configurations])
     if times is None:
-        _refuse_blend(blend)
+        if blend is not None:
+            raise InvalidValueError(
+                "blend: allowed only with times; without times the acceleration limits determine the blends"
+            )
         t, b = blend_timing(q, solver.arm.limit("speed"), solver.arm.limit("acceleration"), ends=ends)
     else:
         t, b = _timing(times, blend, len(X))
-    labels = [configuration.label for configuration in configurations]
     move = Move(
         arm=solver.arm,
         poses=X,
         times=t,
         configurations=q,
-        label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
+        label=_joined_label([configuration.label for configuration in configurations]),
         trajectory=blended(t, q, b, ends=ends),
         passing_distances=via_distances(t, q, b, ends=ends),
     )
@@ -240,7 +242,7 @@ def stopping_move(
     """
     solver, X = solver_of(arm), exact_poses(poses)
     if Path(poses=X).lengths().max() <= NEGLIGIBLE:
-        raise InvalidValueError("poses: all of them are the same, so there is no path to go")
+        raise InvalidValueError("poses: all of them coincide, so there is no path")
     first: PathError | None = None
     for start in configurations_at(solver.arm, X[:1], _near(solver.arm, near))[0]:
         try:
@@ -263,7 +265,7 @@ def exact_poses(poses: ArrayLike) -> Array:
     """
     X = of_shape(poses, (4, 4), "poses")
     if X.ndim != 3 or len(X) < 2:
-        raise ShapeError(f"poses: expected two or more, shape (k, 4, 4), got {X.shape}")
+        raise ShapeError(f"poses: expected two or more poses, shape (k, 4, 4), got {X.shape}")
     try:
         typed_poses(X)
     except InvalidValueError:
@@ -276,7 +278,8 @@ def exact_poses(poses: ArrayLike) -> Array:
     changes = np.abs(R - X[:, :3, :3]).max(axis=(1, 2))
     for i in np.flatnonzero(changes > _ROUNDING).tolist():
         warnings.warn(
-            f"pose {i + 1}: its rotation is none, by {changes[i]:.2g}; the nearest one is taken",
+            f"pose {i + 1}: its rotation matrix is not orthonormal (error {changes[i]:.2g}); the nearest rotation is "
+            "used",
             RotationWarning,
             stacklevel=3,
         )
@@ -303,17 +306,12 @@ def _tool_times(arm: Arm, X: Array) -> Array:
     """Return when poses are passed at the arm's speed of the tool."""
     lengths = Path(poses=X).lengths()
     for i in np.flatnonzero(lengths <= NEGLIGIBLE):
-        raise InvalidValueError(f"poses {i + 1} and {i + 2} are the same; leave one out, or give times")
+        raise InvalidValueError(f"poses {i + 1} and {i + 2} coincide; omit one, or specify times")
     if not np.isfinite(arm.tool_speed):
         raise InvalidValueError(
-            f"arm '{arm.name}': times are needed, as its tool has no speed of its own ([hand] in the arm file)"
+            f"arm '{arm.name}': times are needed, since its tool speed is unknown ([hand] in the arm file)"
         )
     return np.concatenate([[0.0], np.cumsum(lengths / arm.tool_speed)])
-
-
-def _refuse_blend(blend: ArrayLike | None) -> None:
-    if blend is not None:
-        raise InvalidValueError("blend: only with times; without them the limits of acceleration determine the blends")
 
 
 def _inside_limits(arm: AnyArm, move: Move) -> Move:
@@ -347,7 +345,9 @@ def _followed(
             errors[branch.label] = error
     nearest = next(iter(errors.values()))
     reasons = "; ".join(f"{label}: {error}" for label, error in errors.items())
-    raise nearest.restated(nearest.segment, f"no branch carries the tool to its last pose. {reasons}")
+    raise nearest.restated(
+        nearest.segment, f"no single branch of the inverse kinematics can be followed to the last pose. {reasons}"
+    )
 
 
 def _legs(arm: AnyArm, q: Array, X: Array, *, method: DetourMethod, deviation: float, speed: float) -> list[Detour]:
@@ -362,16 +362,20 @@ def _legs(arm: AnyArm, q: Array, X: Array, *, method: DetourMethod, deviation: f
     return legs
 
 
+def _joined_label(labels: Sequence[str]) -> str:
+    """Return the label of configurations: that of all of them, or all labels where they differ."""
+    return labels[0] if len(set(labels)) == 1 else " -> ".join(labels)
+
+
 def _stopping(arm: Arm, X: Array, q_start: Array, legs: Sequence[Detour]) -> Move:
     times = np.concatenate([[0.0], np.cumsum([leg.trajectory.duration for leg in legs])])
     configurations = np.array([q_start, *(leg.trajectory(leg.trajectory.duration) for leg in legs)])
-    labels = [inverse(arm, each, q).best.label for each, q in zip(X, configurations, strict=True)]
     return Move(
         arm=arm,
         poses=X,
         times=times,
         configurations=configurations,
-        label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
+        label=_joined_label([inverse(arm, pose, q).best.label for pose, q in zip(X, configurations, strict=True)]),
         trajectory=join([leg.trajectory for leg in legs]),
         passing_distances=np.zeros(len(X)),
         detours=tuple(legs),

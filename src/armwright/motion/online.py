@@ -8,7 +8,6 @@ again.
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +15,8 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, not_negative, one_per_joint, positive
-from armwright.errors import ArmwrightError, InvalidValueError, MissingExtraError
+from armwright.errors import ArmwrightError, InvalidValueError
+from armwright.extras import import_extra
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.efforts import checked
 from armwright.motion.trajectory import Trajectory, hold, join
@@ -30,8 +30,8 @@ _MAX_JERK = 1000.0
 # A joint does not have its full acceleration sooner than this: rounding would make steps of it [s].
 _SHORTEST_RISE = 1e-6
 _GAVE_UP = (
-    "Ruckig found no motion to the new goal: a path, a limit or a jerk is of quite another size than the others; check "
-    "their units"
+    "Ruckig found no motion to the new goal: a distance, a limit or a jerk differs from the others by orders of "
+    "magnitude; check their units"
 )
 # A path of no joint farther than this, from rest, is none [rad] or [m].
 _NOWHERE = 1e-12
@@ -105,7 +105,8 @@ def retarget(
     jerk_limits = _jerk_limits(task, jerk, brake=brake)
     if not synchronised and (task.qd_goal.any() or period is not None):
         raise InvalidValueError(
-            "synchronised=False: joints that arrive by themselves rest there, so neither qd_goal nor period fits"
+            "synchronised=False: joints that arrive independently stop at the goal, so qd_goal and period are not "
+            "allowed"
         )
     if period is not None:
         period = positive(period, "period", "s")
@@ -166,7 +167,7 @@ def _up_to(running: Trajectory, t: float) -> Trajectory:
         end = running(running.duration)
         if np.abs(running(running.duration, 1)).max() > _AT_LIMIT:
             raise InvalidValueError(
-                f"t: the motion ends at {running.duration:g} s and not at rest, so there is no state at {t:g} s"
+                f"t: the motion ends at {running.duration:g} s and not at rest, so its state at {t:g} s is undefined"
             )
         return join([running, hold(end, t - running.duration)])
     count = max(1, int(np.searchsorted(running.times, t, side="left")))
@@ -181,11 +182,11 @@ def _check_goal(task: _Task) -> None:
         raise InvalidValueError(f"q_goal: {fault}")
     for j in np.flatnonzero(np.abs(task.qd_goal) > speed * (1 + _AT_LIMIT)).tolist():
         beyond = _beyond_limit(arm, j, "s", task.qd_goal[j], speed[j])
-        raise InvalidValueError(f"qd_goal: {arm.called(j)} would move at {beyond}")
+        raise InvalidValueError(f"qd_goal: the velocity of {arm.called(j)} would be {beyond}")
     for j in np.flatnonzero(~np.isfinite(arm.limit("acceleration"))).tolist():
         raise InvalidValueError(
-            f"arm '{arm.name}': {arm.called(j)} has no limit of acceleration, so the motion to a new goal has no "
-            "duration"
+            f"arm '{arm.name}': {arm.called(j)} has no limit of acceleration, so the duration of the motion to a new "
+            "goal is undefined"
         )
 
 
@@ -203,8 +204,8 @@ def _jerk_limits(task: _Task, limits: ArrayLike | None, *, brake: bool) -> Array
         for j in np.flatnonzero(jerk * _SHORTEST_RISE > acceleration).tolist():
             largest = f"{acceleration[j] / _SHORTEST_RISE:.3g} {arm.joints[j].units.position}/s³"
             raise InvalidValueError(
-                f"jerk: {arm.called(j)} would have its full acceleration in less than a microsecond; expected "
-                f"{largest} at most, got {jerk[j]:.3g}"
+                f"jerk: {arm.called(j)} would reach its full acceleration in less than a microsecond; expected "
+                f"at most {largest}, got {jerk[j]:.3g}"
             )
     # While an acceleration dies away at a constant jerk the speed still grows by a²/(2 jerk).
     room = speed * (1 + _AT_LIMIT) - task.qd * np.sign(task.qdd)
@@ -220,7 +221,7 @@ def _jerk_limits(task: _Task, limits: ArrayLike | None, *, brake: bool) -> Array
 def _check_state(task: _Task, jerk: Array, least: Array) -> None:
     """Refuse a state beyond a limit, or one that passes its limit of speed with jerks below the ``least`` (n,)."""
     arm, speed, acceleration = task.arm, task.arm.limit("speed"), task.arm.limit("acceleration")
-    allowed = "; brake=True accepts it and brings it back inside first"
+    allowed = "; brake=True accepts it and first brakes to within the limits"
     for does, per, rates, limits in (
         ("accelerates by", "s²", task.qdd, acceleration),
         ("moves at", "s", task.qd, speed),
@@ -250,7 +251,7 @@ def _phases(task: _Task, jerk_limits: Array, *, synchronised: bool, period: floa
         How long they last (n, k) [s]; their jerks (n, k + 1), the last of which is that of the rest after the joint has
         arrived; and the duration of the motion [s].
     """
-    ruckig = _ruckig()
+    ruckig: Any = import_extra("ruckig", "a new goal for a running motion", "online", "Ruckig")
     n, arm = task.arm.n, task.arm
     request = ruckig.InputParameter(n)
     request.current_position, request.current_velocity = task.q.tolist(), task.qd.tolist()
@@ -308,14 +309,4 @@ def _check_range(task: _Task, motion: Trajectory) -> None:
     for extreme, worse in zip(motion.extremes(0), (np.less, np.greater), strict=True):
         for fault in violations(task.arm, extreme):
             if worse(fault.value, fault.limit) and worse(fault.value, task.q[fault.joint - 1]):
-                raise OnlineError(f"on its motion to the new goal {fault}: it moves too fast to reverse before")
-
-
-def _ruckig() -> Any:
-    """Import Ruckig, which only those need whose goals change on the path."""
-    try:
-        return import_module("ruckig")
-    except ImportError as error:
-        raise MissingExtraError(
-            "a new goal for a running motion needs Ruckig; install it by: pip install 'armwright[online]'"
-        ) from error
+                raise OnlineError(f"on its motion to the new goal {fault}: it moves too fast to stop before")

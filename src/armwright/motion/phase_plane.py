@@ -58,10 +58,6 @@ class _Rows(NamedTuple):
     viscous: Array
     ahead: Array
 
-    def without_viscous(self) -> Bounds:
-        """Leave the root of x out."""
-        return Bounds(self.a, self.b, self.c)
-
     def by_tangent(self, x: Array, lengths: Array) -> Bounds:
         """Put a tangent in the position of the root of x: at a solution (N + 1,), or where standing still keeps it."""
         u = np.diff(x) / (2 * lengths)
@@ -98,10 +94,10 @@ def fastest(
     """
     solve = by_toppra if method == "toppra" else largest_squares
     rows = _rows(solver, grid, locate, efforts=efforts)
-    bounds = rows.without_viscous()
+    bounds = Bounds(rows.a, rows.b, rows.c)  # the root of x left out
     x = solve(bounds, grid.lengths, rests)
     for k in np.flatnonzero(x[1:-1] > UNBOUNDED / 2):
-        raise IncapableArmError(f"{locate(float(grid.origins[k + 1]))} nothing limits how fast the joints may be")
+        raise IncapableArmError(f"{locate(float(grid.origins[k + 1]))} no limit bounds the joint velocities")
     before = 0.0
     for _ in range(_ROUNDS if rows.viscous.any() else 0):
         bounds = rows.by_tangent(x, grid.lengths)
@@ -142,7 +138,9 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
     arm = solver.arm
     speed, acceleration, effort = (arm.limit(name) for name in ("speed", "acceleration", "effort"))
     viscous = arm.drive("viscous")
-    least, most = _dry_frictions(solver, grid)
+    # The least and the most that dry friction takes of the joints on the intervals (N, n).
+    frictions = np.stack([dry_frictions(arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
+    least, most = frictions.min(axis=0), frictions.max(axis=0)
     limits: list[_Rows] = []
     for part in _PARTS:
         rate, bend = grid.at(part, 1), grid.at(part, 2)
@@ -164,12 +162,6 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
             margin = effort - (most - least) / 2
             limits.append(_limited(margin, _Rows(a, b, gravity + (most + least) / 2, viscous * rate, ahead)))
     return _Rows(*(np.concatenate(arrays, axis=1) for arrays in zip(*limits, strict=True)))
-
-
-def _dry_frictions(solver: Solver, grid: Grid) -> tuple[Array, Array]:
-    """Return the least and the most that dry friction takes of the joints on the intervals (N, n)."""
-    frictions = np.stack([dry_frictions(solver.arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
-    return frictions.min(axis=0), frictions.max(axis=0)
 
 
 def _limited(limits: Array, rows: _Rows) -> _Rows:

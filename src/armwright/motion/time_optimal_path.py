@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from numbers import Integral
 from typing import get_args
 
 import attrs
@@ -12,8 +11,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import positions
-from armwright.arrays import Array, ArrayLike
-from armwright.errors import IncapableArmError, InvalidValueError, KindError, ShapeError, one_of, shown
+from armwright.arrays import Array, ArrayLike, integer
+from armwright.errors import IncapableArmError, InvalidValueError, ShapeError, one_of
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.certificate import LIMITS, LimitName
 from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
@@ -160,7 +159,7 @@ def _geometry(arm: Arm, path: Trajectory | ArrayLike) -> tuple[Trajectory, Calla
     """Return a path as a trajectory, and what says where one of its parameters is."""
     if isinstance(path, Trajectory):
         checked(arm, path, "path")
-        return path, lambda s: f"at {s:.3f} s of the motion as it was given"
+        return path, lambda s: f"at {s:.3f} s of the original motion"
     knots = positions(arm, path, "path", callers=2)
     if knots.ndim != 2 or len(knots) < 2:
         raise ShapeError(f"path: expected a Trajectory, or (k, {arm.n}) knots with k at least 2, got {knots.shape}")
@@ -174,11 +173,10 @@ def _geometry(arm: Arm, path: Trajectory | ArrayLike) -> tuple[Trajectory, Calla
 
 
 def _whole(intervals: int) -> int:
-    if isinstance(intervals, bool) or not isinstance(intervals, Integral):
-        raise KindError(f"intervals: expected a whole number, got {shown(intervals)}")
+    count = integer(intervals, "intervals", least=0)
     if not _MIN_INTERVALS <= intervals <= _MAX_INTERVALS:
         raise InvalidValueError(f"intervals: expected {_MIN_INTERVALS} to {_MAX_INTERVALS}, got {intervals}")
-    return int(intervals)
+    return count
 
 
 def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
@@ -190,8 +188,8 @@ def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
     limited = np.any([np.isfinite(arm.limit(name)) for name in counting if name != "speed"], axis=0)
     for j in np.flatnonzero(~limited & (np.ptp(path.extremes(0), axis=0) > 0)):
         raise IncapableArmError(
-            f"arm '{arm.name}': {arm.called(int(j))} moves and has no limit of {' or '.join(counting[1:])}, so there "
-            "is no fastest run"
+            f"arm '{arm.name}': {arm.called(int(j))} moves and has no limit of {' or '.join(counting[1:])}, so the "
+            "fastest motion is undefined"
         )
 
 
@@ -212,9 +210,8 @@ def _bindings(solver: Solver, run: Trajectory, *, efforts: bool) -> tuple[Bindin
     uses = np.stack([np.abs(values[name]) / solver.arm.limit(name) for name in values], axis=1)
     flat = uses.reshape(_LOOKS, -1)
     counts = np.bincount(flat.argmax(axis=1)[flat.max(axis=1) >= _BINDS], minlength=flat.shape[1])
-    runs_ = [
+    return tuple(
         Binding(limit=LIMITS[k // solver.arm.n], joint=int(k % solver.arm.n), share=float(counts[k] / _LOOKS))
         for k in np.argsort(-counts, kind="stable")
         if counts[k]
-    ]
-    return tuple(runs_)
+    )

@@ -38,13 +38,11 @@ class ToolPath:
     Attributes:
         position: (x, y, z) [m].
         times: (k,) when the poses are passed that it was planned through [s].
-        rotations: the orientation by rotations about one fixed axis from pose to pose; None where it is by ``angles``.
-        angles: the orientation by ZYZ angles [rad]; None where it is by ``rotations``.
+        orientation: by rotations about one fixed axis from pose to pose, or by ZYZ angles.
     """
 
     position: Trajectory
-    rotations: Rotations | None
-    angles: Trajectory | None
+    orientation: Rotations | ZYZAngles
     times: Array
 
     @property
@@ -55,10 +53,7 @@ class ToolPath:
     def __call__(self, t: ArrayLike) -> Array:
         """Return poses (..., 4, 4) at times (...)."""
         t = floats(t, "t")
-        if self.angles is not None:
-            return homogeneous(from_zyz(self.angles(t)), self.position(t))
-        assert self.rotations is not None  # noqa: S101 - one of the two is there
-        return homogeneous(self.rotations(t), self.position(t))
+        return homogeneous(self.orientation(t), self.position(t))
 
     def first_knots(self, step: float, fewest: int) -> Array:
         """Return the first times: so far apart [s], and so many at least in each blend and on each straight segment."""
@@ -69,8 +64,7 @@ class ToolPath:
         """Return the same path run ``factor`` times slower."""
         return ToolPath(
             position=self.position.slowed(factor),
-            rotations=None if self.rotations is None else self.rotations.slowed(factor),
-            angles=None if self.angles is None else self.angles.slowed(factor),
+            orientation=self.orientation.slowed(factor),
             times=self.times * factor,
         )
 
@@ -100,9 +94,29 @@ class ToolPath:
 
     def spin(self) -> tuple[Array, Array]:
         """Return upper bounds (m,) of angular speed [rad/s] and acceleration [rad/s²] on each interval."""
-        if self.rotations is not None:
-            return self.rotations.spin((self.knots[1:] + self.knots[:-1]) / 2)
-        assert self.angles is not None  # noqa: S101 - one of the two is there
+        return self.orientation.spin((self.knots[1:] + self.knots[:-1]) / 2)
+
+
+@attrs.frozen(eq=False)
+class ZYZAngles:
+    """Orientations by ZYZ Euler angles.
+
+    Attributes:
+        angles: phi, theta, psi over time [rad].
+    """
+
+    angles: Trajectory
+
+    def __call__(self, t: Array) -> Array:
+        """Return rotations (..., 3, 3) at times (...)."""
+        return from_zyz(self.angles(t))
+
+    def slowed(self, factor: float) -> ZYZAngles:
+        """Return the same rotations run ``factor`` times slower."""
+        return ZYZAngles(self.angles.slowed(factor))
+
+    def spin(self, _t: Array) -> tuple[Array, Array]:
+        """Return upper bounds (m,) of angular speed [rad/s] and acceleration [rad/s²] on each of the m segments."""
         phi, theta, psi = self.angles.segment_peaks(1).T
         # Each angle rotates about an axis of length 1 that the angles before it carry round.
         change = self.angles.segment_peaks(2).sum(axis=-1) + phi * theta + phi * psi + theta * psi
@@ -186,16 +200,15 @@ def tool_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, o
     position = blended(times, poses[:, :3, 3], blend, ends=ends)
     R, t = poses[:, :3, :3], floats(times, "times")
     if orientation == "zyz":
-        return ToolPath(
-            position=position, rotations=None, angles=blended(times, zyz_angles(R), blend, ends=ends), times=t
-        )
+        angles = ZYZAngles(blended(times, zyz_angles(R), blend, ends=ends))
+        return ToolPath(position=position, orientation=angles, times=t)
     plan = blend_plan(times, poses[:, :3, 3], blend, ends)
     # A rotation is the same vector in the axes of the pose before it and of that after it.
     ways = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / np.diff(plan.centres)[:, None]
     still = np.zeros((1, 3))
     first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])
     plan = plan._replace(before=np.concatenate([first, ways]), after=np.concatenate([ways, last]))
-    return ToolPath(position=position, rotations=Rotations(R=R, plan=plan), angles=None, times=t)
+    return ToolPath(position=position, orientation=Rotations(R=R, plan=plan), times=t)
 
 
 def zyz_angles(R: Array) -> Array:

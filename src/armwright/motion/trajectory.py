@@ -5,12 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from numbers import Integral
 
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats, not_negative, number, positive, read_only, reduce_by_fields
+from armwright.arrays import (
+    Array,
+    ArrayLike,
+    floats,
+    integer,
+    not_negative,
+    number,
+    positive,
+    read_only,
+    reduce_by_fields,
+)
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import one_way
 from armwright.motion.polynomials import derivative, extremes, peaks, shifted
@@ -27,7 +36,7 @@ def _times(value: ArrayLike) -> Array:
     if times.ndim != 1 or len(times) < 2:
         raise ShapeError(f"times: expected at least two, got shape {times.shape}")
     if times[0] != 0 or (np.diff(times) < 0).any():
-        raise InvalidValueError(f"times: expected to begin at 0 and never to fall, got {times.tolist()}")
+        raise InvalidValueError(f"times: expected non-decreasing times that begin at 0, got {times.tolist()}")
     times.setflags(write=False)
     return times
 
@@ -99,7 +108,7 @@ class Trajectory:
             KindError: a time is no number, or the order no whole number.
             InvalidValueError: a time is NaN or infinite, or the order below 0.
         """
-        _check_order(order)
+        integer(order, "order", least=0)
         t = floats(t, "t")
         inside = np.clip(t, 0.0, self.duration)
         segment = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.coefficients) - 1)
@@ -136,7 +145,7 @@ class Trajectory:
         return np.maximum(np.abs(lowest), np.abs(highest))
 
     def _segment_extremes(self, order: int) -> tuple[Array, Array]:
-        _check_order(order)
+        integer(order, "order", least=0)
         return extremes(derivative(self.coefficients, order), np.diff(self.times))
 
     def peaks(self, order: int) -> Array:
@@ -146,7 +155,7 @@ class Trajectory:
             KindError: the order is no whole number.
             InvalidValueError: it is below 0.
         """
-        _check_order(order)
+        integer(order, "order", least=0)
         return peaks(derivative(self.coefficients, order), np.diff(self.times))
 
     def slowed(self, factor: float) -> Trajectory:
@@ -174,9 +183,7 @@ class Trajectory:
         """
         duration = positive(duration, "duration", "s")
         if self.duration == 0:
-            raise InvalidValueError(
-                f"a motion of 0 s cannot be run in {duration:g} s; hold(q, {duration:g}) stands still"
-            )
+            raise InvalidValueError(f"a motion of 0 s cannot be stretched to {duration:g} s; use hold(q, {duration:g})")
         slow = self.slowed(duration / self.duration)
         times = np.append(np.minimum(slow.times[:-1], duration), duration)
         return Trajectory(times=times, coefficients=slow.coefficients)
@@ -214,8 +221,8 @@ class Trajectory:
         period = positive(period, "period", "s")
         if self.duration / period > _MAX_SAMPLES:
             raise InvalidValueError(
-                f"period: {period:g} s cuts {self.duration:g} s into {self.duration / period:.3g} samples, "
-                f"{_MAX_SAMPLES:.0e} are allowed"
+                f"period: {period:g} s divides {self.duration:g} s into {self.duration / period:.3g} samples; "
+                f"at most {_MAX_SAMPLES:.0e} are allowed"
             )
         before = max(math.ceil(self.duration / period - _HAIR), int(self.duration > 0))
         times = np.append(period * np.arange(before), self.duration)
@@ -262,7 +269,7 @@ def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:
             raise KindError(f"join: expected trajectories, got {shown(part)}")
     gap = number(gap, "gap")
     if not parts:
-        raise ShapeError("join: expected one trajectory at least, got none")
+        raise ShapeError("join: expected at least one trajectory, got none")
     for i, (last, part) in enumerate(pairwise(parts), 1):
         _check_meeting(last, part, i, gap)
     powers = max(part.coefficients.shape[1] for part in parts)
@@ -270,13 +277,6 @@ def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:
     starts = np.cumsum([0.0, *(part.duration for part in parts)])
     times = np.concatenate([[0.0], *(part.times[1:] + start for part, start in zip(parts, starts[:-1], strict=True))])
     return Trajectory(times=times, coefficients=np.concatenate(padded))
-
-
-def _check_order(order: int) -> None:
-    if isinstance(order, bool) or not isinstance(order, Integral):
-        raise KindError(f"order: expected a whole number from 0, got {shown(order)}")
-    if order < 0:
-        raise InvalidValueError(f"order: expected 0 or more, got {order}")
 
 
 def _check_meeting(last: Trajectory, part: Trajectory, number_of_last: int, gap: float) -> None:

@@ -18,8 +18,8 @@ from functools import cache
 
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, one_per_joint, positive
-from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, integer, one_per_joint, positive
+from armwright.errors import InvalidValueError, ShapeError
 from armwright.motion.cubic_polynomials import hermite
 from armwright.motion.knots import one_way
 from armwright.motion.xspline_path import Pair, Triple, rate_of_knot
@@ -107,10 +107,7 @@ def xspline_kernel(joints: int) -> Kernel:
         KindError: ``joints`` is no whole number.
         InvalidValueError: it is below 1.
     """
-    if isinstance(joints, bool) or not isinstance(joints, int):
-        raise KindError(f"joints: expected a whole number from 1, got {shown(joints)}")
-    if joints < 1:
-        raise InvalidValueError(f"joints: expected 1 or more, got {joints}")
+    joints = integer(joints, "joints", least=1)
     width = 3 * joints + 1
     emitted = emit(
         f"a knot of an X-spline of {joints} joints",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -13,11 +15,9 @@ from armwright.spatial.rotations import orthonormality_error, rotation_from_quat
 # Entries of a typed rotation may be off by so much; more is a mistake.
 _TYPED = 1e-6
 _SEQUENCES = tuple(
-    first + second + third
+    f"{first}{second}{third}"
     for axes in ("XYZ", "xyz")
-    for first in axes
-    for second in axes
-    for third in axes
+    for first, second, third in product(axes, repeat=3)
     if second not in (first, third)
 )
 
@@ -87,7 +87,7 @@ def _checked(R: Array) -> Array:
     error = float(np.max(orthonormality_error(R), initial=0.0))
     if error > _TYPED:
         raise InvalidValueError(
-            f"rotation: expected an orthonormal matrix with determinant 1, got one off by {error:.2g}"
+            f"rotation: expected an orthonormal matrix with determinant 1, got an orthonormality error of {error:.2g}"
         )
     return R
 

@@ -24,7 +24,7 @@ from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 from armwright.motion.moves import along, stopping_move
 from armwright.motion.obstruction import PathError
 from armwright.motion.solver import solver_of
-from armwright.motion.tool_path import ToolPath, tool_path, zyz_angles
+from armwright.motion.tool_path import ToolPath, ZYZAngles, tool_path, zyz_angles
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.report.move_figures import Panel
@@ -80,7 +80,7 @@ def path_of(kind: MoveKind) -> ToolPath:
     if kind == "seed":
         position = blended(TIMES, X[:, :3, 3], BLEND, ends="running")
         angles = blended(TIMES, matlab_zyz(PRINTED_ROTATIONS), BLEND, ends="running")
-        return ToolPath(position=position, rotations=None, angles=angles, times=np.array(TIMES))
+        return ToolPath(position=position, orientation=ZYZAngles(angles), times=np.array(TIMES))
     if kind == "joint":
         raise UnknownNameError("Cartesian move", kind, [known for known in MOVES if known != "joint"])
     return tool_path(X, TIMES, BLEND, ends="running", orientation=kind)
@@ -326,8 +326,8 @@ def figure_panels(number: int) -> list[Panel]:
         title = ("joint angles", "joint speeds", "joint accelerations")[order]
         return [Panel(title, f"deg{per}", {f"joint {i + 1}": q[:, i] for i in range(6)})]
     hand = path_of(kind)
-    assert hand.angles is not None  # noqa: S101 - this path has them
-    position, angles = hand.position(t, order) * 100, np.degrees(hand.angles(t, order))
+    assert isinstance(hand.orientation, ZYZAngles)  # noqa: S101 - this path has them
+    position, angles = hand.position(t, order) * 100, np.degrees(hand.orientation.angles(t, order))
     derivative = ("", "speed of the ", "acceleration of the ")[order]
     return [
         Panel(f"{derivative}position", f"cm{per}", dict(zip("xyz", position.T, strict=True))),

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +17,15 @@ import attrs
 import numpy as np
 
 from armwright.arrays import LARGEST, Array
-from armwright.errors import FileFormatError, MissingExtraError, closest, shown
+from armwright.errors import FileFormatError, closest, shown
+from armwright.extras import import_extra
 from armwright.files.inputs import read_bytes
 from armwright.files.limits import beyond, limit
 
 _MISSING: Any = object()
 # What is matched is not given back: a word of a million digits and a letter is passed once.
 _NUMBER = re.compile(r"[+-]?(\d++\.?\d*+|\.\d++)([eE][+-]?\d++)?", re.ASCII)
-_XACRO = "xacro is expanded before it is URDF: xacro FILE > robot.urdf"
+_XACRO = "expand xacro files to URDF first: xacro FILE > robot.urdf"
 # What URDF has in a link, in a joint, and below those: elements, attributes.
 _KNOWN: dict[str, tuple[Collection[str], Collection[str]]] = {
     "robot": (("link", "joint", "material", "transmission", "gazebo", "sensor"), ("name", "version")),
@@ -88,7 +88,7 @@ class Element:
         """
         found = self.all(tag)
         if len(found) > 1:
-            raise found[1].error("", f"given twice, first in line {found[0].line}")
+            raise found[1].error("", f"occurs twice, first in line {found[0].line}")
         return found[0] if found else None
 
     def needed(self, tag: str) -> Element:
@@ -158,7 +158,7 @@ def read_elements(path: Path) -> Element:
         FileFormatError: the file is missing, no XML, or no URDF.
     """
     data = read_bytes(path)
-    etree = _lxml()
+    etree: Any = import_extra("lxml.etree", "reading URDF", "urdf")
     # Nothing is fetched, and entities stay as they are: a file from elsewhere cannot make this read other files.
     # What is deep or huge is refused by the parser itself.
     parser = etree.XMLParser(
@@ -188,14 +188,6 @@ def _refuse_deep(path: Path, raw: Any) -> None:
         if not row:
             return
     raise FileFormatError(path, row[0].sourceline, "", f"nested too deeply: {beyond('nesting')}")
-
-
-def _lxml() -> Any:
-    """Import lxml, which only those need who read URDF."""
-    try:
-        return import_module("lxml.etree")
-    except ImportError as error:
-        raise MissingExtraError("reading URDF needs lxml; install it by: pip install 'armwright[urdf]'") from error
 
 
 def _split(raw: Any) -> tuple[str, str]:
@@ -239,4 +231,4 @@ def _refuse_misspelt(element: Element) -> None:
         if near:
             raise element.error(attribute, f"unknown attribute; did you mean '{near}'?")
         if element.tag == "origin" and attribute not in attributes:
-            raise element.error(attribute, "unknown attribute; known here: xyz and rpy")
+            raise element.error(attribute, "unknown attribute; expected xyz or rpy")
