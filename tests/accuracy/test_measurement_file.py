@@ -171,7 +171,7 @@ def test_too_few_directions(read: Read) -> None:
     assert assessment.few
     assert (assessment.cycles, assessment.note) == (30, "between 1 and 2, 2 of 3 directions of approach")
     with pytest.raises(
-        InvalidValueError, match="multidirectional P1: ISO 9283 asks for 3 directions of approach, got 2"
+        InvalidValueError, match="multidirectional P1: ISO 9283 requires 3 directions of approach, got 2"
     ):
         assess(tests)
 
@@ -230,7 +230,7 @@ def test_column_map_and_gaps(read: Read, tmp_path: Path) -> None:
     path.write_text(POSE.replace("x_mm,y_mm", "Across,Along") + "pose,P1,3,,0\n", encoding="utf-8")
 
     with pytest.warns(
-        IncompleteRowsWarning, match=r"other\.csv: 1 row left out for empty cells, 3 read: Across as x_mm"
+        IncompleteRowsWarning, match=r"other\.csv: 1 row omitted because of empty cells, 3 read: Across as x_mm"
     ):
         assessment = read_measurements(path, columns={"Across": "x_mm", "Along": "y_mm"}, skip_incomplete=True)
 
@@ -238,38 +238,41 @@ def test_column_map_and_gaps(read: Read, tmp_path: Path) -> None:
 
 
 MISTAKES = {
-    "two units": (POSE.replace("y_mm", "y_m"), "1: y_m: coordinates have one unit in a file, and x_mm has another"),
+    "two units": (
+        POSE.replace("y_mm", "y_m"),
+        "1: y_m: coordinates must have one unit in a file, but x_mm has another",
+    ),
     "two units of angles": (
         POSE.replace("y_mm", "y_mm,a_deg,c_rad"),
-        "1: c_rad: angles have one unit in a file, and a_deg has another",
+        "1: c_rad: angles must have one unit in a file, but a_deg has another",
     ),
     "no unit": (POSE.replace("x_mm", "x"), "1: x: the name has no unit: expected x_mm or x_m or x_cm or x_um or x_in"),
     "a strange unit": (POSE.replace("x_mm", "x_ft"), "1: x_ft: unknown unit 'ft': expected x_mm or x_m or "),
     "no column": (POSE.replace("y_mm", "note"), "1: y_mm: no such column; there are test, pose, cycle, x_mm"),
     "a strange column": (POSE.replace("cycle", "cycl"), "1: cycl: no such column. Did you mean 'cycle'? Known: test, "),
-    "twice": (POSE.replace("y_mm", "x_m"), "1: x_m: there twice, as x_mm too"),
+    "twice": (POSE.replace("y_mm", "x_m"), "1: x_m: a second column for this quantity, after x_mm"),
     "no name": (
         POSE.replace("pose,", "note,", 1),
-        "1: pose: expected a column pose or a column path, and the file has neither: test, cycle, x_mm, y_mm",
+        "1: pose: expected a column pose or a column path, but the file has neither: test, cycle, x_mm, y_mm",
     ),
     "two names": (
         POSE.replace("pose,", "path,pose,", 1),
-        "1: pose: expected a column pose or a column path, and the file has both: test, path, pose, cycle, x_mm, y_mm",
+        "1: pose: expected a column pose or a column path, but the file has both: test, path, pose, cycle, x_mm, y_mm",
     ),
     "decimal comma": (POSE.replace("401", '"401,5"'), "3: x_mm: expected a number, got '401,5'; write a decimal point"),
     "too many": (
         POSE.replace("401", "401,5"),
-        "3: expected 5 values, as there are columns, got 6; is there a comma in",
+        "3: expected 5 values, one per column, got 6; does a number contain a comma",
     ),
-    "too few": (POSE.replace("401,0", "401"), "3: expected 5 values, as there are columns, got 4"),
+    "too few": (POSE.replace("401,0", "401"), "3: expected 5 values, one per column, got 4"),
     "text": (POSE.replace("401", "far"), "3: x_mm: expected a number, got 'far'"),
     "nothing": (POSE.replace("401", ""), "3: x_mm: empty; expected a number"),
     "NaN": (POSE.replace("401", "nan"), "3: x_mm: every number must be finite and no larger than 1e+100, got nan"),
-    "empty": ("\n\n", ": the file is empty; its first line should name the columns"),
-    "no rows": (HEAD, ": no rows below the names of the columns"),
+    "empty": ("\n\n", ": the file is empty; expected column names in its first line"),
+    "no rows": (HEAD, ": no rows after the column names"),
     "no nominal y": (
         NOMINAL.replace("Y nominal [mm]", "note"),
-        "1: y_nominal_mm: no such column; all that is measured is nominal too, or nothing; there are Pose, X nominal",
+        "1: y_nominal_mm: no such column; either all measured columns have nominal columns, or none has; there are",
     ),
     "nothing measured": (
         NOMINAL.replace("Y measured [mm]", "z nominal [mm]"),
@@ -292,9 +295,9 @@ MISTAKES = {
         "3: test: expected one of pose, multidirectional, distance, ",
     ),
     "cycle 0": (POSE.replace("P1,1", "P1,0"), "3: cycle: expected 1, 2, 3 ... or the word commanded, got '0'"),
-    "no pose": (POSE.replace("P1,1", ",1"), "3: pose: empty; expected a word"),
+    "no pose": (POSE.replace("P1,1", ",1"), "3: pose: empty; expected a name"),
     "a cycle twice": (POSE.replace("P1,2", "P1,1"), "4: cycle: a second row of cycle 1, after line 3"),
-    "commanded twice": (POSE + "pose,P1,commanded,1,1\n", "5: cycle: a second commanded pose, after that of line 2"),
+    "commanded twice": (POSE + "pose,P1,commanded,1,1\n", "5: cycle: a second commanded pose, after the one in line 2"),
     "not commanded": (POSE.replace("commanded", "9"), "2: cycle: P1 has no commanded pose: expected a row with"),
     "nothing attained": (f"{HEAD}pose,P1,commanded,0,0\n", "2: cycle: the test has commanded rows, but no attained"),
     "metres": (
@@ -318,7 +321,7 @@ MISTAKES = {
     ),
     "three poses": (
         HEAD + "".join(f"distance,{p},{c},0,0\n" for p in "ABC" for c in ("commanded", 1)),
-        "2: pose: a distance is that of two poses, got 3: A, B, C",
+        "2: pose: a distance needs two poses, got 3: A, B, C",
     ),
     "a lone cycle": (
         HEAD + "".join(f"distance,{p},{c},0,0\n" for p in "AB" for c in ("commanded", 1)) + "distance,B,2,0,0\n",
@@ -328,13 +331,13 @@ MISTAKES = {
         "\n".join(line for line in RUNS.split("\n") if "commanded" not in line),
         "2: cycle: L has no commanded path: expected rows with cycle commanded",
     ),
-    "time back": (RUNS.replace("L,1,1,", "L,1,0,"), "5: t_s: samples are in order of time, and 0 s does not follow 0"),
+    "time back": (RUNS.replace("L,1,1,", "L,1,0,"), "5: t_s: samples must be in order of time, but 0 s follows 0"),
     "no time": (RUNS.replace("L,1,1,", "L,1,,"), "5: t_s: empty; expected a number, as in the rows before"),
     "one sample": (RUNS + "path,L,3,0,0,0\n", "8: cycle: a run has two rows at least, and this is its only one"),
     "no times": (f"{HEAD}settling,P1,1,0,0\nsettling,P1,1,1,0\n", "2: t_s: a test of settling needs the time of every"),
     "settling commanded": (
         f"{HEAD}settling,P1,commanded,0,0\nsettling,P1,1,0,0\n",
-        "2: cycle: a test of settling has no commanded row",
+        "2: cycle: a settling test must not have a commanded row",
     ),
     "no speed": (RUNS.replace("path,L", "velocity,L"), "2: speed_mm_per_s: a test of velocity has the commanded"),
 }
@@ -366,9 +369,11 @@ def test_honest_offsets(read: Read) -> None:
 
 def test_too_few_cycles(read: Read) -> None:
     """Too few cycles are refused with the name of the test; no files and a strange force are too."""
-    with pytest.raises(InvalidValueError, match=r"^pose P1: ISO 9283 asks for 30 cycles, got 2; few=True takes fewer$"):
+    with pytest.raises(
+        InvalidValueError, match=r"^pose P1: ISO 9283 requires 30 cycles, got 2; few=True accepts fewer"
+    ):
         assess(read(POSE))
-    with pytest.raises(InvalidValueError, match="expected one file at least, got none"):
+    with pytest.raises(InvalidValueError, match="expected at least one file, got none"):
         read_measurements([])
     rows = "".join(f"compliance,P1,up,{load},1,0,0\n" for load in range(11))
     with pytest.raises(ArmwrightError, match=r"no direction 'up' of a force; expected one of \+x, -x, \+y, -y"):
@@ -421,6 +426,6 @@ def test_too_many_parts(read: Read) -> None:
     """More poses and runs than a laboratory measures are refused with the limit; raised by name, they are read."""
     rows = "".join(f"pose,P{i},commanded,{i},0\npose,P{i},1,{i},0\npose,P{i},2,{i},0.1\n" for i in range(6))
 
-    with raised(entries=5), pytest.raises(FileFormatError, match=r"csv:17: test: too many tests.*at most 5 entries"):
+    with raised(entries=5), pytest.raises(FileFormatError, match=r"csv:17: test: too many.*the limit is 5 entries"):
         read(HEAD + rows)
     assert len(read(HEAD + rows)) == 6

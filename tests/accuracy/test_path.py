@@ -260,13 +260,13 @@ RUN = beside(0.0)
 TIMED = Trace(positions=((0, 0), (1, 0)), times=(0, 1))
 STANDSTILL = Trace(positions=((0, 0), (1, 0), (1, 0)), times=(0, 1, 9))
 MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
-    "few": (lambda: path_deviation(LINE, [RUN] * 9), TooFewError, "path: ISO 9283 asks for 10 cycles, got 9"),
-    "few corners": (lambda: corner_deviations(BEND, [rounded(0.1)]), TooFewError, "asks for 3 cycles, got 1"),
-    "one": (lambda: path_deviation(LINE, [RUN], few=True), TooFewError, "needs 2 cycles at least"),
+    "few": (lambda: path_deviation(LINE, [RUN] * 9), TooFewError, "path: ISO 9283 requires 10 cycles, got 9"),
+    "few corners": (lambda: corner_deviations(BEND, [rounded(0.1)]), TooFewError, "requires 3 cycles, got 1"),
+    "one": (lambda: path_deviation(LINE, [RUN], few=True), TooFewError, "expected at least 2 cycles"),
     "no length": (
         lambda: path_deviation(Trace(positions=((0, 0), (0, 0))), [RUN] * 10),
         InvalidValueError,
-        "commanded path: all of its points are the same",
+        "commanded path: all of its points coincide",
     ),
     "half a run": (
         lambda: path_deviation(LINE, [*[RUN] * 9, Trace(positions=((0, 0), (0.6, 0)))]),
@@ -281,7 +281,7 @@ MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
     "a cut corner": (
         lambda: path_deviation(BEND, [rounded(0.2)] * 10),
         InvalidValueError,
-        "leave out what is near corners",
+        "exclude the sections near corners",
     ),
     "all corner": (lambda: path_deviation(BEND, [BEND] * 10, corners=2), InvalidValueError, "within 2000 mm of a"),
     "angles": (
@@ -307,7 +307,7 @@ MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
         InvalidValueError,
         "run 1 has no sample on the leg after the corner at 1000 mm",
     ),
-    "inside": (lambda: settling([TIMED] * 3, 5.0), InvalidValueError, "run 1 begins within 5000 mm of where it ends"),
+    "inside": (lambda: settling([TIMED] * 3, 5.0), InvalidValueError, "run 1 begins within 5000 mm of its end"),
     "no band": (lambda: settling([STANDSTILL] * 3, 0), InvalidValueError, "the band must be above 0 m, got 0"),
     "no rest": (
         lambda: settling([Trace(positions=((0, 0), (5, 0), (0, 0), (1, 0)), times=(0, 1, 9.5, 10))] * 3, 0.1),
@@ -319,14 +319,14 @@ MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
         InvalidValueError,
         "each must be later than the one before, got 1 after 1",
     ),
-    "one sample": (lambda: Trace(positions=((0, 0),)), ShapeError, "expected two samples at least, got 1"),
+    "one sample": (lambda: Trace(positions=((0, 0),)), ShapeError, "expected at least two samples, got 1"),
     "rows": (lambda: Trace(positions=((0, 0), (1, 0)), times=(1,)), ShapeError, "2 positions but 1 times"),
-    "no weave": (lambda: weaving_deviation(LINE, [TIMED] * 3, 1), InvalidValueError, "a straight line, so nothing"),
-    "back": (lambda: weaving_deviation(SQUARE, [TIMED] * 3, 1), InvalidValueError, "it has no middle line"),
+    "no weave": (lambda: weaving_deviation(LINE, [TIMED] * 3, 1), InvalidValueError, "a straight line, not a weave"),
+    "back": (lambda: weaving_deviation(SQUARE, [TIMED] * 3, 1), InvalidValueError, "it has no centre line"),
     "no reversals": (
         lambda: weaving_deviation(BEND, [TIMED] * 3, 1),
         InvalidValueError,
-        "the commanded path reverses 2 times; a weave takes three at least",
+        "the commanded path reverses 2 times; expected at least three reversals",
     ),
 }
 

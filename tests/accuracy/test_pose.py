@@ -194,21 +194,21 @@ def test_compliance() -> None:
 
 THIRTY = np.zeros((30, 2))
 MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
-    "few": (lambda: pose_accuracy(THIRTY[:12], (0, 0)), TooFewError, "pose: ISO 9283 asks for 30 cycles, got 12"),
-    "one": (lambda: pose_repeatability(THIRTY[:1], few=True), TooFewError, "needs 2 cycles at least, got 1"),
+    "few": (lambda: pose_accuracy(THIRTY[:12], (0, 0)), TooFewError, "pose: ISO 9283 requires 30 cycles, got 12"),
+    "one": (lambda: pose_repeatability(THIRTY[:1], few=True), TooFewError, "expected at least 2 cycles, got 1"),
     "directions": (
         lambda: multidirectional_variation([THIRTY, THIRTY]),
         TooFewError,
-        "asks for 3 directions of approach, got 2",
+        "requires 3 directions of approach, got 2",
     ),
-    "robots": (lambda: exchangeability([THIRTY], few=True), TooFewError, "needs 2 robots at least, got 1"),
+    "robots": (lambda: exchangeability([THIRTY], few=True), TooFewError, "expected at least 2 robots, got 1"),
     "few of one robot": (
         lambda: exchangeability([THIRTY] * 4 + [THIRTY[:9]]),
         TooFewError,
-        "exchangeability: ISO 9283 asks for 30 cycles, got 9",
+        "exchangeability: ISO 9283 requires 30 cycles, got 9",
     ),
     "loads": (lambda: static_compliance([0, 1, 2], THIRTY[:3], (1, 0)), TooFewError, "10 loads besides none, got 2"),
-    "no rest": (lambda: static_compliance([1, 2], THIRTY[:2], (1, 0)), InvalidValueError, "no measurement is without"),
+    "no rest": (lambda: static_compliance([1, 2], THIRTY[:2], (1, 0)), InvalidValueError, "a measurement without load"),
     "pull": (lambda: static_compliance([0, -2], THIRTY[:2], (1, 0)), InvalidValueError, "reverse the direction"),
     "no direction": (lambda: static_compliance([0, 2], THIRTY[:2], (0, 0)), InvalidValueError, "direction is 0"),
     "text": (lambda: pose_repeatability("abc"), KindError, "positions: expected numbers, got 'abc'"),
@@ -224,12 +224,12 @@ MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
     "all round": (
         lambda: pose_repeatability(THIRTY, angles=np.linspace(0, 6, 30)[:, None]),
         InvalidValueError,
-        "only angles within 90 deg have one",
+        "defined only for angles within 90 deg",
     ),
     "two sizes": (
         lambda: multidirectional_variation([THIRTY, THIRTY, np.zeros((30, 3))]),
         ShapeError,
-        "multidirectional: all parts of a test have the same columns, got 2 and 3",
+        "multidirectional: all parts of a test must have the same columns, got 2 and 3",
     ),
     "cycles of a distance": (
         lambda: distance_repeatability(THIRTY, THIRTY[1:]),

@@ -159,7 +159,7 @@ def test_json(tmp_path: Path) -> None:
 
 
 NO_BODY = (
-    " kg m² about its centre of mass: none may be negative, or larger than the other two together; "
+    " kg m² about its centre of mass: none may be negative, or exceed the sum of the other two; "
     "check inertia_about and com"
 )
 MISTAKES = {
@@ -180,21 +180,21 @@ MISTAKES = {
     ),
     "an angle without its unit": (
         TURN + "alpha = 90\n",
-        "3: joint 1, alpha: the key must tell the unit: alpha_deg or alpha_rad",
+        "3: joint 1, alpha: the key must contain the unit: alpha_deg or alpha_rad",
     ),
     "a length in an angle's place": (
         TURN + "[joint.limits]\nlower_m = 0.1\n",
-        "4: joint 1, limits, lower_m: unknown key; known here: ",
+        "4: joint 1, limits, lower_m: unknown key; known keys: ",
     ),
     "an angle in a length's place": (
         SLIDE + "[joint.limits]\nupper_deg = 90\n",
-        "4: joint 1, limits, upper_deg: unknown key; known here: ",
+        "4: joint 1, limits, upper_deg: unknown key; known keys: ",
     ),
     "a torque of a slide": (
         SLIDE + "[joint.limits]\neffort_Nm = 90\n",
         "4: joint 1, limits, effort_Nm: unknown key; did you mean 'effort_N'?",
     ),
-    "a length twice": (TURN + "d_m = 1\nd_mm = 1000\n", "4: joint 1, d_mm: d is given twice, in m and in mm"),
+    "a length twice": (TURN + "d_m = 1\nd_mm = 1000\n", "4: joint 1, d_mm: d is specified twice, in m and in mm"),
     "limits the wrong way round": (
         TURN + "[joint.limits]\nlower_deg = 90\nupper_deg = -90\n",
         "3: joint 1, limits: the lower limit must be below the upper, got 90° and -90°",
@@ -222,15 +222,15 @@ MISTAKES = {
     ),
     "one moment above the two others": (
         TURN + "[joint.link]\ninertia_kgm2 = [1, 1, 3]\n",
-        "4: joint 1, link, inertia_kgm2: no body has the principal moments 1, 1, 3" + NO_BODY,
+        "4: joint 1, link, inertia_kgm2: a body cannot have the principal moments 1, 1, 3" + NO_BODY,
     ),
     "a moment below none": (
         TURN + "[joint.link]\ninertia_kgm2 = [1, 1, 1, 2, 0, 0]\n",
-        "4: joint 1, link, inertia_kgm2: no body has the principal moments -1, 1, 3" + NO_BODY,
+        "4: joint 1, link, inertia_kgm2: a body cannot have the principal moments -1, 1, 3" + NO_BODY,
     ),
     "less inertia about the frame than its distance makes": (
         TURN + "[joint.link]\nmass_kg = 3\ncom_m = [1, 0, 0]\ninertia_kgm2 = [0, 1, 1]\ninertia_about = 'frame'\n",
-        "6: joint 1, link, inertia_kgm2: no body has the principal moments -2, -2, 0" + NO_BODY,
+        "6: joint 1, link, inertia_kgm2: a body cannot have the principal moments -2, -2, 0" + NO_BODY,
     ),
     "inertia about something else": (
         TURN + "[joint.link]\ninertia_about = 'con'\n",
@@ -238,7 +238,7 @@ MISTAKES = {
     ),
     "two motor inertias": (
         TURN + "[joint.motor]\ninertia_kgm2 = 1\nrotor_inertia_kgm2 = 1\n",
-        "5: joint 1, motor, rotor_inertia_kgm2: give the inertia at the load or that of the rotor, not both",
+        "5: joint 1, motor, rotor_inertia_kgm2: specify the inertia at the load side or that of the rotor, not both",
     ),
     "a gear that turns the other way": (
         TURN + "[joint.motor]\ngear_ratio = -62\n",
@@ -246,11 +246,11 @@ MISTAKES = {
     ),
     "a turn twice": (
         "[tool]\nrpy_deg = [0, 0, 90]\nrotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n" + TURN,
-        "3: tool, rotation: the turn is given twice, as rpy and as rotation",
+        "3: tool, rotation: the rotation is specified twice, as rpy and as rotation",
     ),
     "a turn three ways": (
         "[tool]\nquaternion_wxyz = [1, 0, 0, 0]\nzyz_deg = [0, 0, 90]\nrpy_rad = [0, 0, 1]\n" + TURN,
-        "3: tool, zyz_deg: the turn is given twice, as rpy and as zyz",
+        "3: tool, zyz_deg: the rotation is specified twice, as rpy and as zyz",
     ),
     "a long quaternion": (
         "[tool]\nquaternion_wxyz = [1, 1, 0, 0]\n" + TURN,
@@ -262,7 +262,7 @@ MISTAKES = {
     ),
     "a mirror": (
         "[base]\nrotation = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]\n" + TURN,
-        "2: base, rotation: expected the rows of a rotation, got a matrix that is off by 2",
+        "2: base, rotation: expected the rows of a rotation matrix, got an orthonormality error of 2",
     ),
     "a covariance of other errors": (
         TURN + "[uncertainty]\nerrors = ['joint1.a', 'tool.x']\ncovariance = [[1, 0]]\n",
@@ -270,11 +270,11 @@ MISTAKES = {
     ),
     "a variance below none": (
         TURN + "[uncertainty]\nerrors = ['joint1.a', 'tool.x']\ncovariance = [[1, 2], [2, 1]]\n",
-        "3: uncertainty: uncertainty: expected a covariance: symmetric, and no variance below 0",
+        "3: uncertainty: uncertainty: expected a covariance matrix, symmetric and with variances of 0 or more",
     ),
     "an error twice": (
         TURN + "[uncertainty]\nerrors = ['tool.x', 'tool.x']\ncovariance = [[1, 0], [0, 1]]\n",
-        "3: uncertainty: uncertainty: an error is named twice",
+        "3: uncertainty: uncertainty: expected different names of errors, got one twice",
     ),
     "errors that are no texts": (
         TURN + "[uncertainty]\nerrors = [1, 2]\ncovariance = [[1, 0], [0, 1]]\n",

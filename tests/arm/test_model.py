@@ -188,14 +188,14 @@ REFUSED = {
     "a moment above the two others together": (
         lambda: Link(mass=2, inertia=np.diag([1, 1, 3])),
         (
-            "link of 2 kg: no body has the principal moments 1, 1, 3 kg m² of its inertia [[1.0, 0.0, 0.0], "
-            "[0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]: none may be negative, or larger than the other two together. Give the "
+            "link of 2 kg: a body cannot have the principal moments 1, 1, 3 kg m² of its inertia [[1.0, 0.0, 0.0], "
+            "[0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]: none may be negative, or exceed the sum of the other two. Specify the "
             "tensor about the centre of mass"
         ),
     ),
     "a moment below none": (
         lambda: Link(mass=2, inertia=[[1, 2, 0], [2, 1, 0], [0, 0, 1]]),
-        "no body has the principal moments -1, 1, 3 kg m² of its inertia",
+        "a body cannot have the principal moments -1, 1, 3 kg m² of its inertia",
     ),
     "a tensor beyond measure": (lambda: Link(inertia=1e200 * np.eye(3)), "inertia: expected numbers no larger than"),
     "mass beyond measure": (lambda: Link(mass=1e200), "link: mass must not be larger than 1e+100, got 1e+200"),
@@ -235,7 +235,7 @@ REFUSED = {
     "no link for one joint": (lambda: Arm(name="one", joints=ONE, links=[]), "arm 'one': 1 joints but 0 links"),
     "a base that is no pose": (
         lambda: Arm(name="one", joints=ONE, base=2 * np.eye(4)),
-        "base: expected a rotation, a position and the row 0 0 0 1",
+        "base: expected a homogeneous transformation",
     ),
     "a tool of three rows": (
         lambda: Arm(name="one", joints=ONE, tool=np.eye(4)[:3]),

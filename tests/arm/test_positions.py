@@ -38,7 +38,7 @@ def test_degrees_by_mistake(door: str) -> None:
     assert len(caught) == 1
     assert caught[0].filename == doors.__file__
     assert str(caught[0].message).startswith(
-        f"{what}: joint 1 of 'puma560-seed' stands at 10 rad, 1.6 turns. If degrees are meant, 10 degrees "
+        f"{what}: joint 1 of 'puma560-seed' is at 10 rad, 1.6 revolutions. If degrees are meant, 10 degrees "
         "are 0.174533 rad: give numpy.deg2rad(...)."
     )
 
@@ -55,7 +55,7 @@ def test_one_warning_for_many_configurations() -> None:
     rows = np.zeros((50, 4, 6))
     rows[:, 2, 3], rows[7, 2, 3], rows[:, :, 4] = 30.0, -170.0, 80.0
 
-    with pytest.warns(UnitWarning, match="joint 4 of 'puma560-seed' stands at -170 rad, 27.1 turns") as caught:
+    with pytest.warns(UnitWarning, match="joint 4 of 'puma560-seed' is at -170 rad, 27.1 revolutions") as caught:
         armwright.kinematics.forward(PUMA, rows)
 
     assert len(caught) == 1
@@ -67,9 +67,9 @@ def test_joints_that_turn_so_far() -> None:
     winch = Arm(name="winch", joints=[turns])
 
     armwright.kinematics.forward(winch, [49.0])
-    with pytest.warns(UnitWarning, match="stands at 90 rad"):
+    with pytest.warns(UnitWarning, match="is at 90 rad"):
         armwright.kinematics.forward(winch, [90.0])
-    with pytest.warns(UnitWarning, match="stands at 49 rad"):
+    with pytest.warns(UnitWarning, match="is at 49 rad"):
         armwright.kinematics.forward(Arm(name="free", joints=[Joint(kind="revolute")]), [49.0])
 
 

@@ -27,9 +27,7 @@ def read(tmp_path: Path) -> Callable[..., Arm]:
 
 def test_twins_are_told_apart_by_line(read: Callable[..., Arm]) -> None:
     """Two links of one name are refused with both lines."""
-    with pytest.raises(
-        FileFormatError, match=r"arm.urdf:3: link 'a', name: there is another link of that name in line 2"
-    ):
+    with pytest.raises(FileFormatError, match=r"arm.urdf:3: link 'a', name: another link has this name, in line 2"):
         read(robot(link("a"), link("a")))
 
 
@@ -53,21 +51,21 @@ MISTAKES: dict[str, tuple[str, str]] = {
     "another format": ("<sdf/>", "arm.urdf:1: expected <robot>, as URDF files have, got <sdf>"),
     "xacro": (
         '<robot xmlns:xacro="http://www.ros.org/wiki/xacro">\n<xacro:include filename="a"/></robot>',
-        "arm.urdf:2: <include>: xacro is expanded before it is URDF: xacro FILE > robot.urdf",
+        "arm.urdf:2: <include>: expand xacro files to URDF first: xacro FILE > robot.urdf",
     ),
     "xacro without its namespace": (
         "<robot><xacro:include/></robot>",
-        "Namespace prefix xacro on include is not defined; xacro is expanded before it is URDF",
+        "Namespace prefix xacro on include is not defined; expand xacro files to URDF first",
     ),
     "a property of xacro": (
         one(f'<origin xyz="0 0 ${{height}}"/>{LIMIT}'),
-        "joint 'turn', origin, xyz: expected a number, got '${height}'; xacro is expanded",
+        "joint 'turn', origin, xyz: expected a number, got '${height}'; expand xacro files",
     ),
     "no link": ("<robot/>", "arm.urdf:1: expected at least one <link> in <robot>"),
     "a link without a name": (robot("<link/>"), "arm.urdf:2: link, name: missing"),
     "a joint without a name": (robot(link("a"), "<joint/>"), "arm.urdf:3: joint, type: missing"),
     "no parent": (one().replace('<parent link="base"/>', ""), "joint 'turn': expected <parent> in it"),
-    "a link that is not there": (
+    "a link that does not exist": (
         one().replace('<child link="hand"/>', '<child link="hnad"/>'),
         "arm.urdf:4: joint 'turn', child, link: there is no link 'hnad'; did you mean 'hand'?",
     ),
@@ -75,43 +73,43 @@ MISTAKES: dict[str, tuple[str, str]] = {
         one(kind="revolut"),
         "one of fixed, revolute, continuous, prismatic, planar, floating, got 'revolut'; did you mean 'revolute'?",
     ),
-    "planar": (one(kind="planar"), "joint 'turn', type: a planar joint is no joint of an arm"),
-    "floating": (one(kind="floating"), "joint 'turn', type: a floating joint is no joint of an arm"),
+    "planar": (one(kind="planar"), "joint 'turn', type: an arm cannot have a planar joint"),
+    "floating": (one(kind="floating"), "joint 'turn', type: an arm cannot have a floating joint"),
     "mimic": (
         one(f'{LIMIT}<mimic joint="other"/>'),
-        "joint 'turn', mimic: the joint follows 'other'; an arm has only joints that move by themselves",
+        "joint 'turn', mimic: the joint mimics 'other'; an arm can only have independent joints",
     ),
     "nothing moves": (
         robot(link("base"), link("hand"), joint("weld", "fixed", "base", "hand")),
-        "arm.urdf: no joint moves a link that hangs on 'base'",
+        "arm.urdf: no joint moves a link below 'base'",
     ),
     "twin joints": (
         robot(*FORK).replace('"jb"', '"ja"'),
-        "joint 'ja', name: there is another joint of that name in line 5",
+        "joint 'ja', name: another joint has this name, in line 5",
     ),
     "two parents": (
         robot(*FORK, joint("jc", "fixed", "a", "b")),
-        "arm.urdf:7: joint 'jc', child: link 'b' hangs on joint 'jb' already",
+        "arm.urdf:7: joint 'jc', child: link 'b' is already the child of joint 'jb'",
     ),
     "a ring": (
         robot(link("a"), link("b"), link("c"), joint("ab", "fixed", "a", "b"), joint("ba", "fixed", "b", "a")),
-        "links hang on one another in a ring: 'a', 'b'",
+        "links form a cycle: 'a', 'b'",
     ),
     "two roots": (
         robot(link("a"), link("b")),
-        "arm.urdf: the base could be any of the links 'a', 'b'; name one as base (--base)",
+        "arm.urdf: the base link is ambiguous: it could be 'a', 'b'; specify one as base (--base)",
     ),
     "two ends": (
         robot(*FORK),
-        "the arm could end at any of the links 'a', 'b'; name one as tip: load_urdf(path, tip='a')",
+        "the tip link is ambiguous: it could be 'a', 'b'; specify one as tip: load_urdf(path, tip='a')",
     ),
     "no limit": (
         one(""),
-        "joint 'turn': a revolute joint needs <limit>; a joint that turns without end is of type cont",
+        "joint 'turn': a revolute joint needs <limit>; a joint without limits has the type cont",
     ),
     "limits left out": (
         one('<limit effort="1" velocity="1"/>'),
-        "joint 'turn', limit: the lower limit must be below the upper, got 0 and 0, where one left out is 0",
+        "joint 'turn', limit: the lower limit must be below the upper, got 0 and 0, where an omitted one is 0",
     ),
     "limits reversed": (
         one('<limit lower="2" upper="1"/>'),
@@ -124,14 +122,14 @@ MISTAKES: dict[str, tuple[str, str]] = {
     "negative damping": (one(f'{LIMIT}<dynamics damping="-1"/>'), "dynamics, damping: expected 0 or more, got -1"),
     "no direction": (
         one(f'<axis xyz="0 0 -0.0"/>{LIMIT}'),
-        "joint 'turn', axis, xyz: an axis of 0 0 0 has no direction",
+        "joint 'turn', axis, xyz: expected a direction, got the axis 0 0 0",
     ),
     "an axis in two dimensions": (one(f'<axis xyz="0 1"/>{LIMIT}'), "axis, xyz: expected 3 numbers, got 2"),
     "not a number": (one(f'<axis xyz="0 0 nan"/>{LIMIT}'), "axis, xyz: expected a number, got 'nan'"),
     "a comma": (one(f'<axis xyz="0,0,1"/>{LIMIT}'), "axis, xyz: expected a number, got '0,0,1'"),
     "endless": (one('<limit lower="-inf" upper="1"/>'), "limit, lower: expected a number, got '-inf'"),
     "too large": (one(f'<origin xyz="0 0 1e200"/>{LIMIT}'), "expected a number no larger than 1e+100, got '1e200'"),
-    "given twice": (one(LIMIT + LIMIT), "joint 'turn', limit: given twice, first in line 4"),
+    "given twice": (one(LIMIT + LIMIT), "joint 'turn', limit: occurs twice, first in line 4"),
     "a misspelt element": (
         one().replace("limit", "limits"),
         "joint 'turn', limits: unknown element; did you mean <limit>?",
@@ -139,7 +137,7 @@ MISTAKES: dict[str, tuple[str, str]] = {
     "a misspelt attribute": (one().replace("upper", "uper"), "limit, uper: unknown attribute; did you mean 'upper'?"),
     "another turn": (
         one(f'<origin quat_xyzw="0 0 0 1"/>{LIMIT}'),
-        "joint 'turn', origin, quat_xyzw: unknown attribute; known here: xyz and rpy",
+        "joint 'turn', origin, quat_xyzw: unknown attribute; expected xyz or rpy",
     ),
     "an entity": (
         f'<!DOCTYPE r [<!ENTITY file SYSTEM "/etc/hostname">]>{one()}'.replace(LIMIT, "&file;"),
@@ -188,7 +186,7 @@ def test_fingers_beside_the_chain(read: Callable[..., Arm]) -> None:
         read(ARM_WITH_GRIPPER, tip="camera")
 
     assert (
-        "joint 'left_slide': 2 joints hang beside the chain, move and have mass to carry: 'left_slide', 'right_slide'. "
+        "joint 'left_slide': 2 joints lie beside the chain, move and have mass to carry: 'left_slide', 'right_slide'. "
         "An arm has no branches: choose another tip, or lock them, at 0 or elsewhere: lock=['left_slide', "
         "'right_slide'] (--lock left_slide,right_slide)"
     ) in str(caught.value)
@@ -201,7 +199,7 @@ def test_fingers_beside_the_chain(read: Callable[..., Arm]) -> None:
         ({"base": "bas"}, UnknownNameError, "no link 'bas'. Did you mean 'base'? Known: arm, base, camera"),
         ({"tip": "camera", "lock": ["left"]}, UnknownNameError, "no joint 'left'. Known: clip, left_slide"),
         ({"tip": "base"}, FileFormatError, "arm.urdf: no joint moves between the links 'base' and 'base'"),
-        ({"base": "palm", "tip": "arm"}, FileFormatError, "arm.urdf: link 'arm' does not hang on link 'palm'"),
+        ({"base": "palm", "tip": "arm"}, FileFormatError, "arm.urdf: link 'arm' is not below link 'palm'"),
         ({"tip": 3}, UnknownNameError, "no link '3'"),
         (
             {"lock": "left_slide"},
@@ -212,14 +210,14 @@ def test_fingers_beside_the_chain(read: Callable[..., Arm]) -> None:
         (
             {"lock": {"left_slide": 3.0}},
             InvalidValueError,
-            "'left_slide' cannot be held at 3 (rad or m): it goes from -1 ",
+            "'left_slide' cannot be locked at 3 (rad or m): it goes from -1 ",
         ),
         (
             {"lock": {"turn": math.inf}},
             InvalidValueError,
-            "joint 'turn' cannot be held at inf (rad or m): it goes from -i",
+            "joint 'turn' cannot be locked at inf (rad or m): it goes from -i",
         ),
-        ({"lock": {"clip": 0.1}}, InvalidValueError, "joint 'clip' cannot be held at 0.1 (rad or m): it is fixed"),
+        ({"lock": {"clip": 0.1}}, InvalidValueError, "joint 'clip' cannot be locked at 0.1 (rad or m): it is fixed"),
     ],
 )
 def test_wrong_choices(
@@ -259,5 +257,5 @@ def test_a_xacro_file_is_no_arm_file(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf.xacro"
     path.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro">\n<xacro:include filename="a"/></robot>')
 
-    with pytest.raises(FileFormatError, match="xacro is expanded before it is URDF"):
+    with pytest.raises(FileFormatError, match="expand xacro files to URDF first"):
         load_arm(path)

@@ -205,8 +205,8 @@ def test_a_half_turn_typed_short(tmp_path: Path) -> None:
 
     assert len(reading.notes) == 1
     assert reading.notes[0] == (
-        "joints 'shoulder' and 'elbow': their axes are 7.3e-06 rad from parallel and kept so; if they are meant to be "
-        "parallel, write their angles with more digits"
+        "joints 'shoulder' and 'elbow': their axes deviate by 7.3e-06 rad from parallel, which is preserved; if "
+        "they should be parallel, write their angles with more digits"
     )
 
 

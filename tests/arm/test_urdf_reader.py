@@ -201,9 +201,7 @@ def test_unknown_limits_are_told(tmp_path: Path) -> None:
     """That an effort of 0 was taken for unknown is told to who asks."""
     (tmp_path / "arm.urdf").write_text(one('<limit lower="-1" upper="1" effort="0" velocity="3"/>'))
 
-    assert read_urdf(tmp_path / "arm.urdf").notes == (
-        "joint 'turn': a largest effort of 0 is taken to say that it is not known",
-    )
+    assert read_urdf(tmp_path / "arm.urdf").notes == ("joint 'turn': a maximum effort of 0 is interpreted as unknown",)
 
 
 def test_locked_joints_are_fixed(read: Callable[..., Arm]) -> None:
@@ -260,7 +258,8 @@ def test_a_tensor_that_no_body_has(read: Callable[..., Arm], moment: str, said: 
     np.testing.assert_allclose(forward(arm, [0.5])[:2, 0], (np.cos(0.5), np.sin(0.5)))
     message = (
         f"arm 'test': no dynamics, for mass and inertia of link 1 ('hand') are unknown: {tmp_path / 'arm.urdf'}:3: "
-        f"link 'hand', inertial, inertia: no body has the principal moments {said} kg m² about its centre of mass"
+        f"link 'hand', inertial, inertia: a body cannot have the principal moments {said} kg m² about its centre of "
+        "mass"
     )
     asked = (
         lambda: inverse_dynamics(arm, [0.0], [0.0], [0.0]),
@@ -275,7 +274,7 @@ def test_a_tensor_that_no_body_has(read: Callable[..., Arm], moment: str, said: 
         with pytest.raises(UnsupportedArmError) as caught:
             ask()
         assert message in str(caught.value)
-    assert str(caught.value).endswith("Kinematics does without them")
+    assert str(caught.value).endswith("Kinematics does not need them")
     # It is kept in files of our own, and told by those that cannot hold it.
     (tmp_path / "arm.toml").write_text(toml_text(arm), encoding="utf-8")
     assert read_arm(tmp_path / "arm.toml") == arm
@@ -295,7 +294,7 @@ def test_names_are_kept(read: Callable[..., Arm], tmp_path: Path) -> None:
     assert '<link name="hand"/>' in written
     assert '<link name="tool"/>' in written  # the hand is the tool; two links cannot have one name
     solution = inverse(arm, forward(arm, [2.5]))
-    assert "joint 1 ('turn') would stand at 143.2 deg, 28.6 deg beyond its limit 114.6 deg" in solution.explain()
+    assert "joint 1 ('turn') would be at 143.2 deg, 28.6 deg beyond its limit 114.6 deg" in solution.explain()
 
 
 def test_links_without_mass_may_move_beside_the_chain(read: Callable[..., Arm]) -> None:

@@ -179,14 +179,14 @@ def test_what_is_lost() -> None:
     assert lost_in_urdf(arm) == [
         "joint 1: the inertia of the drive, 0.5 kg m², is not in the file",
         "joint 1: the gear ratio 100 is not in the file",
-        "joint 1: the largest acceleration, 2 rad/s², is not in the file",
+        "joint 1: the maximum acceleration, 2 rad/s², is not in the file",
         "joint 2: the inertia of the drive, 1.5 kg, is not in the file",
-        "joint 2: dry friction of 3 N forward and 5 N backward is 4 N either way in the file",
-        "joint 2: the largest acceleration, 3 m/s², is not in the file",
-        "gravity of (9.80665, 0, 0) m/s² is not in the file: URDF has it pointing down the z axis",
+        "joint 2: Coulomb friction of 3 N forward and 5 N backward is 4 N in both directions in the file",
+        "joint 2: the maximum acceleration, 3 m/s², is not in the file",
+        "gravity of (9.80665, 0, 0) m/s² is not in the file: in URDF it points downwards along z",
         "the reach of 0.9 m is not in the file",
         "the hand speed of 0.5 m/s is not in the file",
-        "how well its dimensions are known is not in the file",
+        "the uncertainty of its dimensions is not in the file",
         "the title is not in the file",
         "the source is not in the file",
     ]
@@ -220,5 +220,5 @@ def test_names_with_line_ends(name: str, back: Callable[[Arm], Arm]) -> None:
 @pytest.mark.parametrize("name", ["\x00", "bell \x07", "\ufffe", "\ud800"])
 def test_names_that_xml_cannot_hold(name: str) -> None:
     """XML has no way to write some characters, and a file with them would not be read."""
-    with pytest.raises(InvalidValueError, match="XML cannot hold every character of this name"):
+    with pytest.raises(InvalidValueError, match="XML cannot represent every character of this name"):
         urdf_text(Arm(name=name, joints=[Joint(kind="revolute")]))

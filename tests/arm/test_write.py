@@ -104,7 +104,7 @@ def test_what_an_arm_file_cannot_hold() -> None:
     ):
         toml_text(Arm(name="odd", joints=joints, links=[half_known]))
     with pytest.raises(
-        InvalidValueError, match="arm 'odd': joint 1 has the gear ratio -50; in an arm file it is above 0"
+        InvalidValueError, match="arm 'odd': joint 1 has the gear ratio -50; an arm file needs one above 0"
     ):
         toml_text(Arm(name="odd", joints=joints, motors=[Motor(gear_ratio=-50)]))
 

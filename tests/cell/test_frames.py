@@ -49,10 +49,10 @@ def test_placing_keeps_hanging(bench: FrameTree) -> None:
 
 
 def test_no_ring(bench: FrameTree) -> None:
-    """The bench cannot hang on the lid of the cup that stands on it, nor anything on itself."""
-    with pytest.raises(InvalidValueError, match="BENCH cannot hang on LID"):
+    """The bench cannot be attached to the lid of the cup that stands on it, nor anything on itself."""
+    with pytest.raises(InvalidValueError, match="BENCH cannot be attached to LID"):
         bench.affix("BENCH", "LID")
-    with pytest.raises(InvalidValueError, match="CUP cannot hang on CUP"):
+    with pytest.raises(InvalidValueError, match="CUP cannot be attached to CUP"):
         bench.affix("CUP", "CUP")
 
 
@@ -128,7 +128,7 @@ def test_any_history(history: list[tuple[str, str, str, int]]) -> None:
         if kind == "unfix":
             tree = tree.unfix(name)
         elif name == other or other in below:
-            with pytest.raises(InvalidValueError, match="cannot hang on"):
+            with pytest.raises(InvalidValueError, match="cannot be attached to"):
                 tree.affix(name, other)
         elif kind == "affix":
             tree = tree.affix(name, other)

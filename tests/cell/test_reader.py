@@ -250,12 +250,12 @@ FAULTS = {
     "arms that differ in spelling": (
         ARM + "[arms.arm-1]\njoint_positions = [0,0,0.3,0,0,0]\n",
         4,
-        "arms, arm-1: ARM_1 is given twice",
+        "arms, arm-1: ARM_1 occurs twice",
     ),
     "arms that differ in leading zeros": (
         ARM + "[arms.ARM_01]\njoint_positions = [0,0,0.3,0,0,0]\n",
         4,
-        "arms, ARM_01: ARM_1 is given twice; case, - or _ and leading zeros make no other arm",
+        "arms, ARM_01: ARM_1 occurs twice; case, - or _ and leading zeros do not distinguish arms",
     ),
     "unknown model": (
         '[arms.ARM_1]\nmodel = "pumma560"\n',
@@ -266,13 +266,13 @@ FAULTS = {
     "model without an inverse": (
         '[arms.ARM_1]\nmodel = "ntu-3r"\n',
         2,
-        "arms, ARM_1, model: 'ntu-3r' has 3 joints; moves ask for a place and an orientation",
+        "arms, ARM_1, model: 'ntu-3r' has 3 joints; moves specify position and orientation",
     ),
-    "no start": ("[arms.ARM_1]\n", 1, "arms, ARM_1, hand: missing; give the pose of the hand at the start, or the jo"),
+    "no start": ("[arms.ARM_1]\n", 1, "arms, ARM_1, hand: missing; specify the initial pose of the gripper, or the jo"),
     "two starts": (
         ARM + "joint_positions = [0,0,0.3,0,0,0]\n",
         3,
-        "hand: the start is given twice, as hand and as joint_positions",
+        "hand: the start is specified twice, as hand and as joint_positions",
     ),
     "start out of reach": (
         '[arms.ARM_1]\nmodel = "puma560"\nhand = [1,0,0, 0,1,0, 0,0,1, 3,0,0]\n',
@@ -288,7 +288,7 @@ FAULTS = {
     "configuration outside the limits": (
         "[arms.ARM_1]\njoint_positions = [0, 0, 1.2, 0, 0, 0]\n",
         2,
-        "arms, ARM_1, joint_positions: joint 3 would stand at 1200.0 mm, 82.4 mm beyond its limit 1117.6 mm",
+        "arms, ARM_1, joint_positions: joint 3 would be at 1200.0 mm, 82.4 mm beyond its limit 1117.6 mm",
     ),
     "configuration too short": (
         "[arms.ARM_1]\njoint_positions = [0, 0]\n",
@@ -316,12 +316,12 @@ FAULTS = {
     "no rotation": (
         ARM + "[frames]\nA = [1,0,0, 0,1,0, 0,0,2, 0,0,0]\n",
         5,
-        "frames, A: the first nine numbers are no rotation (off by 3)",
+        "frames, A: the first nine numbers are not a rotation (error 3)",
     ),
     "a mirror image": (
         ARM + "[frames]\nA = [1,0,0, 0,1,0, 0,0,-1, 0,0,0]\n",
         5,
-        "frames, A: the first nine numbers are no rotation (off by 2)",
+        "frames, A: the first nine numbers are not a rotation (error 2)",
     ),
     "a pose by rows": (
         ARM + "[frames]\nA = [1,0,0,0.4, 0,1,0,0.1, 0,0,1,0.2]\n",
@@ -331,27 +331,27 @@ FAULTS = {
     "twins": (
         ARM + f"[frames]\nBox = {IDENTITY}\nBOX = {IDENTITY}\n",
         6,
-        "frames, BOX: BOX is given twice; names that differ in case only are one",
+        "frames, BOX: BOX occurs twice; case does not distinguish names",
     ),
     "frame on an unknown frame": (
         ARM + f"[frames]\nTABLE = {IDENTITY}\n[frames.CUP]\nat = {IDENTITY}\non = 'TABEL'\n",
         8,
-        "frames, CUP, on: CUP hangs on TABEL, which is no frame here; did you mean TABLE?",
+        "frames, CUP, on: CUP is attached to TABEL, which is not a frame of the cell; did you mean TABLE?",
     ),
-    "frame on an arm that is not there": (
+    "frame on an arm that does not exist": (
         ARM + f"[frames.CUP]\non = 'ARM_2'\nat = {IDENTITY}\n",
         5,
-        "frames, CUP, on: CUP hangs on ARM_2, which is no frame here; did you mean ARM_1?",
+        "frames, CUP, on: CUP is attached to ARM_2, which is not a frame of the cell; did you mean ARM_1?",
     ),
     "frame on itself": (
         ARM + f"[frames.CUP]\non = 'cup'\nat = {IDENTITY}\n",
         5,
-        "frames, CUP, on: CUP hangs on itself",
+        "frames, CUP, on: CUP is attached to itself",
     ),
     "a ring": (
         ARM + "[frames]\n" + "".join(f"{a} = {{ on = '{b}', at = {IDENTITY} }}\n" for a, b in ("XA", "AC", "CB", "BA")),
         6,
-        "frames, A, on: A hangs on itself by way of C, B",
+        "frames, A, on: A is attached to itself by way of C, B",
     ),
     "WORLD as a frame": (ARM + f"[frames]\nworld = {IDENTITY}\n", 5, "frames, world: 'world' cannot name a frame"),
     "an arm as a frame": (ARM + f"[frames]\nARM_1 = {IDENTITY}\n", 5, "frames, ARM_1: 'ARM_1' cannot name a frame"),
@@ -363,7 +363,7 @@ FAULTS = {
     "a misspelt key of a frame": (
         ARM + f"[frames.A]\nat = {IDENTITY}\nparent = 'WORLD'\n",
         6,
-        "frames, A, parent: unknown key; known here: at, on",
+        "frames, A, parent: unknown key; known keys: at, on",
     ),
     "a vision that is not a list of poses": (
         ARM + f"[visions]\nA = {IDENTITY}\n",
@@ -373,7 +373,7 @@ FAULTS = {
     "a second answer that is no rotation": (
         ARM + f"[visions]\nA = [{IDENTITY},\n [2,0,0, 0,1,0, 0,0,1, 0,0,0]]\n",
         6,
-        "visions, A 2: the first nine numbers are no rotation (off by 3)",
+        "visions, A 2: the first nine numbers are not a rotation (error 3)",
     ),
     "devices as a list": (
         ARM.replace("[arms", "devices = ['PRESS']\n[arms"),
@@ -383,7 +383,7 @@ FAULTS = {
     "a device with a setting": (
         ARM + "[devices]\nPRESS = { v = 1 }\n",
         5,
-        "devices, PRESS, v: unknown key; none is kn",
+        "devices, PRESS, v: unknown key; no keys are allo",
     ),
     "servo out of range": (ARM + "[motion]\nservo_ms = 0.05\n", 5, "motion, servo_ms: expected 0.1 to 100, got 0.05"),
     "no way round": (
@@ -410,7 +410,7 @@ FAULTS = {
     "two arms on one base": (
         ARM + ARM.replace("ARM_1", "ARM_2").replace("0,0,0]", "0,0,0.009]", 1),
         5,
-        "arms, ARM_2, base: ARM_2 and ARM_1 stand on one base, 9 mm apart; two arms need 10 mm or more",
+        "arms, ARM_2, base: ARM_2 and ARM_1 have bases 9 mm apart; two arms need 10 mm or more",
     ),
     "contact that is no height": (
         ARM + "[contact]\nz = 'low'\n",
@@ -438,11 +438,11 @@ def test_mistake_in_json(tmp_path: Path) -> None:
     good = json.loads((CORPUS / "cell1.json").read_text())
     good["frames"]["stop"][0] = 7
     lines = json.dumps(good, indent=1).split("\n")
-    with pytest.raises(FileFormatError, match="frames, stop: the first nine numbers are no rotation") as caught:
+    with pytest.raises(FileFormatError, match="frames, stop: the first nine numbers are not a rotation") as caught:
         cell(tmp_path, "\n".join(lines), "cell.json")
     assert lines[caught.value.line - 1].strip() == '"stop": ['
 
-    with pytest.raises(FileFormatError, match=r"cell.json:2: arms, ARM_1: this key is given twice"):
+    with pytest.raises(FileFormatError, match=r"cell.json:2: arms, ARM_1: this key occurs twice"):
         cell(tmp_path, '{"arms": {"ARM_1": {},\n "ARM_1": {}}}', "cell.json")
 
 
@@ -460,9 +460,7 @@ def test_a_long_chain(tmp_path: Path) -> None:
     text = f"{ARM}[frames]\n{''.join(rows)}"
 
     assert len(cell(tmp_path, text).frames) == 1000
-    with pytest.raises(
-        FileFormatError, match=r"F1000 hangs too far from WORLD: more, and at most 1,000 frames are read"
-    ):
+    with pytest.raises(FileFormatError, match=r"F1000 is too deep in the frame tree: the limit is 1,000 frames"):
         cell(tmp_path, f"{text}F1000 = {{ on = 'F999', at = {IDENTITY} }}\n")
 
 

@@ -93,7 +93,7 @@ def test_notes(tmp_path: Path) -> None:
 
     said = armwright("convert", tmp_path / "slow.urdf", "-o", tmp_path / "slow.toml").stdout
 
-    assert "\n  joint 'hand_roll': a largest velocity of 0 is taken to say that it is not known\n" in said
+    assert "\n  joint 'hand_roll': a maximum velocity of 0 is interpreted as unknown\n" in said
 
 
 def test_other_commands_read_urdf() -> None:
@@ -124,7 +124,7 @@ def test_other_commands_read_urdf() -> None:
     ],
 )
 def test_mistakes(arguments: tuple[str | Path, ...], status: int, said: str, tmp_path: Path) -> None:
-    """A call that cannot be understood ends with status 2, a file that is not there with 4; nothing is written."""
+    """A call that cannot be understood ends with status 2, a file that does not exist with 4; nothing is written."""
     done = armwright("convert", *arguments, cwd=tmp_path, columns=400)
 
     assert done.returncode == status

@@ -74,10 +74,10 @@ def test_the_page_of_the_format(tmp_path: Path) -> None:
     refused, taken = armwright("iso9283", path), armwright("iso9283", path, "--few")
 
     assert refused.returncode == 3
-    assert refused.stderr == "armwright: pose P1: ISO 9283 asks for 30 cycles, got 2; --few takes fewer\n"
+    assert refused.stderr == "armwright: pose P1: ISO 9283 requires 30 cycles, got 2; --few accepts fewer\n"
     assert taken.returncode == 0, taken.stderr
     assert "2 of 30" in taken.stdout
-    assert "fewer cycles than ISO 9283 asks for" in taken.stdout
+    assert "fewer cycles than ISO 9283 requires" in taken.stdout
     # On average 0.1315, 0.0385 and 0.097 mm off.
     assert "0.1679" in taken.stdout
 

@@ -29,7 +29,7 @@ def mean_angles(angles: Array, what: str = "angles") -> Array:
     if deviations.size and np.abs(deviations).max() > _WIDEST:
         widest = np.degrees(np.abs(deviations).max())
         raise InvalidValueError(
-            f"{what}: they scatter by {widest:.0f} deg about their mean, and only angles within 90 deg have one"
+            f"{what}: they scatter by {widest:.0f} deg about their mean, which is defined only for angles within 90 deg"
         )
     return wrapped(direction + deviations.mean(axis=0))
 

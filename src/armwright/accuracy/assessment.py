@@ -67,10 +67,12 @@ class Assessment:
             names = [f"{test.kind} {test.name}" for test in self.tests if test.size == 2]
             more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
             which = "all tests" if len(names) == len(self.tests) else f"{', '.join(names[:_NAMED])}{more}"
-            notes.append(f"planar reduction: {which} measured in a plane, without z; distances are taken in it")
+            notes.append(
+                f"planar reduction: {which} measured in a plane, without z; distances are computed in that plane"
+            )
         if self.few:
             notes.append(
-                "fewer cycles than ISO 9283 asks for, where n or the note says so: such a measure is an estimate"
+                "fewer cycles than ISO 9283 requires, where n or the note says so: such a measure is an estimate"
             )
         if self.exceeded:
             notes.append(f"limit exceeded: {', '.join(sorted({measure.symbol for measure in self.exceeded}))}")

@@ -58,14 +58,14 @@ def static_compliance(
     if F.shape != (len(P),):
         raise ShapeError(f"compliance: loads: expected shape ({len(P)},), one per position, got {F.shape}")
     if (F < 0).any():
-        raise InvalidValueError("compliance: loads are sizes of forces, 0 or more; reverse the direction instead")
+        raise InvalidValueError("compliance: loads are magnitudes of forces, 0 or more; reverse the direction instead")
     d = np.array(position_of(direction, P.shape[1], "compliance: direction"))
     if not np.linalg.norm(d) > 0:
         raise InvalidValueError("compliance: the direction is 0")
     d /= np.linalg.norm(d)
     levels, repeats = np.unique(F, return_counts=True)
     if levels[0] != 0:
-        raise InvalidValueError("compliance: no measurement is without load, so there is nothing to compare with")
+        raise InvalidValueError("compliance: expected a measurement without load as the reference, got none")
     checked_parts("compliance", len(levels) - 1, LOADS, few=few, what="loads besides none")
     count = checked_cycles("compliance", repeats.tolist(), few=few, least=1)
     unloaded = P[F == 0].mean(axis=0)

@@ -56,7 +56,7 @@ def checked_parts(kind: Kind, count: int, required: int, *, few: bool, what: str
 
 def _checked(kind: Kind, count: int, required: int, *, few: bool, least: int, what: str) -> int:
     if count < least:
-        raise TooFewError(f"{kind}: needs {least} {what} at least, got {count}")
+        raise TooFewError(f"{kind}: expected at least {least} {what}, got {count}")
     if count < required and not few:
-        raise TooFewError(f"{kind}: ISO 9283 asks for {required} {what}, got {count}; few=True takes fewer")
+        raise TooFewError(f"{kind}: ISO 9283 requires {required} {what}, got {count}; few=True accepts fewer")
     return count

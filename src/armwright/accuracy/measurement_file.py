@@ -133,7 +133,7 @@ def read_measurements(
     """
     files = [paths] if isinstance(paths, str | Path) else list(paths)
     if not files:
-        raise InvalidValueError("measurements: expected one file at least, got none")
+        raise InvalidValueError("measurements: expected at least one file, got none")
     groups: dict[tuple[str, ...], list[Row]] = {}
     for table in read_tables(files, columns=columns, skip_incomplete=skip_incomplete):
         for row in table.rows():
@@ -165,7 +165,7 @@ def _pose_test(rows: list[Row]) -> PoseTest:
     commanded: dict[str, Row] = {}
     for row in (row for row in rows if row.cycle is None):
         if row.name in commanded:
-            raise row.error("cycle", f"a second commanded pose, after that of line {commanded[row.name].line}")
+            raise row.error("cycle", f"a second commanded pose, after the one in line {commanded[row.name].line}")
         commanded[row.name] = row
     clouds: dict[tuple[str, float | None], list[Row]] = {}
     for row in (row for row in rows if row.cycle is not None):
@@ -239,7 +239,7 @@ def _cloud(rows: list[Row], commanded: dict[str, Row]) -> Cloud:
 def _paired(rows: list[Row], clouds: tuple[Cloud, ...], names: list[str]) -> tuple[Cloud, ...]:
     """Return the two poses of a distance with their cycles in one order."""
     if len(clouds) != 2:
-        raise rows[0].error("pose", f"a distance is that of two poses, got {len(clouds)}: {', '.join(names)}")
+        raise rows[0].error("pose", f"a distance needs two poses, got {len(clouds)}: {', '.join(names)}")
     lacking = set(clouds[0].cycles) ^ set(clouds[1].cycles)
     if lacking:
         raise rows[0].error("cycle", f"cycle {min(lacking)} of {' to '.join(names)} has one of the two poses only")
@@ -263,7 +263,7 @@ def _path_test(rows: list[Row]) -> PathTest:
     if not path and first.test in _COMMANDED:
         raise rows[0].error("cycle", f"{first.name} has no commanded path: expected rows with cycle commanded")
     if path and first.test == "settling":
-        raise path[0].error("cycle", "a test of settling has no commanded row: its pose is where the run ends")
+        raise path[0].error("cycle", "a settling test must not have a commanded row: its pose is the end of the run")
     commanded = _trace(path, timed=False) if path else None
     traces = tuple(_trace(run, timed=True) for run in runs.values())
     if commanded is not None:
@@ -316,7 +316,7 @@ def _times(rows: list[Row]) -> list[float] | None:
         row.require(["t"], "expected a number, as in the rows before")
         t = row.number("t") or 0.0
         if times and not t > times[-1]:
-            raise row.error("t_s", f"samples are in order of time, and {t:g} s does not follow {times[-1]:g} s")
+            raise row.error("t_s", f"samples must be in order of time, but {t:g} s follows {times[-1]:g} s")
         times.append(t)
     return times
 

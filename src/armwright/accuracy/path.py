@@ -106,7 +106,7 @@ def path_deviation(
     count = _checked(kind, commanded, runs, few=few)
     legs = legs_of(commanded)
     if planes < 1:
-        raise InvalidValueError(f"{kind}: needs one plane at least, got {planes}")
+        raise InvalidValueError(f"{kind}: expected at least one plane, got {planes}")
     stations = _apart(legs, middles(legs.stations[-1], planes), corners)
     across, passed = passages(legs, stations, runs, what=kind, ends=ENDS)
     P, A = np.array([run.positions for run in passed]), np.array([run.angles for run in passed])
@@ -174,7 +174,7 @@ def path_velocity(
     durations = np.diff([run.times for run in passed], axis=1)
     if not (durations > 0).all():
         wrong = int(np.argwhere(durations <= 0)[0, 0]) + 1
-        raise InvalidValueError(f"velocity: run {wrong} goes back along the path; take fewer, longer stretches")
+        raise InvalidValueError(f"velocity: run {wrong} moves backwards along the path; use fewer, longer sections")
     V = np.diff(edges) / durations
     return PathVelocity(
         accuracy=float(V.mean() / speed - 1),

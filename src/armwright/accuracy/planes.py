@@ -94,7 +94,7 @@ def legs_of(commanded: Trace) -> Legs:
     """
     steps = np.linalg.norm(np.diff(commanded.positions, axis=0), axis=1)
     if not steps.sum() > 0:
-        raise InvalidValueError("commanded path: all of its points are the same")
+        raise InvalidValueError("commanded path: all of its points coincide")
     distinct = np.append(True, steps > _SAME * steps.sum())
     positions = commanded.positions[distinct]
     legs = np.diff(positions, axis=0)
@@ -180,7 +180,9 @@ def _corner_hint(legs: Legs, station: float) -> str:
     sharp = legs.stations[legs.corners]
     if not len(sharp):
         return ""
-    return f"; the nearest corner is {np.abs(sharp - station).min() * 1e3:.4g} mm away: leave out what is near corners"
+    return (
+        f"; the nearest corner is {np.abs(sharp - station).min() * 1e3:.4g} mm away: exclude the sections near corners"
+    )
 
 
 def _passages(run: Trace, samples: Array) -> Passages:

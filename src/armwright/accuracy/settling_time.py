@@ -148,13 +148,12 @@ def _arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, float]:
     outside = np.flatnonzero(distances > band)
     if not len(outside) or outside[0] != 0:
         raise InvalidValueError(
-            f"settling: run {cycle + 1} begins within {band * 1e3:g} mm of where it ends; "
-            "record from before the arrival"
+            f"settling: run {cycle + 1} begins within {band * 1e3:g} mm of its end; start the record before the arrival"
         )
     if t[outside[-1]] >= t[-1] - TAIL * (t[-1] - t[0]):
         raise InvalidValueError(
             f"settling: run {cycle + 1} is still more than {band * 1e3:g} mm away in the last tenth of its record; "
-            "record longer, or take a wider band"
+            "record longer, or use a wider band"
         )
     entries = _entries(t, relative, band)
     entered = float(np.nanmin(entries))

@@ -169,7 +169,9 @@ def _table(header: Header, *, skip_incomplete: bool) -> Table:
     header.require(("x", "y") if nominal else ("test", "cycle", "x", "y"))
     measured = header.present((*_COORDINATES, *ANGLES))
     if nominal:
-        header.require((f"{name}_nominal" for name in measured), "all that is measured is nominal too, or nothing")
+        header.require(
+            (f"{name}_nominal" for name in measured), "either all measured columns have nominal columns, or none has"
+        )
         header.require((name.removesuffix("_nominal") for name in nominal), "it is nominal")
     columns = header.rows(filled=(*identifiers, name, *measured, *nominal), skip_incomplete=skip_incomplete)
     for row in range(len(columns)) if "test" in columns else ():

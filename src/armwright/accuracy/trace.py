@@ -41,7 +41,7 @@ def position_of(value: ArrayLike, size: int, what: str = "commanded position") -
     """
     array = floats(value, what, LARGEST)
     if array.shape != (size,):
-        raise ShapeError(f"{what}: expected {size} numbers, as the measured positions have, got shape {array.shape}")
+        raise ShapeError(f"{what}: expected {size} numbers, as for the measured positions, got shape {array.shape}")
     array.setflags(write=False)
     return array
 
@@ -79,7 +79,7 @@ def refuse_mixed_dimensions(parts: Sequence[Array], what: str) -> None:
     """
     sizes = sorted({part.shape[1] for part in parts})
     if len(sizes) > 1:
-        raise ShapeError(f"{what}: all parts of a test have the same columns, got {' and '.join(map(str, sizes))}")
+        raise ShapeError(f"{what}: all parts of a test must have the same columns, got {' and '.join(map(str, sizes))}")
 
 
 def _trace_positions(value: ArrayLike) -> Array:
@@ -127,7 +127,7 @@ class Trace:
         """Refuse times and angles that do not have one row per sample."""
         rows = len(self.positions)
         if rows < 2:
-            raise ShapeError(f"trace: expected two samples at least, got {rows}")
+            raise ShapeError(f"trace: expected at least two samples, got {rows}")
         if self.times is not None and len(self.times) != rows:
             raise ShapeError(f"trace: {rows} positions but {len(self.times)} times")
         angles_of(self.angles, rows, "trace: angles")
@@ -146,7 +146,7 @@ class Trace:
             InvalidValueError: there are none.
         """
         if self.times is None:
-            raise InvalidValueError(f"{what}: the measure needs the time of every sample")
+            raise InvalidValueError(f"{what}: this measure needs the time of every sample")
         return self.times
 
 

@@ -140,7 +140,7 @@ def pose_drift(
     if t.shape != (len(clouds),):
         raise ShapeError(f"times: expected one per measurement, {len(clouds)}, got shape {t.shape}")
     if len(t) < 2 or not (np.diff(t) > 0).all():
-        raise InvalidValueError("drift: needs two measurements at least, each later than the one before")
+        raise InvalidValueError("drift: expected at least two measurements, each later than the one before")
     refuse_mixed_dimensions(clouds, "drift")
     goal = position_of(commanded, clouds[0].shape[1])
     angle_clouds = _angles_of_all("drift", clouds, angles)

@@ -66,14 +66,14 @@ def weaving_deviation(commanded: Trace, runs: Sequence[Trace], speed: float, *, 
     speed = positive(speed, "weaving: the commanded speed", "m/s")
     line = commanded.positions[-1] - commanded.positions[0]
     if not np.linalg.norm(line) > 0:
-        raise InvalidValueError("weaving: the commanded weave ends where it begins, so it has no middle line")
+        raise InvalidValueError("weaving: the commanded weave ends at its start, so it has no centre line")
     forward = line / np.linalg.norm(line)
     sideways = _sideways(commanded.positions - commanded.positions[0], forward)
     swings, reversals = _swings(commanded.positions @ sideways, "the commanded path")
     stations = (commanded.positions @ forward)[reversals]
     pitch = 2 * (stations[-1] - stations[0]) / (len(reversals) - 1)
     if not pitch > 0:
-        raise InvalidValueError("weaving: the commanded weave does not go along its middle line")
+        raise InvalidValueError("weaving: the commanded weave does not advance along its centre line")
     strokes, frequencies = [], []
     for j, run in enumerate(runs):
         widths, extremes = _swings(run.positions @ sideways, f"run {j + 1}")
@@ -97,7 +97,7 @@ def _sideways(relative: Array, forward: Array) -> Array:
     across = relative - (relative @ forward)[:, None] * forward
     _, widths, axes = np.linalg.svd(across - across.mean(axis=0), full_matrices=False)
     if not widths[0] > 0:
-        raise InvalidValueError("weaving: the commanded path is a straight line, so nothing weaves")
+        raise InvalidValueError("weaving: the commanded path is a straight line, not a weave")
     return np.asarray(axes[0])
 
 
@@ -121,6 +121,6 @@ def _swings(side: Array, name: str) -> tuple[Array, Array]:
             reversals.append(low)
             rising, high = True, i
     if len(reversals) < 3:
-        raise InvalidValueError(f"weaving: {name} reverses {len(reversals)} times; a weave takes three at least")
+        raise InvalidValueError(f"weaving: {name} reverses {len(reversals)} times; expected at least three reversals")
     extremes = np.array(reversals)
     return np.abs(np.diff(side[extremes])), extremes

@@ -18,10 +18,10 @@ from armwright.spatial.poses import to_noap
 
 # The origin of the gravity vector, in words.
 _GRAVITY_FROM = {
-    "standard": "the default; in a cell, that of the cell",
-    "stated": "stated by the arm; in a cell, that of the cell",
-    "root": "down in the root link of the file; in a cell, that of the cell",
-    "world": "that of the cell",
+    "standard": "the default; in a cell, the gravity of the cell applies",
+    "stated": "stated by the arm file; in a cell, the gravity of the cell applies",
+    "root": "downwards in the root link of the file; in a cell, the gravity of the cell applies",
+    "world": "the gravity of the cell",
 }
 # Parameters of a drive that affect the motion of the joint.
 _DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")

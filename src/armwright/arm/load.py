@@ -153,7 +153,7 @@ def _joint(table: Table) -> Joint:
             raise limits.error(
                 unit_of(limits, name, units) and f"{name}_{unit_of(limits, name, units)}",
                 f"too far from zero: {beyond('revolutions', _written(kind, values[name]))}; for a joint without "
-                "limits leave it out",
+                "limits omit it",
             )
     return Joint(
         kind="revolute" if kind == "revolute" else "prismatic",
@@ -172,7 +172,7 @@ def _link(table: Table) -> Link:
     if unknown:
         for key in ("mass_kg", "com_m", "inertia_kgm2"):
             if key in table:
-                raise table.error(key, "mass and inertia are said to be unknown; give them, or why they are unknown")
+                raise table.error(key, "mass and inertia are declared unknown; specify either them or the reason")
         table.finish()
         return Link(unknown=unknown, name=name)
     mass = table.number("mass_kg", default=0.0, lower=0.0)
@@ -189,8 +189,8 @@ def _link(table: Table) -> Link:
         said = ", ".join(f"{moment:.3g}" for moment in moments)
         raise table.error(
             "inertia_kgm2",
-            f"no body has the principal moments {said} kg m² about its centre of mass: none may be negative, or larger "
-            "than the other two together; check inertia_about and com",
+            f"a body cannot have the principal moments {said} kg m² about its centre of mass: none may be negative, or "
+            "exceed the sum of the other two; check inertia_about and com",
         )
     return Link(mass=mass, com=com, inertia=inertia, name=name)
 
@@ -200,7 +200,9 @@ def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
     inertia = table.number("inertia_kgm2" if revolute else "inertia_kg", default=0.0, lower=0.0)
     if "rotor_inertia_kgm2" in table:
         if inertia:
-            raise table.error("rotor_inertia_kgm2", "give the inertia at the load or that of the rotor, not both")
+            raise table.error(
+                "rotor_inertia_kgm2", "specify the inertia at the load side or that of the rotor, not both"
+            )
         inertia = table.number("rotor_inertia_kgm2", lower=0.0) * ratio**2
     force = "Nm" if revolute else "N"
     motor = Motor(

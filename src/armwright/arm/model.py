@@ -281,10 +281,10 @@ class Link:
         if moments is not None:
             said = ", ".join(f"{moment:.3g}" for moment in moments)
             raise InvalidValueError(
-                f"link of {self.mass:g} kg: no body has the principal moments {said} kg m² of its inertia "
-                f"{self.inertia.tolist()}: none may be negative, or larger than the other two together. Give the "
-                "tensor about the centre of mass, not about the frame's origin, and check its units and the signs of "
-                "its products; complete=False lets a tensor pass of which not all moments are known"
+                f"link of {self.mass:g} kg: a body cannot have the principal moments {said} kg m² of its inertia "
+                f"{self.inertia.tolist()}: none may be negative, or exceed the sum of the other two. Specify the "
+                "tensor about the centre of mass, not about the origin of the frame, and check its units and the signs "
+                "of its products; complete=False accepts a tensor of which not all moments are known"
             )
 
 

@@ -93,7 +93,7 @@ def degrees_by_mistake(arm: Arm, q: Array) -> str:
     i = int(suspects[0])
     value = float(q.reshape(-1, arm.n)[rows[:, i].argmax(), i])
     return (
-        f"{arm.called(i)} of '{arm.name}' stands at {value:g} rad, {abs(value) / _TURN:.1f} turns. If degrees are "
+        f"{arm.called(i)} of '{arm.name}' is at {value:g} rad, {abs(value) / _TURN:.1f} revolutions. If degrees are "
         f"meant, {value:g} degrees are {math.radians(value):.6g} rad"
     )
 
@@ -128,7 +128,7 @@ def ask_for_degrees(arm: Arm, q: Array, what: str, callers: int) -> None:
     found = degrees_by_mistake(arm, q)
     if found:
         warnings.warn(
-            f"{what}: {found}: give numpy.deg2rad(...). A joint that really turns so far has limits that say so; or "
+            f"{what}: {found}: give numpy.deg2rad(...). If the joint really rotates so far, set its limits; or "
             "silence this: warnings.simplefilter('ignore', armwright.errors.UnitWarning)",
             UnitWarning,
             stacklevel=callers + 2,

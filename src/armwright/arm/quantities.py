@@ -51,7 +51,7 @@ def typed_pose(table: Table) -> TypedPose:
     ways |= {way: way for way in ("rotation", "quaternion_wxyz") if way in table}
     if len(ways) > 1:
         (first, _), (second, key), *_ = ways.items()
-        raise table.error(key, f"the turn is given twice, as {first} and as {second}")
+        raise table.error(key, f"the rotation is specified twice, as {first} and as {second}")
     rpy = vector_in(table, "rpy", ANGLE, default=np.zeros(3))
     zyz = vector_in(table, "zyz", ANGLE, default=np.zeros(3))
     table.allow("rotation", "quaternion_wxyz")
@@ -88,10 +88,10 @@ def unit_of(table: Table, name: str, units: dict[str, float]) -> str | None:
     """
     if name in table:
         known = [f"{name}_{unit}" for unit in units]
-        raise table.error(name, f"the key must tell the unit: {', '.join(known[:-1])} or {known[-1]}")
+        raise table.error(name, f"the key must contain the unit: {', '.join(known[:-1])} or {known[-1]}")
     found = [unit for unit in units if f"{name}_{unit}" in table]
     if len(found) > 1:
-        raise table.error(f"{name}_{found[1]}", f"{name} is given twice, in {found[0]} and in {found[1]}")
+        raise table.error(f"{name}_{found[1]}", f"{name} is specified twice, in {found[0]} and in {found[1]}")
     return found[0] if found else None
 
 
@@ -121,7 +121,9 @@ def _rotation(table: Table) -> tuple[Array, float]:
     typed = np.array(rows)
     error = float(orthonormality_error(typed))
     if error > _TYPED_ROTATION:
-        raise table.error("rotation", f"expected the rows of a rotation, got a matrix that is off by {error:.2g}")
+        raise table.error(
+            "rotation", f"expected the rows of a rotation matrix, got an orthonormality error of {error:.2g}"
+        )
     if error < _COMPUTED_ROTATION:
         return typed, 0.0
     R = nearest_rotation(typed)

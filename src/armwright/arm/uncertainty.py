@@ -45,7 +45,7 @@ class Uncertainty:
         """Refuse what is no covariance of these errors."""
         f = len(self.errors)
         if len(set(self.errors)) != f:
-            raise InvalidValueError("uncertainty: an error is named twice")
+            raise InvalidValueError("uncertainty: expected different names of errors, got one twice")
         if self.covariance.shape != (f, f):
             raise ShapeError(f"uncertainty: expected ({f}, {f}) for {f} errors, got {self.covariance.shape}")
         C = self.covariance
@@ -53,7 +53,9 @@ class Uncertainty:
         scaled = C / np.maximum(np.outer(size, size), np.finfo(float).tiny)
         symmetric = np.allclose(scaled, scaled.T, rtol=0, atol=_ROUNDING)
         if not symmetric or np.linalg.eigvalsh(scaled).min(initial=0.0) < -_SMALLEST:
-            raise InvalidValueError("uncertainty: expected a covariance: symmetric, and no variance below 0")
+            raise InvalidValueError(
+                "uncertainty: expected a covariance matrix, symmetric and with variances of 0 or more"
+            )
         object.__setattr__(self, "noise", number(self.noise, "uncertainty: noise"))
         if not self.noise >= 0:
             raise InvalidValueError(f"uncertainty: noise must be 0 or more, got {self.noise:g}")

@@ -96,7 +96,7 @@ def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:
     if impossible_moments(link.mass, link.com, link.inertia) is not None:
         raise InvalidValueError(
             f"arm '{arm.name}': link {i} has the inertia {link.inertia.tolist()}, of which not all moments are known; "
-            "an arm file cannot say so"
+            "an arm file cannot represent this"
         )
     values: dict[str, float | Array] = {}
     if link.mass:
@@ -114,7 +114,7 @@ def _motor(arm: Arm, i: int, motor: Motor, joint: Joint) -> dict[str, float]:
     if not motor.gear_ratio > 0:
         raise InvalidValueError(
             f"arm '{arm.name}': {arm.called(i - 1)} has the gear ratio {motor.gear_ratio:g}; "
-            "in an arm file it is above 0"
+            "an arm file needs one above 0"
         )
     inertia, viscous, dry = ("kgm2", "Nms", "Nm") if joint.revolute else ("kg", "Ns_per_m", "N")
     values = {

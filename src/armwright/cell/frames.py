@@ -154,7 +154,7 @@ class FrameTree:
         while (node := self.nodes.get(name)) is not None and node.rigid and node.relation is not None:
             X, name = X @ inverse_pose(node.relation), node.parent
         if name == WORLD:
-            raise InvalidValueError("the frame WORLD is the root and cannot be placed")
+            raise InvalidValueError("the frame WORLD is the root and cannot be assigned a pose")
         parent = WORLD if node is None else node.parent
         relation = X if parent == WORLD else _kept(inverse_pose(self.world(parent)) @ X)
         return self._with(name, Node(parent=parent, relation=relation))
@@ -194,7 +194,7 @@ class FrameTree:
             InvalidValueError: a ring would close, or a pose that is needed has no value.
         """
         if self.would_ring(child, parent):
-            raise InvalidValueError(f"{child} cannot hang on {parent}, which hangs on {child}")
+            raise InvalidValueError(f"{child} cannot be attached to {parent}, which is attached to {child}")
         if relation is None:
             relation = _kept(inverse_pose(self.world(parent)) @ self.world(child))
         else:

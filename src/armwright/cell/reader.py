@@ -127,14 +127,12 @@ def _arms(table: Table, folder: Path) -> dict[str, CellArm]:
             raise table.error(key, "expected the name of an arm, such as ARM_1")
         name = arm_name(match[1])
         if name in arms:
-            raise table.error(key, f"{name} is given twice; case, - or _ and leading zeros make no other arm")
+            raise table.error(key, f"{name} occurs twice; case, - or _ and leading zeros do not distinguish arms")
         arms[name] = _arm(table.table(key), folder)
         for other in arms:
             apart = float(np.linalg.norm(arms[name].base[:3, 3] - arms[other].base[:3, 3]))
             if other != name and apart < _APART:
-                text = (
-                    f"{name} and {other} stand on one base, {apart * 1e3:.3g} mm apart; two arms need {_APART * 1e3:g}"
-                )
+                text = f"{name} and {other} have bases {apart * 1e3:.3g} mm apart; two arms need {_APART * 1e3:g}"
                 raise table.table(key).error("base", f"{text} mm or more")
     if not arms:
         raise table.error(None, "expected at least one arm, such as [arms.ARM_1]")
@@ -151,12 +149,12 @@ def _arm(table: Table, folder: Path) -> CellArm:
     if arm.n < _PLACE_AND_TURN:
         raise table.error(
             "model",
-            f"'{arm.name}' has {arm.n} joints; moves ask for a place and an orientation, which takes six or more",
+            f"'{arm.name}' has {arm.n} joints; moves specify position and orientation, which needs six or more",
         )
     try:
         weighed(arm)
     except ArmwrightError as error:
-        raise table.error("model", f"{error}, but a program's motions come with efforts") from error
+        raise table.error("model", f"{error}, but the motions of a program are computed with efforts") from error
     if "tool" in table:
         arm = attrs.evolve(arm, tool=_pose(table, "tool"))
     table.allow("tool")
@@ -174,7 +172,7 @@ def _start(table: Table, arm: Arm, base: Array) -> Array:
     """Read where an arm stands at the start: joint by joint, or by the pose of its hand in the world."""
     if "joint_positions" in table:
         if "hand" in table:
-            raise table.error("hand", "the start is given twice, as hand and as joint_positions")
+            raise table.error("hand", "the start is specified twice, as hand and as joint_positions")
         table.allow("hand")
         q = table.vector("joint_positions", arm.n)
         if mistake := degrees_by_mistake(arm, q):
@@ -184,7 +182,7 @@ def _start(table: Table, arm: Arm, base: Array) -> Array:
         return q
     table.allow("joint_positions")
     if "hand" not in table:
-        raise table.error("hand", "missing; give the pose of the hand at the start, or the joints as joint_positions")
+        raise table.error("hand", "missing; specify the initial pose of the gripper, or the joints as joint_positions")
     solution = inverse(arm, inverse_pose(base) @ _pose(table, "hand"))
     if not solution.allowed:
         raise table.error("hand", solution.explain())
@@ -212,13 +210,15 @@ def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
         if node.parent not in known:
             near = closest(node.parent, known - {name})
             hint = f"; did you mean {near}?" if near else ""
-            raise table.table(keys[name]).error("on", f"{name} hangs on {node.parent}, which is no frame here{hint}")
+            raise table.table(keys[name]).error(
+                "on", f"{name} is attached to {node.parent}, which is not a frame of the cell{hint}"
+            )
         way = _way_up(name, frames, most)
         if frames[way[-1]].parent == name:
             by = f" by way of {', '.join(way[1:])}" if len(way) > 1 else ""
-            raise table.table(keys[name]).error("on", f"{name} hangs on itself{by}")
+            raise table.table(keys[name]).error("on", f"{name} is attached to itself{by}")
         if len(way) > most:
-            raise table.table(keys[name]).error("on", f"{name} hangs too far from WORLD: {beyond('hanging')}")
+            raise table.table(keys[name]).error("on", f"{name} is too deep in the frame tree: {beyond('hanging')}")
     return frames
 
 
@@ -268,7 +268,7 @@ def _name(table: Table, key: str, taken: Iterable[str], text: str | None = None)
             key, f"{written!r} cannot name a frame or device: letters A to Z, digits and _, not WORLD or an arm"
         )
     if name in taken:
-        raise table.error(key, f"{name} is given twice; names that differ in case only are one")
+        raise table.error(key, f"{name} occurs twice; case does not distinguish names")
     return name
 
 
@@ -286,5 +286,5 @@ def _checked(table: Table, key: str, numbers: Array, index: int | None = None) -
         by_rows = np.linalg.norm(numbers.reshape(3, 4)[:, :3], axis=-1)
         rows = np.allclose(by_rows, 1.0, atol=_TYPED_ROTATION)
         hint = "; they look like rows: write the columns n, o, a, p" if rows else ""
-        raise table.error(key, f"the first nine numbers are no rotation (off by {error:.2g}){hint}", index)
+        raise table.error(key, f"the first nine numbers are not a rotation (error {error:.2g}){hint}", index)
     return homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])

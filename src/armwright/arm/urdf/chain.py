@@ -99,7 +99,7 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
 def _root(robot: Robot) -> str:
     roots = [name for name in robot.links if name not in robot.above]
     if len(roots) > 1:
-        raise robot.error(f"the base could be any of the links {_listed(roots)}; name one as base (--base)")
+        raise robot.error(f"the base link is ambiguous: it could be {_listed(roots)}; specify one as base (--base)")
     return roots[0]
 
 
@@ -122,13 +122,13 @@ def _only_end(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
         if moves and not robot.below[link]:
             ends.append(link)
     if not ends:
-        raise robot.error(f"no joint moves a link that hangs on '{base}'")
+        raise robot.error(f"no joint moves a link below '{base}'")
     if len(ends) == 1:
         return ends[0], ()
     carrier = _carrier(robot, base, ends)
     if carrier is None:
         raise robot.error(
-            f"the arm could end at any of the links {_listed(ends)}; name one as tip: "
+            f"the tip link is ambiguous: it could be {_listed(ends)}; specify one as tip: "
             f"load_urdf(path, tip='{ends[0]}'), or armwright convert {robot.path} --tip {ends[0]} -o arm.toml"
         )
     return carrier, (
@@ -150,7 +150,7 @@ def _route(robot: Robot, base: str, tip: str) -> list[UrdfJoint]:
     link = tip
     while link != base:
         if link not in robot.above:
-            raise robot.error(f"link '{tip}' does not hang on link '{base}'")
+            raise robot.error(f"link '{tip}' is not below link '{base}'")
         route.append(robot.above[link])
         link = robot.above[link].parent
     return route[::-1]
@@ -177,7 +177,7 @@ def _refuse_loads(robot: Robot, beside: list[UrdfJoint]) -> None:
     loaded = [joint for joint in beside if _carries(robot, joint)]
     if loaded:
         one, names = len(loaded) == 1, [joint.name for joint in loaded]
-        does = "joint hangs beside the chain, moves and has" if one else "joints hang beside the chain, move and have"
+        does = "joint lies beside the chain, moves and has" if one else "joints lie beside the chain, move and have"
         raise loaded[0].element.error(
             "",
             f"{len(loaded)} {does} mass to carry: {_listed(names)}. An arm has no branches: choose another tip, or "

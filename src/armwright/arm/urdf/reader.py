@@ -104,7 +104,7 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
     )
     if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         down = vector_text(arm.gravity)
-        notes.append(f"gravity points down in the root link of the file: {down} along the axes of '{chain.base}'")
+        notes.append(f"gravity points downwards in the root link of the file: {down} along the axes of '{chain.base}'")
     return Reading(arm=arm, notes=tuple(notes))
 
 
@@ -144,8 +144,8 @@ def _welded(bodies: Sequence[Link]) -> Link:
 def _leaning(chain: Chain, frames: Frames) -> list[str]:
     """Say which axes are nearly parallel, and so were probably meant to be."""
     return [
-        f"joints '{one.joint.name}' and '{other.joint.name}': their axes are {angle:.1e} rad from parallel and kept "
-        "so; if they are meant to be parallel, write their angles with more digits"
+        f"joints '{one.joint.name}' and '{other.joint.name}': their axes deviate by {angle:.1e} rad from "
+        "parallel, which is preserved; if they should be parallel, write their angles with more digits"
         for one, other, angle in zip(chain.moving, chain.moving[1:], frames.leaning, strict=False)
         if 0 < angle < _MEANT_PARALLEL
     ]

@@ -70,11 +70,11 @@ class UrdfJoint:
         if self.fixed:
             return
         if self.kind not in _MOVING:
-            raise self.element.error("type", f"a {self.kind} joint is no joint of an arm; expected {_either(_MOVING)}")
+            raise self.element.error("type", f"an arm cannot have a {self.kind} joint; expected {_either(_MOVING)}")
         follows = self.element.one("mimic")
         if follows is not None:
             master = follows.attributes.get("joint", "another joint")
-            raise follows.error("", f"the joint follows '{master}'; an arm has only joints that move by themselves")
+            raise follows.error("", f"the joint mimics '{master}'; an arm can only have independent joints")
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -109,7 +109,7 @@ def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
 
     Raises:
         MissingExtraError: the library that parses it is not installed.
-        UnknownNameError: a joint to lock is not there.
+        UnknownNameError: a joint to lock does not exist.
         InvalidValueError: a joint is to be held where its limits do not let it.
         FileFormatError: the file is missing, broken, or its links and joints make no tree.
     """
@@ -117,7 +117,7 @@ def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
     links: dict[str, Element] = {}
     for element in root.all("link"):
         if element.name in links:
-            raise element.error("name", f"there is another link of that name in line {links[element.name].line}")
+            raise element.error("name", f"another link has this name, in line {links[element.name].line}")
         links[element.name] = element
     names: dict[str, UrdfJoint] = {}
     above: dict[str, UrdfJoint] = {}
@@ -125,9 +125,11 @@ def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
     for element in root.all("joint"):
         joint = _joint(element, links, lock)
         if joint.name in names:
-            raise element.error("name", f"there is another joint of that name in line {names[joint.name].element.line}")
+            raise element.error("name", f"another joint has this name, in line {names[joint.name].element.line}")
         if joint.child in above:
-            raise element.error("child", f"link '{joint.child}' hangs on joint '{above[joint.child].name}' already")
+            raise element.error(
+                "child", f"link '{joint.child}' is already the child of joint '{above[joint.child].name}'"
+            )
         names[joint.name] = above[joint.child] = joint
         below[joint.parent].append(joint)
     for name in lock:
@@ -165,7 +167,7 @@ def _locked(joint: UrdfJoint, position: float) -> UrdfJoint:
         limits = limits_of(joint)[0] if moves else Limits()
         if not (moves and math.isfinite(position) and limits.lower <= position <= limits.upper):
             ends = f"it goes from {limits.lower:g} to {limits.upper:g}" if moves else f"it is {joint.kind}"
-            raise InvalidValueError(f"lock: joint '{joint.name}' cannot be held at {position:g} (rad or m): {ends}")
+            raise InvalidValueError(f"lock: joint '{joint.name}' cannot be locked at {position:g} (rad or m): {ends}")
     return attrs.evolve(joint, kind="fixed", locked=position)
 
 
@@ -178,9 +180,7 @@ def _refuse_rings(robot: Robot) -> None:
         while link not in settled and link in robot.above:
             if link in way:
                 ring = list(way)[list(way).index(link) :]
-                raise robot.above[link].element.error(
-                    "", f"links hang on one another in a ring: {', '.join(map(repr, sorted(ring)))}"
-                )
+                raise robot.above[link].element.error("", f"links form a cycle: {', '.join(map(repr, sorted(ring)))}")
             way[link] = None
             link = robot.above[link].parent
         settled.update(way)
@@ -211,7 +211,7 @@ def axis_of(joint: UrdfJoint) -> Array:
     axis = element.vector("xyz", (1.0, 0.0, 0.0))
     largest = float(np.abs(axis).max())
     if largest == 0:
-        raise element.error("xyz", "an axis of 0 0 0 has no direction")
+        raise element.error("xyz", "expected a direction, got the axis 0 0 0")
     axis = axis / largest  # an axis of any length has a direction, though its square may be no number
     return np.asarray(axis / np.linalg.norm(axis))
 
@@ -237,8 +237,8 @@ def body_of(link: Element) -> Link:
         said = ", ".join(f"{moment:.3g}" for moment in moments)
         why = element.error(
             "",
-            f"no body has the principal moments {said} kg m² about its centre of mass: none may be negative, or larger "
-            "than the other two together",
+            f"a body cannot have the principal moments {said} kg m² about its centre of mass: none may be negative, or "
+            "exceed the sum of the other two",
         )
         return Link(unknown=str(why))
     R = X[:3, :3]
@@ -256,13 +256,13 @@ def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
         if joint.kind == "continuous":
             return Limits(), []
         raise joint.element.error(
-            "", f"a {joint.kind} joint needs <limit>; a joint that turns without end is of type continuous"
+            "", f"a {joint.kind} joint needs <limit>; a joint without limits has the type continuous"
         )
     largest, notes = {}, []
     for name, key in (("effort", "effort"), ("speed", "velocity")):
         value = element.number(key, math.inf, lower=0.0)
         if value == 0:
-            notes.append(f"joint '{joint.name}': a largest {key} of 0 is taken to say that it is not known")
+            notes.append(f"joint '{joint.name}': a maximum {key} of 0 is interpreted as unknown")
         largest[name] = value if 0 < value < NO_LIMIT else math.inf
     if joint.kind == "continuous":
         return Limits(**largest), notes
@@ -270,8 +270,8 @@ def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
     if not lower < upper:
         raise element.error(
             "",
-            f"the lower limit must be below the upper, got {lower:g} and {upper:g}, where one left out is 0; a joint "
-            "that turns without end is of type continuous",
+            f"the lower limit must be below the upper, got {lower:g} and {upper:g}, where an omitted one is 0; a "
+            "joint without limits has the type continuous",
         )
     lower, upper = (value if abs(value) < NO_LIMIT else math.copysign(math.inf, value) for value in (lower, upper))
     most = limit("revolutions") * math.tau

@@ -45,7 +45,7 @@ def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
     for name in (arm.name, arm.base_link, arm.tool_link, *parts):
         if not all(_in_xml(character) for character in name):
             raise InvalidValueError(
-                f"arm {arm.name!r}: XML cannot hold every character of this name: {name!r}; give another"
+                f"arm {arm.name!r}: XML cannot represent every character of this name: {name!r}; choose another"
             )
     return "\n".join(["<?xml version='1.0' encoding='utf-8'?>", *_robot(arm, tilts), ""])
 
@@ -55,12 +55,12 @@ def lost_in_urdf(arm: Arm) -> list[str]:
     lost = [sentence for i in range(arm.n) for sentence in _lost_of_joint(arm, i)]
     if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         x, y, z = arm.gravity
-        lost.append(f"gravity of ({x:g}, {y:g}, {z:g}) m/s² is not in the file: URDF has it pointing down the z axis")
+        lost.append(f"gravity of ({x:g}, {y:g}, {z:g}) m/s² is not in the file: in URDF it points downwards along z")
     for name, value, unit in (("reach", arm.reach, "m"), ("hand speed", arm.tool_speed, "m/s")):
         if math.isfinite(value):
             lost.append(f"the {name} of {value:g} {unit} is not in the file")
     if arm.uncertainty is not None:
-        lost.append("how well its dimensions are known is not in the file")
+        lost.append("the uncertainty of its dimensions is not in the file")
     lost += [f"the {name} is not in the file" for name in ("title", "source") if getattr(arm, name)]
     return lost
 
@@ -75,13 +75,13 @@ def _lost_of_joint(arm: Arm, at: int) -> Iterator[str]:
         yield f"{called}: the gear ratio {motor.gear_ratio:g} is not in the file"
     if motor.coulomb_forward != motor.coulomb_backward:
         yield (
-            f"{called}: dry friction of {motor.coulomb_forward:g} {units.effort} forward and "
-            f"{motor.coulomb_backward:g} {units.effort} backward is {_dry(motor):g} {units.effort} either way in the "
-            "file"
+            f"{called}: Coulomb friction of {motor.coulomb_forward:g} {units.effort} forward and "
+            f"{motor.coulomb_backward:g} {units.effort} backward is {_dry(motor):g} {units.effort} in both "
+            "directions in the file"
         )
     if math.isfinite(joint.limits.acceleration):
         largest = f"{joint.limits.acceleration:g} {units.position}/s²"
-        yield f"{called}: the largest acceleration, {largest}, is not in the file"
+        yield f"{called}: the maximum acceleration, {largest}, is not in the file"
     if link.unknown:
         yield f"link {at + 1}: its mass and inertia are unknown and not in the file: {link.unknown}"
 
