@@ -159,7 +159,7 @@ def test_measurements_of_the_page(name: str, tmp_path: Path) -> None:
 
 def known_keys(message: str) -> list[str]:
     """The keys that the answer to an unknown one lists."""
-    keys = message.split("known here: ")[1].split(", ")
+    keys = message.split("known keys: ")[1].split(", ")
     assert keys
     return keys
 

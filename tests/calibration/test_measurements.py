@@ -128,7 +128,7 @@ def test_joints_that_a_urdf_counts_from_0(arm: Arm, write: Write) -> None:
     joints = [attrs.evolve(joint, name=f"joint_{i}") for i, joint in enumerate(arm.joints)]
     path, named = write(table(HEAD)), attrs.evolve(arm, joints=joints)
 
-    assert "joint_1_deg: joint_1 is a name of joint_1 and joint_2; say which is meant by --columns" in refused(
+    assert "joint_1_deg: joint_1 is a name of joint_1 and joint_2; specify which is meant by --columns" in refused(
         path, named
     )
     columns = {f"joint_{i}_deg": f"joint_{i}_deg" for i in (1, 2)}
@@ -140,9 +140,9 @@ def test_rows_with_gaps(arm: Arm, write: Write) -> None:
     """Rows without a joint or with part of a point are refused together, or left out with a warning."""
     path = write(table(HEAD, [*ROWS, "1,,3,4,5", "1,2,3,,5"]))
 
-    said = "points.csv:5: cells are empty: joint_2_deg in line 5; y_mm in line 6; --skip-incomplete leaves out 2 rows"
+    said = "points.csv:5: cells are empty: joint_2_deg in line 5; y_mm in line 6; --skip-incomplete omits 2 rows"
     assert refused(path, arm) == said
-    with pytest.warns(IncompleteRowsWarning, match="2 rows left out for empty cells, 3 read"):
+    with pytest.warns(IncompleteRowsWarning, match="2 rows omitted because of empty cells, 3 read"):
         measured = read_measurements(path, arm, skip_incomplete=True)
     assert measured.names == ("2", "3", "4")
 
@@ -152,7 +152,7 @@ def test_a_row_that_has_no_point_is_complete(arm: Arm, write: Write) -> None:
     path = write(table(f"{HEAD},plane", [*(f"{row}," for row in ROWS), "1,2,,,,table", "1,2,3,,,table"]))
 
     with pytest.warns(
-        IncompleteRowsWarning, match="1 row left out for empty cells, 4 read: y_mm in line 6; z_mm in line 6"
+        IncompleteRowsWarning, match="1 row omitted because of empty cells, 4 read: y_mm in line 6; z_mm in line 6"
     ):
         measured = read_measurements(path, arm, skip_incomplete=True)
     assert measured.readings.plane.tolist() == [-1, -1, -1, 0]
@@ -252,8 +252,8 @@ def test_radians_for_degrees(arm: Arm, write: Write) -> None:
         ),
         ("jiont_1_deg,joint_2_deg,x_mm,y_mm,z_mm", "jiont_1_deg: no such column. Did you mean 'joint_1_deg'? Known: "),
         (f"{HEAD},", "points.csv:1: '': no such column."),
-        (f"{HEAD},X_mm", "points.csv:1: X_mm: there twice, as x_mm too"),
-        (f"{HEAD},joint_1_rad", "points.csv:1: joint_1_rad: there twice, as joint_1_deg too"),
+        (f"{HEAD},X_mm", "points.csv:1: X_mm: a second column for this quantity, after x_mm"),
+        (f"{HEAD},joint_1_rad", "points.csv:1: joint_1_rad: a second column for this quantity, after joint_1_deg"),
         (
             "joint_1,joint_2_deg,x_mm,y_mm,z_mm",
             "joint_1: the name has no unit: expected joint_1_deg or joint_1_rad or joint_1_mrad, in the file or by",
@@ -267,7 +267,10 @@ def test_radians_for_degrees(arm: Arm, write: Write) -> None:
             "joint_1_mm,joint_2_deg,x_mm,y_mm,z_mm",
             "joint_1_mm: mm is a unit of length, and joint 1 of elbow is revolute: expected joint_1_deg or",
         ),
-        ("joint_1_deg,joint_2_deg,x_mm,y_m,z_mm", "y_m: coordinates have one unit in a file, and x_mm has another"),
+        (
+            "joint_1_deg,joint_2_deg,x_mm,y_m,z_mm",
+            "y_m: coordinates must have one unit in a file, but x_mm has another",
+        ),
         (
             f"{HEAD},x_dif_mm",
             "points.csv:1: x_mm: give the points, or nominal points and deviations, not both: joint_",
@@ -278,7 +281,7 @@ def test_radians_for_degrees(arm: Arm, write: Write) -> None:
         ),
         (
             "joint_1_deg,joint_2_deg,x_t_mm,y_t_mm,z_t_mm,x_dif_um,y_dif_um,z_dif_um",
-            "x_dif_um: nominal coordinates and deviations have one unit in a file, and x_t_mm has another",
+            "x_dif_um: nominal coordinates and deviations must have one unit in a file, but x_t_mm has another",
         ),
         (f"{HEAD},name,pose", "points.csv:1: pose: rows have one name, and column name has it"),
     ],
@@ -303,15 +306,15 @@ def test_unit_of_a_slide(sliding: Arm, write: Write) -> None:
     ("row", "message"),
     [
         ("10,twenty,1,2,3", "points.csv:2: joint_2_deg: expected a number, got 'twenty'"),
-        ("10,20,,2,3", "points.csv:2: x_mm: empty; expected a number, or --skip-incomplete to leave the row out"),
+        ("10,20,,2,3", "points.csv:2: x_mm: empty; expected a number, or --skip-incomplete to omit the row"),
         ("10,20,nan,2,3", "points.csv:2: x_mm: every number must be finite and no larger than 1e+100, got nan"),
         ("10,20,1,2,-inf", "points.csv:2: z_mm: every number must be finite and no larger than 1e+100, got -inf"),
         ('10,20,"1,5",2,3', "points.csv:2: x_mm: expected a number, got '1,5'; write a decimal point"),
         (
             "10,20,1,5,2,3",
-            "points.csv:2: expected 5 values, as there are columns, got 6; is there a comma in a number?",
+            "points.csv:2: expected 5 values, one per column, got 6; does a number contain a comma?",
         ),
-        ("10,20,1,5", "points.csv:2: expected 5 values, as there are columns, got 4"),
+        ("10,20,1,5", "points.csv:2: expected 5 values, one per column, got 4"),
     ],
 )
 def test_values(row: str, message: str, arm: Arm, write: Write) -> None:
@@ -322,9 +325,9 @@ def test_values(row: str, message: str, arm: Arm, write: Write) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "points.csv: the file is empty; its first line should name the columns"),
-        ("\n \n", "points.csv: the file is empty; its first line should name the columns"),
-        (HEAD, "points.csv: no rows below the names of the columns"),
+        ("", "points.csv: the file is empty; expected column names in its first line"),
+        ("\n \n", "points.csv: the file is empty; expected column names in its first line"),
+        (HEAD, "points.csv: no rows after the column names"),
         (f"{HEAD}\n{'1' * 200_000},2,3,4,5", "points.csv:2: not valid CSV: field larger than field limit (131072)"),
     ],
     ids=["empty", "blank", "no rows", "endless"],
@@ -335,7 +338,7 @@ def test_no_table(text: str, message: str, arm: Arm, write: Write) -> None:
 
 
 def test_missing_file(arm: Arm, write: Write) -> None:
-    """A file that is not there is refused with the nearest name in its folder."""
+    """A file that does not exist is refused with the nearest name in its folder."""
     path = write(table(HEAD))
 
     with pytest.raises(FileFormatError, match=r"points\.csv"):
@@ -346,7 +349,9 @@ def test_degrees_for_radians(arm: Arm, write: Write) -> None:
     """Radians that are many turns are asked about, with line and joint."""
     said = refused(write(table(HEAD.replace("deg", "rad"))), arm)
 
-    assert said.startswith("points.csv:4: joint_1_rad: joint 1 of 'elbow' stands at -40 rad, 6.4 turns. If degrees are")
+    assert said.startswith(
+        "points.csv:4: joint_1_rad: joint 1 of 'elbow' is at -40 rad, 6.4 revolutions. If degrees are"
+    )
     assert said.endswith("are the units right?")
 
 
@@ -452,7 +457,11 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
     [
         (f"{HEAD},qw,qx,qy", "1,2,3,4,5,1,0,0", "points.csv:1: qz: no such column; there are joint_1_deg"),
         (f"{HEAD},qw,qx,qy,qz", "1,2,3,4,5,1,0,0,1", "points.csv:2: qw: expected a quaternion of length 1, got one of"),
-        (f"{HEAD},roll_deg,pitch_deg,yaw_rad", "1,2,3,4,5,1,0,0", "yaw_rad: angles have one unit in a file, and roll_"),
+        (
+            f"{HEAD},roll_deg,pitch_deg,yaw_rad",
+            "1,2,3,4,5,1,0,0",
+            "yaw_rad: angles must have one unit in a file, but roll_",
+        ),
         (f"{HEAD},roll_deg,qw", "1,2,3,4,5,1,0", "points.csv:1: qw: give roll, pitch and yaw, or a quaternion, not bo"),
         (
             f"{HEAD},distance_mm",

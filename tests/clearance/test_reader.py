@@ -103,7 +103,7 @@ def test_unknown_name() -> None:
 
 
 def test_no_file(tmp_path: Path) -> None:
-    """A file that is not there is named."""
+    """A file that does not exist is named."""
     with pytest.raises(FileFormatError, match=r"nowhere\.toml"):
         load_linkage(tmp_path / "nowhere.toml")
 

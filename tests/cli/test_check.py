@@ -136,7 +136,7 @@ def test_json_with_a_stage(emit: str, first: str) -> None:
 
 
 def test_no_such_program(tmp_path: Path) -> None:
-    """A program that is not there is a caller's mistake, told in one line."""
+    """A program that does not exist is a caller's mistake, told in one line."""
     result = check(tmp_path / "nothing.rlo")
 
     assert result.returncode == 4

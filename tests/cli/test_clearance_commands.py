@@ -140,12 +140,12 @@ def test_sweep_goes_on(folder: Path) -> None:
     assert told == {"runs": 64, "failed": 0, "paths": ["y1", "y3", "y7"], "folder": str(folder)}
     assert all(0.2 < one["earliest"] <= one["until"] < 0.25 and one["chance"] == [] for one in chaos.values())
     assert other.returncode == 3
-    assert "holds another sweep: design.runs is 64 there, 32 here" in other.stderr
+    assert "contains another sweep: design.runs is 64 in the folder, 32 here" in other.stderr
     assert (folder / "results.nc").read_bytes() == before
 
 
 def test_damaged_sweep(folder: Path, tmp_path: Path) -> None:
-    """Whoever reads a sweep back names the file that is damaged, with status 4; it stays as it is."""
+    """Whoever reads a sweep back names the file that is damaged, with status 4; it is not changed."""
     swept = tmp_path / "swept"
     shutil.copytree(folder, swept)
     results, block = swept / "results.nc", swept / "blocks" / "0000000.npy"
@@ -159,7 +159,7 @@ def test_damaged_sweep(folder: Path, tmp_path: Path) -> None:
     anew = armwright(*sweep, "--json")
 
     assert [done.returncode for done in (learnt, again, anew)] == [4, 4, 4]
-    assert f"armwright: {results}: damaged: its checksum does not match run.json; it stays as it is" in learnt.stderr
+    assert f"armwright: {results}: damaged: its checksum does not match run.json; it is not changed" in learnt.stderr
     assert f"{results}: damaged" in again.stderr
     assert json.loads(anew.stdout)["error"]["file"] == str(block)
     assert block.read_bytes() == b""
@@ -236,7 +236,7 @@ MISTAKES = [
     (("sweep", "five-bar", "--design", "lsh"), "no design 'lsh'. Did you mean 'lhs'?"),
     (("sweep", "five-bar", "--design", "factorial", "--levels", "1"), "levels: expected an integer of at least"),
     (("sweep", "five-bar", "--design", "factorial", "--from-mm", "0"), "contact needs them above 0, got 0 mm"),
-    (("sweep", "five-bar", "-n", "100"), "a Sobol design has a power of two of points, got 100"),
+    (("sweep", "five-bar", "-n", "100"), "a Sobol design needs a power of two of points, got 100"),
     (("sweep", "five-bar", "--from-mm", "0.5", "--to-mm", "0.1"), "bounds of c_J2: they are reversed"),
     (("sweep", "five-bar", "--step", "1e-3"), "step: 0.001 s is too long for contacts of "),
     (("sweep", "five-bar", "--replicates", "16"), "replicates: expected 0 to 15, got 16"),

@@ -78,7 +78,7 @@ def test_diff(wrong: Path, option: str) -> None:
 
 
 def test_several_programs(wrong: Path) -> None:
-    """A program that is not there keeps no other from being cured."""
+    """A program that does not exist keeps no other from being cured."""
     missing = wrong.with_name("wrnog.rlo")
     result = fix(missing, wrong)
 

@@ -130,7 +130,7 @@ def test_standard_input_that_is_no_text() -> None:
     result = fmt("-", typed=b"BEGIN\n\xff END.")
 
     assert result.returncode == 4
-    reason = "not UTF-8 text: byte 0xff has no meaning; save it as UTF-8"
+    reason = "not UTF-8 text: byte 0xff is invalid; save it as UTF-8"
     assert result.stderr == f"armwright: standard input:2: {reason}\n"
 
 

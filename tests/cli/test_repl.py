@@ -143,7 +143,7 @@ def test_a_program_with_errors() -> None:
 
 
 def test_no_such_file() -> None:
-    """A program or a cell that is not there ends the command with one message."""
+    """A program or a cell that does not exist ends the command with one message."""
     for arguments in (("nowhere.rlo",), ("--cell", "nowhere.toml")):
         done = armwright("repl", *arguments)
         assert done.returncode == 4

@@ -110,7 +110,7 @@ WRONG = {
     "a number beyond floats": (
         f"m = 1{'0' * 400}",
         lambda t: t.number("m"),
-        "1: m: expected a number no larger than 1e+100, got a whole number of many digits",
+        "1: m: expected a number no larger than 1e+100, got an integer of many digits",
     ),
     "a number beyond reason": (
         "m = -1e101",
@@ -187,7 +187,7 @@ WRONG = {
     "misspelt and so missing": (
         "[hand]\nreech_m = 1",
         lambda t: t.table("hand").number("reach_m"),
-        "1: hand, reach_m: missing, expected a number; did you mean it by 'reech_m'?",
+        "1: hand, reach_m: missing, expected a number; was 'reech_m' meant?",
     ),
     "wrong in the second of several": (
         "[[joint]]\n[[joint]]\n[joint.link]\n\nmass_kg = 'x'",
@@ -228,9 +228,9 @@ def test_mistakes(case: str, at: Callable[..., Table], tmp_path: Path) -> None:
 
 UNKNOWN = {
     "near a key that was not given": ("reech_m = 1", "1: reech_m: unknown key; did you mean 'reach_m'?"),
-    "near a key that was given": ("reach_m = 1\nreech_m = 1", "2: reech_m: unknown key; known here: name, reach_m"),
-    "near nothing": ("weight = 1", "1: weight: unknown key; known here: name, reach_m"),
-    "a table": ("name = 'a'\n\n[weights]\nx = 1", "3: weights: unknown key; known here: name, reach_m"),
+    "near a key that was given": ("reach_m = 1\nreech_m = 1", "2: reech_m: unknown key; known keys: name, reach_m"),
+    "near nothing": ("weight = 1", "1: weight: unknown key; known keys: name, reach_m"),
+    "a table": ("name = 'a'\n\n[weights]\nx = 1", "3: weights: unknown key; known keys: name, reach_m"),
 }
 
 
@@ -249,15 +249,15 @@ def test_nothing_is_known(at: Callable[..., Table], tmp_path: Path) -> None:
     """In a table that must be empty, every key is unknown and none can be offered."""
     top = at("[camera]\nx = 1")
 
-    assert refused(tmp_path, top.table("camera").finish) == "thing.toml:2: camera, x: unknown key; none is known here"
+    assert (
+        refused(tmp_path, top.table("camera").finish)
+        == "thing.toml:2: camera, x: unknown key; no keys are allowed here"
+    )
 
 
-TOO_DEEP = (
-    " nested too deeply: more, and at most 60 levels are read; `armwright --raise nesting=NUMBER ...` allows more"
-)
+TOO_DEEP = " nested too deeply: the limit is 60 levels (`armwright --raise nesting=NUMBER ...` raises it)"
 TOO_MANY_DIGITS = (
-    " a whole number in it has too many digits: more, and at most 1,000 digits are read; "
-    "`armwright --raise digits=NUMBER ...` allows more"
+    " an integer in it has too many digits: the limit is 1,000 digits (`armwright --raise digits=NUMBER ...` raises it)"
 )
 BROKEN = {
     "no value": ("a.toml", "x = 1\nmass_kg =\n", "2: not valid TOML: Invalid value, column 10"),
@@ -265,8 +265,8 @@ BROKEN = {
     "the same key twice": ("a.toml", "x = 1\n\nx = 2\n", "3: not valid TOML: Cannot overwrite a value, column 6"),
     "no JSON value": ("a.json", '{\n "x": }', "2: not valid JSON: Expecting value, column 7"),
     "nothing": ("a.json", "", "1: not valid JSON: Expecting value, column 1"),
-    "a JSON key twice": ("a.json", '{"x": 1, "y": [{"x": 1}],\n "x": 2}', "2: x: this key is given twice"),
-    "a JSON key twice, below": ("a.json", '{"y": [0, {"x": 1,\n"x": 1}]}', "2: y 2, x: this key is given twice"),
+    "a JSON key twice": ("a.json", '{"x": 1, "y": [{"x": 1}],\n "x": 2}', "2: x: this key occurs twice"),
+    "a JSON key twice, below": ("a.json", '{"y": [0, {"x": 1,\n"x": 1}]}', "2: y 2, x: this key occurs twice"),
     "a JSON list": ("a.json", "[1, 2]", "1: expected keys and values in braces, got a list of 2"),
     "deep lists": ("a.toml", f"x = {'[' * 9000}{']' * 9000}", TOO_DEEP),
     "deep JSON": ("a.json", f'{{"x": {"[" * 200000}{"]" * 200000}}}', TOO_DEEP),
@@ -288,22 +288,22 @@ def test_not_utf_8(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_bytes(b"x = 1\n# caf\xe9\n")
 
     said = refused(tmp_path, lambda: read_text(tmp_path / "a.toml"))
-    assert said == "a.toml:2: not UTF-8 text: byte 0xe9 has no meaning; save it as UTF-8"
+    assert said == "a.toml:2: not UTF-8 text: byte 0xe9 is invalid; save it as UTF-8"
 
     (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbfx = 1\n\xe9\n")
     said = refused(tmp_path, lambda: read_text(tmp_path / "a.toml"))
-    assert said == "a.toml:2: not UTF-8 text: byte 0xe9 has no meaning; save it as UTF-8"
+    assert said == "a.toml:2: not UTF-8 text: byte 0xe9 is invalid; save it as UTF-8"
 
 
 def test_missing_file(tmp_path: Path) -> None:
-    """A file that is not there is told, with the nearest name in its folder."""
+    """A file that does not exist is told, with the nearest name in its folder."""
     (tmp_path / "stanford.toml").touch()
 
     said = refused(tmp_path, lambda: Document.read(tmp_path / "standford.toml"))
     assert said == "standford.toml: no such file; did you mean 'stanford.toml'?"
     assert refused(tmp_path, lambda: Document.read(tmp_path / "cell.toml")) == "cell.toml: no such file"
     assert refused(tmp_path, lambda: Document.read(tmp_path / "no" / "a.toml")) == "no/a.toml: no such file"
-    assert refused(tmp_path, lambda: Document.read("a\0.toml")) == "'a\\x00.toml': no such file can be"
+    assert refused(tmp_path, lambda: Document.read("a\0.toml")) == "'a\\x00.toml': no file can have this name"
 
 
 def test_folder_for_a_file(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def test_writes_and_replaces(tmp_path: Path) -> None:
 
 
 def test_an_error_half_way_leaves_nothing(tmp_path: Path) -> None:
-    """When the second file fails, the first is not there either, nor the folders made for it."""
+    """When the second file fails, the first does not exist either, nor the folders made for it."""
 
     def full_disk() -> Iterator[str]:
         yield "some"
@@ -59,7 +59,7 @@ def test_a_file_in_the_way(tmp_path: Path) -> None:
     """A file where the folder should be is refused, and stays."""
     (tmp_path / "run").write_text("a file")
 
-    with pytest.raises(OutputError, match=r"cannot write to '.*run': it is a file, and a folder is needed"):
+    with pytest.raises(OutputError, match=r"cannot write to '.*run': it is a file; expected a folder"):
         write_folder(tmp_path / "run", {"figure-x.svg": "one"})
     with pytest.raises(OutputError, match=r"cannot make '.*run': it is a file"):
         write_folder(tmp_path / "run" / "deeper", {"figure-x.svg": "one"})
@@ -73,7 +73,7 @@ def test_a_folder_in_the_way_of_a_file(tmp_path: Path) -> None:
     """A folder named as one of the results stops the writing before any file is replaced."""
     (tmp_path / "run" / "figure-y.svg").mkdir(parents=True)
 
-    with pytest.raises(OutputError, match=r"'figure-y\.svg' in it is a folder"):
+    with pytest.raises(OutputError, match=r"it contains a folder 'figure-y\.svg'"):
         write_folder(tmp_path / "run", {"figure-x.svg": "one", "figure-y.svg": "two"})
 
     assert [p.name for p in (tmp_path / "run").iterdir()] == ["figure-y.svg"]
@@ -200,10 +200,14 @@ def test_what_was_read_stays(tmp_path: Path) -> None:
     (tmp_path / "second.svg").hardlink_to(source)
 
     for name in ("figure-x.svg", "link.svg", "second.svg", "../" + tmp_path.name + "/figure-x.svg"):
-        with pytest.raises(OutputError, match="was read by this command, and would be lost; name another file"):
+        with pytest.raises(
+            OutputError, match="is an input of this command and would be overwritten; name another file"
+        ):
             write_file(tmp_path / name, "other")
     for files in ({source.name: "other"}, {"figure-y.svg": "other"}):
-        with pytest.raises(OutputError, match=r"'figure-x.svg' in it was read, and would be lost: name another folder"):
+        with pytest.raises(
+            OutputError, match=r"it contains the input 'figure-x.svg', which would be overwritten: name another folder"
+        ):
             write_folder(tmp_path, files)
     assert source.read_text() == "mine"
 

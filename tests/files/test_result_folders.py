@@ -157,7 +157,7 @@ def test_killed_while_clearing_up(tmp_path: Path, removals: int) -> None:
 
 
 def test_a_file_that_is_in_no_record(tmp_path: Path) -> None:
-    """A file that the record does not name is somebody's own, unless what it names is not there as it was written."""
+    """A file that the record does not name is somebody's own, unless what it names does not exist as it was written."""
     write_folder(tmp_path, {"figure-a.svg": "a"})
     (tmp_path / "mine.csv").write_text("mine")
     assert not is_stray(tmp_path / "mine.csv")
@@ -228,7 +228,7 @@ def test_records_of_others(tmp_path: Path, record: object) -> None:
     (tmp_path / RECORD).write_text(json.dumps(record))
     before = held(tmp_path)
 
-    with pytest.raises(OutputError, match=r"'run\.json' in it is not of a run of armwright.* move it away"):
+    with pytest.raises(OutputError, match=r"it contains 'run\.json', which is not a result of armwright.* move it"):
         write_folder(tmp_path, {"figure-c.svg": "c"})
 
     assert held(tmp_path) == before
@@ -243,7 +243,7 @@ def test_a_file_of_the_user_with_the_name_of_a_result(tmp_path: Path, *, recorde
     (tmp_path / "figure-a.svg").write_text("mine")
     before = held(tmp_path)
 
-    with pytest.raises(OutputError, match=r"'figure-a\.svg' in it is not of a run of armwright"):
+    with pytest.raises(OutputError, match=r"it contains 'figure-a\.svg', which is not a result of armwright"):
         write_folder(tmp_path, {"figure-a.svg": "a", "figure-c.svg": "c"})
 
     assert held(tmp_path) == before

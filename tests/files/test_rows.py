@@ -51,9 +51,9 @@ def test_separators(text: str, separator: str, write: Write) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "table.csv: the file is empty; its first line should name the columns"),
+        ("", "table.csv: the file is empty; expected column names in its first line"),
         ("\n,,\n", "table.csv: the file is empty"),
-        ("a,b\n\n", "table.csv: no rows below the names of the columns"),
+        ("a,b\n\n", "table.csv: no rows after the column names"),
         ('\n,,\n;;;\n"",\n', "table.csv: the file is empty"),
         (f"a,b\n1,2\n{'1' * 200_000},2\n", "table.csv:3: not valid CSV: field larger than field limit"),
     ],
@@ -72,10 +72,10 @@ def test_no_table(text: str, message: str, write: Write) -> None:
     [
         (
             "a,b\n1,2\n\n1,5,2",
-            "table.csv:4: expected 2 values, as there are columns, got 3; is there a comma in a number?",
+            "table.csv:4: expected 2 values, one per column, got 3; does a number contain a comma?",
         ),
-        ("a;b\n1;2\n\n1;5;2", "table.csv:4: expected 2 values, as there are columns, got 3"),
-        ("a,b\n1\n", "table.csv:2: expected 2 values, as there are columns, got 1"),
+        ("a;b\n1;2\n\n1;5;2", "table.csv:4: expected 2 values, one per column, got 3"),
+        ("a,b\n1\n", "table.csv:2: expected 2 values, one per column, got 1"),
     ],
 )
 def test_widths(text: str, message: str, write: Write) -> None:

@@ -176,7 +176,7 @@ def test_folders_that_others_may_write_to(
 
     assert opened.folder is None
     assert str(caught[0].message) == (
-        f"compiled code is not kept: others may write to '{weak}' (mode {mode:o}). Make the folder private, or "
+        f"compiled code is not cached: other users may write to '{weak}' (mode {mode:o}). Make the folder private, or "
         "name another one in ARMWRIGHT_CACHE"
     )
     assert opened.made(KEY, lambda: DATA) == DATA
@@ -188,7 +188,7 @@ def test_parent_that_others_may_write_to(tmp_path: Path) -> None:
     below = tmp_path / "open" / "cache" / "store"
     below.mkdir(parents=True)
     (tmp_path / "open").chmod(0o777)
-    assert distrust(below) == f"others may write to '{tmp_path / 'open'}' (mode 777)"
+    assert distrust(below) == f"other users may write to '{tmp_path / 'open'}' (mode 777)"
     (tmp_path / "open").chmod(0o1777)
     assert not distrust(below)
 
@@ -218,7 +218,7 @@ def test_links_count_as_what_they_lead_to(tmp_path: Path) -> None:
     (tmp_path / "ring").symlink_to(tmp_path / "ring")
 
     assert not distrust(tmp_path / "to_private" / "store")
-    assert distrust(tmp_path / "to_open" / "store").startswith("others may write to")
+    assert distrust(tmp_path / "to_open" / "store").startswith("other users may write to")
     assert not distrust(tmp_path / "ring" / "store")
     assert Store(tmp_path / "ring" / "store").made(KEY, lambda: DATA) == DATA
 

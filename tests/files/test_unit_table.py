@@ -109,7 +109,7 @@ def test_units(write: Write) -> None:
         ("qw_mm", "no such column."),
         ("x_t_t_mm", "no such column."),
         ("nominal", "no such column."),
-        ("joint_1_deg", "joint_1 is a name of joint_1 and joint_2; say which is meant by --columns"),
+        ("joint_1_deg", "joint_1 is a name of joint_1 and joint_2; specify which is meant by --columns"),
         ("x", "the name has no unit: expected x_mm or x_m or x_cm or x_um or x_in, in the file or by --columns"),
         ("x_ft", "unknown unit 'ft': expected x_mm or x_m or x_cm or x_um or x_in"),
         ("speed_ft_per_min", "unknown unit 'ft_per_min': expected speed_mm_per_s or"),
@@ -132,9 +132,9 @@ def test_nameless_column(write: Write) -> None:
 @pytest.mark.parametrize(
     ("head", "message"),
     [
-        ("x_mm,X [m]", "X [m]: there twice, as x_mm too"),
-        ("x_t_mm,nominal x [mm]", "nominal x [mm]: there twice, as x_t_mm too"),
-        ("x_mm,y_m", "y_m: coordinates have one unit in a file, and x_mm has another"),
+        ("x_mm,X [m]", "X [m]: a second column for this quantity, after x_mm"),
+        ("x_t_mm,nominal x [mm]", "nominal x [mm]: a second column for this quantity, after x_t_mm"),
+        ("x_mm,y_m", "y_m: coordinates must have one unit in a file, but x_mm has another"),
     ],
 )
 def test_columns_that_do_not_agree(head: str, message: str, write: Write) -> None:
@@ -190,12 +190,12 @@ def test_column_map(write: Write) -> None:
     [
         (
             {"Axis 11": "x_mm"},
-            "Axis 11: no such column to be taken for x_mm; did you mean 'Axis 1'? There are Axis 1, Y",
+            "Axis 11: no such column to map to x_mm; did you mean 'Axis 1'? There are Axis 1, Y",
         ),
-        ({"Q": "x_mm"}, "Q: no such column to be taken for x_mm. There are Axis 1, Y"),
+        ({"Q": "x_mm"}, "Q: no such column to map to x_mm. There are Axis 1, Y"),
         ({"Axis 1": "xx_mm", "Y": "y_mm"}, "Axis 1 as xx_mm: no such column. Did you mean 'x_mm'?"),
         ({"Axis 1": "x", "Y": "y_mm"}, "Axis 1 as x: the name has no unit"),
-        ({"Axis 1": "y_mm", "Y": "y_mm"}, "Y as y_mm: there twice, as Axis 1 as y_mm too"),
+        ({"Axis 1": "y_mm", "Y": "y_mm"}, "Y as y_mm: a second column for this quantity, after Axis 1 as y_mm"),
     ],
 )
 def test_bad_column_maps(columns: Mapping[str, str], message: str, write: Write) -> None:
@@ -246,7 +246,7 @@ def test_bad_pairs(text: str) -> None:
         ("[columns]\nA1 = 1\n", "map.toml:2: columns, A1: expected a text in quotes, got 1"),
         ("[columns]\n[rows]\n", "map.toml:2: rows: unknown key"),
         ("[columns", "map.toml:1: "),
-        ("[columns]\na = 'x'\nb = 'y'\nc = 'z'\n", "map.toml:1: columns: too many: 3, and at most 2 columns are read"),
+        ("[columns]\na = 'x'\nb = 'y'\nc = 'z'\n", "map.toml:1: columns: too many: 3; the limit is 2 columns"),
     ],
 )
 def test_bad_files_of_column_maps(text: str, message: str, write: Write) -> None:
@@ -278,7 +278,7 @@ def test_missing_cells(write: Write) -> None:
     header = read_header(write(GAPS), SCHEMA)
 
     where = "x_mm in line 3; pose in line 5; y_mm in line 7"
-    said = f"table.csv:3: cells are empty: {where}; --skip-incomplete leaves out 3 rows"
+    said = f"table.csv:3: cells are empty: {where}; --skip-incomplete omits 3 rows"
     assert refused(lambda: rows(header, "pose", "x", "y")) == said
 
 
@@ -286,7 +286,7 @@ def test_one_missing_cell(write: Write) -> None:
     """A cell that is missing alone is named as any other is."""
     header = read_header(write("pose,x_mm\nP1,1\nP2,\n"), SCHEMA)
 
-    said = "table.csv:3: x_mm: empty; expected a number, or --skip-incomplete to leave the row out"
+    said = "table.csv:3: x_mm: empty; expected a number, or --skip-incomplete to omit the row"
     assert refused(lambda: rows(header, "x")) == said
 
 
@@ -298,7 +298,7 @@ def test_incomplete_rows_left_out(write: Write) -> None:
         table = rows(header, "pose", "x", "y", skip=True)
 
     assert [str(one.message).rpartition("/")[2] for one in caught] == [
-        "table.csv: 3 rows left out for empty cells, 2 read: x_mm in line 3; pose in line 5; y_mm in line 7"
+        "table.csv: 3 rows omitted because of empty cells, 2 read: x_mm in line 3; pose in line 5; y_mm in line 7"
     ]
     assert table.words("pose") == ["P1", "P4"]
     assert table.lines.tolist() == [2, 6]
@@ -311,7 +311,7 @@ def test_cells_that_belong_together(write: Write) -> None:
     said = refused(lambda: header.rows(filled=(), together=[("x", "z"), ("y",)]))
 
     # In line 3 both cells of x and z are empty.
-    assert said == "table.csv:6: cells are empty: z_mm in lines 6, 7; --skip-incomplete leaves out 2 rows"
+    assert said == "table.csv:6: cells are empty: z_mm in lines 6, 7; --skip-incomplete omits 2 rows"
 
 
 def test_nothing_but_gaps(write: Write) -> None:
@@ -328,7 +328,7 @@ def test_very_many_missing_cells(write: Write) -> None:
 
     said = refused(lambda: rows(header, "x"))
 
-    assert said.endswith("19, 20, 21 and 4980 more; --skip-incomplete leaves out 5000 rows")
+    assert said.endswith("19, 20, 21 and 4980 more; --skip-incomplete omits 5000 rows")
     assert len(said) < 300
 
 

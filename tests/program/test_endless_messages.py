@@ -9,8 +9,8 @@ import pytest
 from armwright.files.message_stream import MessageStream
 from armwright.program.debugger.dap_messages import Noise, messages
 
-TOO_LARGE = "a message is too large: more, and at most 16 MB are read; `armwright --raise message_mb=NUMBER ...`"
-TOO_LONG = "the header of a message is too large: more, and at most 8,192 bytes are read"
+TOO_LARGE = "a message is too large: the limit is 16 MB (`armwright --raise message_mb=NUMBER ...`"
+TOO_LONG = "the header of a message is too large: the limit is 8,192 bytes"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ def test_words_are_counted() -> None:
 
     assert said.code == "E119"
     assert said.message == (
-        "the program is too long: more, and at most 16 words are read; `armwright --raise words=NUMBER ...` allows more"
+        "the program is too long: the limit is 16 words (`armwright --raise words=NUMBER ...` raises it)"
     )
     assert said.span == Span(text.rindex("."), len(text) - 1)
 

@@ -290,9 +290,9 @@ def unlimited(joint: Joint) -> Joint:
 @pytest.mark.parametrize(
     ("cell", "move", "said"),
     [
-        (changed(cell_of("cell1"), weak), "VIA (a, b), WITH BLEND = 3cm", "gravity and dry friction alone ask joint"),
-        (changed(cell_of("cell1"), reach=math.inf), "STRAIGHTLY", "paths in space need its reach and its tool speed"),
-        (changed(cell_of("cell1"), unlimited), "DIRECTLY", "no joint that moves has a limit of speed or acceleration"),
+        (changed(cell_of("cell1"), weak), "VIA (a, b), WITH BLEND = 3cm", "gravity and Coulomb friction alone require"),
+        (changed(cell_of("cell1"), reach=math.inf), "STRAIGHTLY", "Cartesian paths need its reach and its tool speed"),
+        (changed(cell_of("cell1"), unlimited), "DIRECTLY", "no moving joint has a limit of speed or acceleration"),
     ],
 )
 def test_a_move_that_the_arm_cannot_make_at_any_speed(cell: Cell, move: str, said: str) -> None:

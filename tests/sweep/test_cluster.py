@@ -102,7 +102,9 @@ def test_cluster_that_goes_away(speeds: Design, tmp_path: Path, monkeypatch: pyt
             if now.done:
                 cluster.close()
 
-        with pytest.raises(SweepError, match=r"the Dask cluster at 'inproc://.*' cannot go on; finished blocks stay: "):
+        with pytest.raises(
+            SweepError, match=r"the Dask cluster at 'inproc://.*' cannot continue; finished blocks are kept"
+        ):
             run(
                 Fall(seconds=0.2),
                 speeds,
@@ -164,7 +166,7 @@ def test_address_of_a_worker(local_cluster: Any, speeds: Design, tmp_path: Path)
     """A worker of Dask is no scheduler."""
     worker = next(iter(local_cluster.scheduler_info["workers"]))
 
-    with pytest.raises(SweepError, match=r"answers 'Worker' of Dask; expected the address of its scheduler"):
+    with pytest.raises(SweepError, match=r"kind 'Worker' answers; expected the address of a scheduler"):
         run(Fall(), speeds, tmp_path / "out", scheduler=worker)
 
 

@@ -135,9 +135,9 @@ def half(speeds: Design, tmp_path: Path) -> Path:
 
 def test_unfinished_results(half: Path, tmp_path: Path) -> None:
     """Results are had of a sweep that is finished."""
-    with pytest.raises(SweepError, match="the sweep is not finished; run it again to go on"):
+    with pytest.raises(SweepError, match="the sweep is not finished; run it again to resume"):
         load(half)
-    with pytest.raises(SweepError, match="the sweep is not there"):
+    with pytest.raises(SweepError, match="the sweep does not exist"):
         load(tmp_path / "nowhere")
 
 
@@ -176,7 +176,7 @@ def test_damaged_block(damage: Callable[[Path], Any], half: Path, speeds: Design
 
     for _ in range(2):
         with pytest.raises(
-            FileFormatError, match=r"0000001.npy: damaged: .*move it away .*its runs, 8 to 15,"
+            FileFormatError, match=r"0000001.npy: damaged: .*move or delete it .*its runs, 8 to 15,"
         ) as caught:
             run(Fall(calls=tmp_path / "calls"), speeds, half, workers=1)
         assert caught.value.exit_status == ExitStatus.FILE
@@ -218,15 +218,15 @@ def test_halves_are_removed(half: Path, speeds: Design) -> None:
 
 
 OTHER: list[tuple[Fall, Callable[[Design], Design], str]] = [
-    (Fall(gravity=1.62), lambda design: design, "settings.gravity is 9.81 there, 1.62 here"),
-    (Fall(name="rise"), lambda design: design, "task is 'fall' there, 'rise' here"),
+    (Fall(gravity=1.62), lambda design: design, "settings.gravity is 9.81 in the folder, 1.62 here"),
+    (Fall(name="rise"), lambda design: design, "task is 'fall' in the folder, 'rise' here"),
     (
         Fall(),
         lambda design: attrs.evolve(design, units={"speed": "km/h"}),
-        "design.units.speed is 'm/s' there, 'km/h' here",
+        "design.units.speed is 'm/s' in the folder, 'km/h' here",
     ),
     (Fall(), lambda design: attrs.evolve(design, points=design.points + 1), r"design.points is \[40, 1, '"),
-    (Fall(samples=9), lambda _: full_factorial({"v": [1]}), "; and 6 more. Give this one a folder of its own"),
+    (Fall(samples=9), lambda _: full_factorial({"v": [1]}), "; and 6 more. Use a separate folder for this one"),
 ]
 
 
@@ -247,7 +247,7 @@ def test_another_version(half: Path, speeds: Design) -> None:
     told["sweep"]["armwright"] = "0.0.1"
     path.write_text(json.dumps(told), encoding="utf-8")
 
-    with pytest.raises(SweepError, match=r"armwright is '0.0.1' there"):
+    with pytest.raises(SweepError, match=r"armwright is '0.0.1' in the folder"):
         run(Fall(), speeds, half, workers=1)
 
 
@@ -288,7 +288,7 @@ def test_damaged_results(damaged: Callable[[bytes], bytes], speeds: Design, tmp_
     path.write_bytes(broken)
 
     for again in (lambda: run(Fall(), speeds, tmp_path / "out", workers=1), lambda: load(tmp_path / "out")):
-        with pytest.raises(FileFormatError, match=r"results.nc: damaged: .*; it stays as it is; move it away"):
+        with pytest.raises(FileFormatError, match=r"results.nc: damaged: .*; it is not changed; move or delete it"):
             again()
     assert path.read_bytes() == broken
     path.unlink()
@@ -305,7 +305,7 @@ def test_results_without_their_hash(speeds: Design, tmp_path: Path) -> None:
 
     for damage in (lambda: record.write_text('{"files": {}}'), record.unlink):
         damage()
-        with pytest.raises(FileFormatError, match=r"results.nc: cannot be checked: no run.json beside it tells its"):
+        with pytest.raises(FileFormatError, match=r"results.nc: it cannot be verified: its folder has no run.json"):
             load(tmp_path / "out")
     (tmp_path / "out" / "results.nc").unlink()
 
@@ -317,7 +317,7 @@ def test_folder_of_other_things(speeds: Design, tmp_path: Path) -> None:
     """A folder with other files in it is refused, and nothing is written there."""
     (tmp_path / "thesis.tex").touch()
 
-    with pytest.raises(SweepError, match=r"holds no sweep, but other things \('thesis.tex'\)"):
+    with pytest.raises(SweepError, match=r"contains files that are not of a sweep \('thesis.tex'\)"):
         run(Fall(), speeds, tmp_path, workers=1)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
@@ -327,7 +327,7 @@ def test_files_with_names_like_ours(name: str, speeds: Design, tmp_path: Path) -
     """A file whose name only resembles those of a sweep is somebody else's."""
     (tmp_path / name).write_text("draft")
 
-    with pytest.raises(SweepError, match=f"holds no sweep, but other things \\('{name}'\\)"):
+    with pytest.raises(SweepError, match=f"contains files that are not of a sweep \\('{name}'\\)"):
         run(Fall(), speeds, tmp_path, workers=1)
     assert (tmp_path / name).read_text() == "draft"
 
@@ -377,7 +377,7 @@ def test_compressed_block(half: Path, speeds: Design) -> None:
     with block.open("wb") as file:
         np.savez_compressed(file, rows=rows)
 
-    with pytest.raises(FileFormatError, match=r"damaged: its checksum is not that of its numbers"):
+    with pytest.raises(FileFormatError, match=r"damaged: its checksum does not match its numbers"):
         run(Fall(), speeds, half, workers=1)
 
 
@@ -385,7 +385,7 @@ def test_folder_that_is_a_file(speeds: Design, tmp_path: Path) -> None:
     """Where a file stands there can be no folder."""
     (tmp_path / "out").touch()
 
-    with pytest.raises(OutputError, match=r"cannot write to '.*out': it is a file, and a folder is needed"):
+    with pytest.raises(OutputError, match=r"cannot write to '.*out': it is a file; expected a folder"):
         run(Fall(), speeds, tmp_path / "out", workers=1)
 
 
@@ -411,7 +411,10 @@ def test_full_disk(writes: int, workers: int, speeds: Design, tmp_path: Path, mo
 
     with monkeypatch.context() as room:
         room.setattr(folder_module.os, "fsync", full)
-        with pytest.raises(OutputError, match=r"No space left on device; what was .* stays. Make room and start again"):
+        with pytest.raises(
+            OutputError,
+            match=r"No space left on device; finished blocks are kept. Free some disk space and start again",
+        ):
             run(Fall(calls=calls), speeds, out, block=8, workers=workers)
 
     assert not [path for path in out.rglob("*") if ".tmp" in path.name]
@@ -437,7 +440,7 @@ def test_results_that_do_not_fit(tmp_path: Path) -> None:
     design = full_factorial({"speed": np.arange(40.0)})
     out = tmp_path / "out"
 
-    with pytest.raises(OutputError, match=r"cannot write '.*results.nc': .*; what was finished before stays"):
+    with pytest.raises(OutputError, match=r"cannot write '.*results.nc': .*; finished blocks are kept"):
         run(Fall(samples=1000), design, out, block=4, workers=1)
 
     assert len(blocks(out)) == 10

@@ -161,10 +161,10 @@ WRONG: list[tuple[Any, type[ArmwrightError], str]] = [
         "'x' cannot be an output of the task: it is already a parameter of",
     ),
     (Told(outputs={"status": Output()}), InvalidValueError, "'status' cannot be an output of the task"),
-    (Told(outputs={"a b": Output()}), InvalidValueError, "'a b' as an output of the task: expected a word"),
+    (Told(outputs={"a b": Output()}), InvalidValueError, "'a b' as an output of the task: expected an identifier"),
     (Told(outputs={"y": Output(dims=["t"])}), InvalidValueError, "'y': the task has no axis 't'. Known: none."),
-    (Told(settings={"law": object()}), KindError, "setting 'law': expected what JSON holds"),
-    (Told(settings={"law": float("nan")}), KindError, "setting 'law': expected what JSON holds"),
+    (Told(settings={"law": object()}), KindError, "setting 'law': expected a value that JSON can"),
+    (Told(settings={"law": float("nan")}), KindError, "setting 'law': expected a value that JSON can"),
 ]
 
 
@@ -181,7 +181,7 @@ def test_wrong_tasks(number: int, tmp_path: Path) -> None:
     ("names", "text"),
     [
         (("a", "a"), "'a' cannot be a parameter of the design: it is already a parameter of the design"),
-        (("a b", "c"), "'a b' as a parameter of the design: expected a word of letters, digits and _"),
+        (("a b", "c"), "'a b' as a parameter of the design: expected an identifier of letters, digits and _"),
         (("status", "c"), "'status' cannot be a parameter of the design: it is already a name that every result has"),
     ],
 )
@@ -195,11 +195,11 @@ def test_wrong_parameters(names: tuple[str, str], text: str, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("asked", "error", "text"),
     [
-        ({"block": 0}, InvalidValueError, "block: expected a whole number not below 1, got 0"),
-        ({"workers": 0}, InvalidValueError, "workers: expected a whole number not below 1, got 0"),
+        ({"block": 0}, InvalidValueError, "block: expected an integer of at least 1, got 0"),
+        ({"workers": 0}, InvalidValueError, "workers: expected an integer of at least 1, got 0"),
         ({"workers": 10**30}, InvalidValueError, "workers: expected at most 1000 processes of this machine, got 1000"),
-        ({"workers": 1.5}, KindError, "workers: expected a whole number, got 1.5"),
-        ({"workers": 2, "scheduler": "tcp://127.0.0.1:1"}, InvalidValueError, "give one of them"),
+        ({"workers": 1.5}, KindError, "workers: expected an integer, got 1.5"),
+        ({"workers": 2, "scheduler": "tcp://127.0.0.1:1"}, InvalidValueError, "specify either workers"),
         ({"design": [1, 2]}, KindError, "design: expected a Design, got list"),
     ],
 )

@@ -124,9 +124,9 @@ def test_bad_input(stanford: Kernel) -> None:
         stanford(np.zeros(6), np.zeros(6))
     with pytest.raises(ShapeError, match=r"qd: expected shape \(6,\) on the last axes, got shape \(5,\)"):
         stanford(np.zeros(6), np.zeros(5), np.zeros(6))
-    with pytest.raises(ShapeError, match=r"leading axes must fit together, got \(2, 6\), \(3, 6\), \(6,\)"):
+    with pytest.raises(ShapeError, match=r"leading axes must broadcast together, got \(2, 6\), \(3, 6\), \(6,\)"):
         stanford(np.zeros((2, 6)), np.zeros((3, 6)), np.zeros(6))
-    with pytest.raises(InvalidValueError, match="threads: expected a whole number above 0"):
+    with pytest.raises(InvalidValueError, match="threads: expected an integer above 0"):
         stanford(np.zeros(6), np.zeros(6), np.zeros(6), threads=0)
     with pytest.raises(InvalidValueError, match="finite"):
         stanford(np.full(6, np.nan), np.zeros(6), np.zeros(6))

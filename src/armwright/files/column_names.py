@@ -166,14 +166,14 @@ def headings_of(
             options = "--columns" if units is None else "--columns or --units"
             raise names.error(text, f"the name has no unit: expected {column.choices}, in the file or by {options}")
         if column.name in found:
-            raise names.error(text, f"there twice, as {found[column.name].text} too")
+            raise names.error(text, f"a second column for this quantity, after {found[column.name].text}")
         found[column.name] = Heading(cell, column, unit, text)
     first: dict[str, Heading] = {}
     for heading in found.values():
         group = heading.column.group
         other = first.setdefault(group, heading) if group else heading
         if other.unit != heading.unit:
-            raise names.error(heading.text, f"{group} have one unit in a file, and {other.text} has another")
+            raise names.error(heading.text, f"{group} must have one unit in a file, but {other.text} has another")
     return found
 
 
@@ -220,7 +220,7 @@ class _Names:
                 continue
             if len(columns) > 1:
                 either = " and ".join(column.name for column in columns)
-                raise self.error(text, f"{name} is a name of {either}; say which is meant by --columns")
+                raise self.error(text, f"{name} is a name of {either}; specify which is meant by --columns")
             if not unit or unit in columns[0].quantity.units:
                 return columns[0], unit
             # What is longer than a unit belongs to the name of a column that there is not.
@@ -242,7 +242,7 @@ class _Names:
         near = closest(name, spellings)
         hint = f" Did you mean '{near}'?" if near else ""
         known = ", ".join(column.proposed for column in self._schema.columns)
-        return self.error(text, f"no such column.{hint} Known: {known}; note... for what is for people")
+        return self.error(text, f"no such column.{hint} Known: {known}; comments are columns named note...")
 
 
 def plain(header: str) -> str:

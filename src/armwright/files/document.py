@@ -223,8 +223,8 @@ class Table:
             if key not in self._read:
                 left = self._read - set(self._data)
                 near = closest(key, left) or next((one for one in sorted(left) if one.startswith(f"{key}_")), None)
-                known = ", ".join(sorted(self._read))
-                hint = f"did you mean '{near}'?" if near else f"known here: {known}" if known else "none is known here"
+                known = f"known keys: {', '.join(sorted(self._read))}" if self._read else "no keys are allowed here"
+                hint = f"did you mean '{near}'?" if near else known
                 raise self.error(key, f"unknown key; {hint}")
 
     def _value(self, key: str, default: Any, expected: str) -> Any:
@@ -233,7 +233,7 @@ class Table:
             return self._data[key]
         if default is _MISSING:
             near = closest(key, set(self._data) - self._read)
-            hint = f"; did you mean it by '{near}'?" if near else ""
+            hint = f"; was '{near}' meant?" if near else ""
             raise self.error(key, f"missing, expected {expected}{hint}")
         return default
 
@@ -243,7 +243,7 @@ class Table:
         if isinstance(value, float) and not math.isfinite(value):
             raise self._error_at(keys, f"expected a finite number, got {value}")
         if abs(value) > _LARGEST:
-            got = f"{value:g}" if isinstance(value, float) else "a whole number of many digits"
+            got = f"{value:g}" if isinstance(value, float) else "an integer of many digits"
             raise self._error_at(keys, f"expected a number no larger than {_LARGEST:g}, got {got}")
 
     def _numbers(self, keys: Keys, value: Any, length: int | Collection[int]) -> Array:
@@ -301,7 +301,7 @@ def _twin(path: Path, text: str) -> FileFormatError | None:
     try:
         json_lines(text)
     except TwinKeyError as error:
-        return FileFormatError(path, error.line, _shown(error.keys), "this key is given twice")
+        return FileFormatError(path, error.line, _shown(error.keys), "this key occurs twice")
     except RecursionError:
         pass
     return None
@@ -330,7 +330,7 @@ def _measured(path: Path, data: Any) -> bool:
 
 
 def _too_many_digits(path: Path) -> FileFormatError:
-    return FileFormatError(path, None, "", f"a whole number in it has too many digits: {beyond('digits')}")
+    return FileFormatError(path, None, "", f"an integer in it has too many digits: {beyond('digits')}")
 
 
 def _toml_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> FileFormatError:

@@ -87,7 +87,7 @@ def pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
     except ValueError as error:  # a zero byte in the name
         if isinstance(error, FileFormatError):
             raise
-        raise FileFormatError(repr(str(path)), None, "", "no such file can be") from error
+        raise FileFormatError(repr(str(path)), None, "", "no file can have this name") from error
 
 
 def read_bytes(path: Path | str, bound: str = "file_mb") -> bytes:
@@ -213,7 +213,7 @@ def decoded(data: bytes, path: Path | str) -> str:
 
 def not_utf8(path: Path | str, line: int, byte: int) -> FileFormatError:
     """Return the error that says which byte of a line is no UTF-8."""
-    return FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} has no meaning; save it as UTF-8")
+    return FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} is invalid; save it as UTF-8")
 
 
 def _too_large(path: Path, bound: str, size: int | None) -> FileFormatError:

@@ -33,27 +33,29 @@ class Limit(NamedTuple):
 
 LIMITS: Mapping[str, Limit] = {
     "file_mb": Limit(4, "MB", "size of an arm, cell, linkage, URDF, poses or estimate file"),
-    "program_mb": Limit(1, "MB", "size of a program in RLO, or of its intermediate code; also what is typed into `-`"),
-    "words": Limit(200_000, "words", "words, numbers and signs of a program; comments do not count"),
+    "program_mb": Limit(
+        1, "MB", "size of a program in RLO, or of its intermediate code, also from standard input (`-`)"
+    ),
+    "words": Limit(200_000, "words", "tokens of a program; comments do not count"),
     "table_mb": Limit(1000, "MB", "size of a CSV table"),
     "table_rows": Limit(1_000_000, "rows", "rows of a CSV table"),
     "table_columns": Limit(1000, "columns", "columns of a CSV table"),
-    "line_characters": Limit(1_000_000, "characters", "length of one line of a CSV table"),
+    "line_characters": Limit(1_000_000, "characters", "length of a line of a CSV table"),
     "nesting": Limit(60, "levels", "depth of tables, lists and dotted keys in TOML and JSON, and of elements in XML"),
     "attributes": Limit(100, "attributes", "attributes of an element in XML"),
-    "digits": Limit(1000, "digits", "digits of a whole number in TOML and JSON"),
+    "digits": Limit(1000, "digits", "digits of an integer in TOML and JSON"),
     "entries": Limit(
         10_000,
         "entries",
-        "tables of a list such as `[[pose]]`, devices, answers of a camera, and poses and runs measured",
+        "tables of a list such as `[[pose]]`, devices, answers of a camera, measured poses and runs",
     ),
     "joints": Limit(100, "joints", "joints of an arm, from the base to the tip"),
     "bodies": Limit(100, "bodies", "bodies of a linkage, and also its joints, pins with clearance, drives and loads"),
     "frames": Limit(10_000, "frames", "frames of a cell"),
-    "imports": Limit(100, "files", "files that a program IMPORTs; their frames together count as those of a cell"),
-    "hanging": Limit(1000, "frames", "frames of a cell that hang on one another, from a frame down to WORLD"),
+    "imports": Limit(100, "files", "files that a program IMPORTs; the limit of frames applies to all of them together"),
+    "hanging": Limit(1000, "frames", "depth of the frame tree of a cell, from a frame to WORLD"),
     "arms": Limit(20, "arms", "arms of a cell"),
-    "revolutions": Limit(1000, "revolutions", "how far the limits of a revolute joint may lie from zero"),
+    "revolutions": Limit(1000, "revolutions", "limits of a revolute joint, as revolutions from zero"),
     "message_mb": Limit(16, "MB", "one message to the language server or the debug adapter"),
     "header_bytes": Limit(8192, "bytes", "the header of such a message"),
 }
@@ -115,12 +117,12 @@ def parsed(text: str) -> dict[str, int]:
 def beyond(name: str, got: int | str | None = None) -> str:
     """Return the end of a message that something is beyond a limit: what was got, what is allowed, how to raise it."""
     one = LIMITS[name]
-    more = "more" if got is None else f"{got:,}" if isinstance(got, int) else got
-    return f"{more}, and at most {limit(name):,} {one.unit} are read; `armwright --raise {name}=NUMBER ...` allows more"
+    amount = "" if got is None else f"{got:,}; " if isinstance(got, int) else f"{got}; "
+    return f"{amount}the limit is {limit(name):,} {one.unit} (`armwright --raise {name}=NUMBER ...` raises it)"
 
 
 def _check(name: str, value: int) -> None:
     if name not in LIMITS:
         raise UnknownNameError("limit", name, LIMITS)
     if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise InvalidValueError(f"{name}: expected a whole number of 1 or more, got {shown(value)}")
+        raise InvalidValueError(f"{name}: expected an integer of 1 or more, got {shown(value)}")

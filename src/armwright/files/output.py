@@ -91,7 +91,9 @@ def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> 
         return
     named, path = path, _resolved(path)
     if not back and is_source(path):
-        raise OutputError(f"cannot write '{named}': it was read by this command, and would be lost; name another file")
+        raise OutputError(
+            f"cannot write '{named}': it is an input of this command and would be overwritten; name another file"
+        )
     with _parents(path, lambda error: f"cannot write '{path}': {error.strerror or error}"):
         there = path.stat() if path.exists() else None
         if there is not None and not stat.S_ISREG(there.st_mode) and not stat.S_ISDIR(there.st_mode):
@@ -221,7 +223,7 @@ def reason(error: OSError, folder: Path) -> str:
     """Say why a folder cannot be made or written to; of a file that is in its place, that it is one."""
     for place in (folder, *folder.parents):
         if place.is_file():
-            return "it is a file, and a folder is needed" if place == folder else f"'{place}' is a file"
+            return "it is a file; expected a folder" if place == folder else f"'{place}' is a file"
     return error.strerror or str(error)
 
 
@@ -243,7 +245,7 @@ def _resolved(path: Path) -> Path:
 
 
 def _replace(folder: Path, new: Path, names: list[str], left: Mapping[str, str]) -> None:
-    """Move results in; a folder that is not there yet comes as a whole.
+    """Move results in; a folder that does not exist yet comes as a whole.
 
     Args:
         folder: of the results.
@@ -367,12 +369,12 @@ def _remove_empty(folder: Path) -> None:
 def _refuse_what_cannot_be_replaced(folder: Path, files: Iterable[str]) -> None:
     """Fail before the first file is moved in, not between two."""
     if not folder.is_dir():
-        raise NotADirectoryError(0, "it is a file, and a folder is needed")
+        raise NotADirectoryError(0, "it is a file; expected a folder")
     if not os.access(folder, os.W_OK):
         raise PermissionError(0, "permission denied")
     for name in files:
         if (folder / name).is_dir():
-            raise IsADirectoryError(0, f"'{name}' in it is a folder")
+            raise IsADirectoryError(0, f"it contains a folder '{name}'")
 
 
 def _refuse_what_others_made(folder: Path, files: Iterable[str], known: Collection[str]) -> None:
@@ -382,7 +384,8 @@ def _refuse_what_others_made(folder: Path, files: Iterable[str], known: Collecti
         if name not in ours and os.path.lexists(folder / name):
             raise FileExistsError(
                 errno.EEXIST,
-                f"'{name}' in it is not of a run of armwright, and would be lost: move it away, or name another folder",
+                f"it contains '{name}', which is not a result of armwright and would be overwritten: move it, or "
+                "name another folder",
             )
 
 
@@ -390,4 +393,6 @@ def _refuse_sources(folder: Path, names: Iterable[str]) -> None:
     """Fail where a file that was read for the results would give way to them."""
     for name in sorted(names):
         if is_source(folder / name):
-            raise FileExistsError(errno.EEXIST, f"'{name}' in it was read, and would be lost: name another folder")
+            raise FileExistsError(
+                errno.EEXIST, f"it contains the input '{name}', which would be overwritten: name another folder"
+            )

@@ -81,12 +81,12 @@ def read_rows(path: Path | str) -> Rows:
         raise FileFormatError(path, head.line, "", f"too many columns: {beyond('table_columns', len(head.cells))}")
     first = next(cells, None)
     if first is None:
-        raise FileFormatError(path, None, "", "no rows below the names of the columns")
+        raise FileFormatError(path, None, "", "no rows after the column names")
     return Rows(head, _of_one_width(path, head, itertools.chain([first], cells), separator), separator)
 
 
 def _empty(path: Path) -> FileFormatError:
-    return FileFormatError(path, None, "", "the file is empty; its first line should name the columns")
+    return FileFormatError(path, None, "", "the file is empty; expected column names in its first line")
 
 
 def _cells(path: Path, lines: Iterable[str], separator: str, skipped: int) -> Iterator[Cells]:
@@ -114,12 +114,12 @@ def _of_one_width(path: Path, head: Cells, rows: Iterable[Cells], separator: str
     for row in rows:
         if len(row.cells) != len(head.cells):
             decimal = separator == "," and len(row.cells) > len(head.cells)
-            hint = "; is there a comma in a number?" if decimal else ""
+            hint = "; does a number contain a comma?" if decimal else ""
             raise FileFormatError(
                 path,
                 row.line,
                 "",
-                f"expected {len(head.cells)} values, as there are columns, got {len(row.cells)}{hint}",
+                f"expected {len(head.cells)} values, one per column, got {len(row.cells)}{hint}",
             )
         yield row
 
@@ -167,7 +167,8 @@ class NumberFormat:
                 self._path,
                 line,
                 header,
-                f"expected a decimal {expected}, as in line {self._line}, got {shown(text)}; thousands are not parted",
+                f"expected a decimal {expected}, as in line {self._line}, got {shown(text)}; "
+                "thousands separators are not allowed",
             )
         return text.replace(",", ".")
 

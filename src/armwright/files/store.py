@@ -153,7 +153,7 @@ def _store(folder: Path, name: str) -> Store:
     if not reason:
         return Store(folder / name)
     warnings.warn(
-        f"compiled code is not kept: {reason}. Make the folder private, or name another one in ARMWRIGHT_CACHE",
+        f"compiled code is not cached: {reason}. Make the folder private, or name another one in ARMWRIGHT_CACHE",
         CacheWarning,
         stacklevel=2,
     )
@@ -224,7 +224,7 @@ def _weakness(folder: Path, *, strict: bool) -> str:
         return ""
     if not strict and (about.st_mode & stat.S_ISVTX or (writers == stat.S_IWGRP and _only_member(about.st_gid))):
         return ""
-    return f"others may write to '{folder}' (mode {stat.S_IMODE(about.st_mode):o})"
+    return f"other users may write to '{folder}' (mode {stat.S_IMODE(about.st_mode):o})"
 
 
 def _trusted(owner: int) -> bool:

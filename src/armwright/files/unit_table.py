@@ -124,7 +124,7 @@ class Header:
     @property
     def listing(self) -> str:
         """The columns, for a message."""
-        return ", ".join(heading.text for heading in self.headings.values()) or "none that is known"
+        return ", ".join(heading.text for heading in self.headings.values()) or "no known column"
 
     def error(self, name: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a column."""
@@ -155,7 +155,7 @@ class Header:
         names = self.present((first, second))
         if len(names) != 1:
             there = "both" if names else "neither"
-            text = f"expected a column {first} or a column {second}, and the file has {there}: {self.listing}"
+            text = f"expected a column {first} or a column {second}, but the file has {there}: {self.listing}"
             raise self.error(first, text)
         return names[0]
 
@@ -250,7 +250,7 @@ def read_headers(
             path, rows = files[0]
             there = ", ".join(rows.head.cells)
             raise FileFormatError(
-                path, rows.head.line, name, f"no such column to be taken for {target}{hint} There are {there}"
+                path, rows.head.line, name, f"no such column to map to {target}{hint} There are {there}"
             )
     return [
         Header(
@@ -298,18 +298,18 @@ class _Incomplete:
         line, heading = self._first
         where = "; ".join(f"{text} in {in_lines(lines, count)}" for text, (count, lines) in self._columns.items())
         if skip and complete:
-            text = f"{path}: {counted(self._rows, 'row')} left out for empty cells, {complete} read: {where}"
+            text = f"{path}: {counted(self._rows, 'row')} omitted because of empty cells, {complete} read: {where}"
             warnings.warn(shortened(text), IncompleteRowsWarning, stacklevel=2)
             return
         if skip:
             raise FileFormatError(path, line, "", f"every row has empty cells: {where}")
         if self._rows == 1 and len(self._columns) == 1:
-            kind = "a word" if heading.column.quantity is WORD else "a number"
+            kind = "a name" if heading.column.quantity is WORD else "a number"
             raise FileFormatError(
-                path, line, heading.text, f"empty; expected {kind}, or --skip-incomplete to leave the row out"
+                path, line, heading.text, f"empty; expected {kind}, or --skip-incomplete to omit the row"
             )
         raise FileFormatError(
-            path, line, "", f"cells are empty: {where}; --skip-incomplete leaves out {counted(self._rows, 'row')}"
+            path, line, "", f"cells are empty: {where}; --skip-incomplete omits {counted(self._rows, 'row')}"
         )
 
 

@@ -20,7 +20,7 @@ MAX_RUNS = 10_000_000
 
 def _names(value: Sequence[str]) -> tuple[str, ...]:
     if isinstance(value, str):
-        raise KindError(f"names: expected names of parameters, one per column, got the one text {shown(value)}")
+        raise KindError(f"names: expected a sequence of parameter names, one per column, got the string {shown(value)}")
     return tuple(value)
 
 
@@ -87,7 +87,7 @@ def full_factorial(levels: Mapping[str, Sequence[float]], *, units: Mapping[str,
         if column.ndim != 1 or not column.size:
             raise ShapeError(f"levels of {name}: expected one level or more, got {shown(levels[name])}")
         if len(np.unique(column)) < column.size:
-            raise InvalidValueError(f"levels of {name}: a level stands there twice: {shown(levels[name])}")
+            raise InvalidValueError(f"levels of {name}: a level occurs twice: {shown(levels[name])}")
     _check_runs(prod(column.size for column in columns.values()))
     grids = np.meshgrid(*columns.values(), indexing="ij")
     points = np.stack([grid.ravel() for grid in grids], axis=-1)
@@ -144,7 +144,7 @@ def sobol(
     below = 1 << n.bit_length() - 1
     if n != below:
         raise InvalidValueError(
-            f"n: a Sobol design has a power of two of points, got {n}; the nearest are {below} and {2 * below}"
+            f"n: a Sobol design needs a power of two of points, got {n}; the nearest are {below} and {2 * below}"
         )
     return _sampled("sobol", bounds, n, seed, units)
 
@@ -186,4 +186,4 @@ def _check_mapping(value: Mapping[str, Any], what: str) -> None:
 
 def _check_runs(runs: int) -> None:
     if runs > MAX_RUNS:
-        raise InvalidValueError(f"design: {runs} runs are more than {MAX_RUNS}; take fewer levels or points")
+        raise InvalidValueError(f"design: expected at most {MAX_RUNS} runs, got {runs}; use fewer levels or points")

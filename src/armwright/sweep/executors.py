@@ -192,7 +192,7 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
             client.__init__(address, timeout=PATIENCE, set_as_default=False)
             failure = f"the Dask scheduler at '{address}' has had no worker for {PATIENCE:g} s"
             client.wait_for_workers(1, timeout=PATIENCE)
-            failure = f"the Dask cluster at '{address}' cannot go on; finished blocks stay"
+            failure = f"the Dask cluster at '{address}' cannot continue; finished blocks are kept"
             yield Cluster(
                 size=lambda: max(1, sum(client.nthreads().values())),
                 submit=partial(client.get_executor(pure=False).submit, work, __version__, payload),
@@ -225,7 +225,9 @@ def _check_scheduler(address: str) -> None:
         answer = thread.submit(asyncio.run, identity()).result()
     kind = answer.get("type") if isinstance(answer, dict) else answer
     if kind != "Scheduler":
-        raise SweepError(f"at '{address}' answers {shown(kind)} of Dask; expected the address of its scheduler")
+        raise SweepError(
+            f"at '{address}' a Dask component of kind {shown(kind)} answers; expected the address of a scheduler"
+        )
 
 
 def _pickled(task: Task, dumps: Callable[[Task], bytes]) -> bytes:

@@ -56,7 +56,9 @@ def identity(task: Task, design: Design) -> dict[str, Any]:
         try:
             json.dumps(value, allow_nan=False)
         except (TypeError, ValueError) as error:
-            raise KindError(f"setting '{name}': expected what JSON holds, got {shown(value)}: {error}") from error
+            raise KindError(
+                f"setting '{name}': expected a value that JSON can represent, got {shown(value)}: {error}"
+            ) from error
     fields = {
         "armwright": __version__,
         "task": task.name,
@@ -130,11 +132,11 @@ class Folder:
                 damage = error.strerror or str(error)
             else:
                 data, checksum = file[:-32], file[-32:]
-                damage = "its checksum is not that of its numbers, or of another block"
+                damage = "its checksum does not match its numbers, or it is another block"
         if checksum != self._checksum(number, data):
             runs = self.blocks[number]
-            advice = "it stays as it is; move it away or delete it and start again"
-            text = f"damaged: {damage}; {advice}: only its runs, {runs[0]} to {runs[-1]}, are done again"
+            advice = "it is not changed; move or delete it and start again"
+            text = f"damaged: {damage}; {advice}: only its runs, {runs[0]} to {runs[-1]}, are repeated"
             raise FileFormatError(path, None, "", text)
         rows: Rows = np.load(io.BytesIO(data), allow_pickle=False)
         return rows
@@ -169,7 +171,7 @@ def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterato
         others = {file.name for file in path.iterdir()} - {_LOCK, MANIFEST + _PARTIAL}
         if others and not manifest.exists():
             raise SweepError(
-                f"'{path}' holds no sweep, but other things ('{min(others)}'); give the sweep a folder of its own"
+                f"'{path}' contains files that are not of a sweep ('{min(others)}'); use a separate folder"
             )
         handle = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
         lock = os.fdopen(handle, "r+", encoding="utf-8", errors="replace")
@@ -178,7 +180,7 @@ def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterato
     with lock:
         holder = lock.read(1000).strip()
         if holder and not holder.startswith(_HOLDER):
-            raise SweepError(f"'{path / _LOCK}' is not the lock of a sweep; give the sweep a folder of its own")
+            raise SweepError(f"'{path / _LOCK}' is not the lock of a sweep; use a separate folder for the sweep")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # it ends with the process, however that ends
         except BlockingIOError as error:
@@ -212,9 +214,9 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
         _sync(path.parent)
     except OSError as error:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        advice = " Make room and start again: it goes on from there." if full else ""
+        advice = " Free some disk space and start again: the sweep resumes." if full else ""
         why = error.strerror or str(error)
-        raise OutputError(f"cannot write '{path}': {why}; what was finished before stays.{advice}") from error
+        raise OutputError(f"cannot write '{path}': {why}; finished blocks are kept.{advice}") from error
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
@@ -259,10 +261,10 @@ def _read_manifest(path: Path, sweep: dict[str, Any]) -> dict[str, Any]:
         ):
             differences = list(_differences("", other, sweep))
         case _:
-            raise FileFormatError(path, None, "", "damaged: block, made or sweep is not as a sweep writes it")
+            raise FileFormatError(path, None, "", "damaged: block, made or sweep is malformed")
     if differences:
         text = "; ".join(differences[:3]) + (f"; and {len(differences) - 3} more" if len(differences) > 3 else "")
-        raise SweepError(f"'{path.parent}' holds another sweep: {text}. Give this one a folder of its own")
+        raise SweepError(f"'{path.parent}' contains another sweep: {text}. Use a separate folder for this one")
     return fields
 
 
@@ -272,7 +274,7 @@ def _differences(key: str, there: Any, here: Any) -> Iterator[str]:
         for name in {**there, **here}:
             yield from _differences(f"{key}.{name}" if key else name, there.get(name), here.get(name))
     elif there != here:
-        yield f"{key} is {shown(there)} there, {shown(here)} here"
+        yield f"{key} is {shown(there)} in the folder, {shown(here)} here"
 
 
 def _now() -> str:

@@ -42,16 +42,16 @@ def load(folder: Path | str) -> "xarray.Dataset":
     xr = extra("xarray")
     path = Path(folder) / RESULTS
     if not path.exists():
-        state = "is not finished; run it again to go on" if path.with_name(MANIFEST).exists() else "is not there"
+        state = "is not finished; run it again to resume" if path.with_name(MANIFEST).exists() else "does not exist"
         raise SweepError(f"'{folder}': the sweep {state}")
     damage, expected, actual = "", recorded(path.parent).get(RESULTS), sha256(regular(path))
     if expected is None:
-        damage = f"cannot be checked: no {RECORD} beside it tells its hash"
+        damage = f"it cannot be verified: its folder has no {RECORD} with its checksum"
     elif expected != actual:
-        damage = f"damaged: its hash is not that in {RECORD}"
+        damage = f"damaged: its checksum does not match {RECORD}"
     if damage:
-        advice = "move it away or delete it and run the sweep again: it is made again of the blocks"
-        raise FileFormatError(path, None, "", f"{damage}; it stays as it is; {advice}")
+        advice = "move or delete it and run the sweep again: it is generated from the blocks"
+        raise FileFormatError(path, None, "", f"{damage}; it is not changed; {advice}")
     # Units such as "hours" are those of a quantity, not of a calendar.
     dataset: xarray.Dataset = xr.open_dataset(
         path, engine="scipy", decode_times=False, decode_timedelta=False, mask_and_scale=False

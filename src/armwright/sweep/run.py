@@ -76,7 +76,9 @@ def run(
                 f"workers: expected at most {_MAX_WORKERS} processes of this machine, got {workers}"
             )
         if scheduler is not None:
-            raise InvalidValueError("workers are processes of this machine, a scheduler has its own: give one of them")
+            raise InvalidValueError(
+                "specify either workers, processes of this machine, or a scheduler, which has its own workers"
+            )
     with locked_folder(Path(folder), task, design, block) as sweep:
         if (sweep.path / RESULTS).exists():
             if progress:

@@ -31,7 +31,7 @@ class Status(IntEnum):
     """How a run ended."""
 
     DONE = 0
-    """It ended well."""
+    """The run succeeded."""
     FAILED = 1
     """The task raised an error, or reported that the run failed."""
     KILLED = 2
@@ -125,7 +125,7 @@ def check_task(task: Task, parameters: Sequence[str]) -> None:
     for kind, names in kinds.items():
         for name in names:
             if not name.isidentifier():
-                raise InvalidValueError(f"'{name}' as {kind}: expected a word of letters, digits and _")
+                raise InvalidValueError(f"'{name}' as {kind}: expected an identifier of letters, digits and _")
             if name in used:
                 raise InvalidValueError(f"'{name}' cannot be {kind}: it is already {used[name]}")
             used[name] = kind
@@ -136,7 +136,9 @@ def check_task(task: Task, parameters: Sequence[str]) -> None:
                 raise InvalidValueError(f"output '{name}': the task has no axis '{dim}'. Known: {known}.")
     numbers = sum(map(prod, _shapes(task).values()))
     if 8 * numbers > _LARGEST_ROW:
-        raise InvalidValueError(f"outputs: a run of {numbers} numbers has more than 2 GiB; take fewer numbers of a run")
+        raise InvalidValueError(
+            f"outputs: a run of {numbers} numbers has more than 2 GiB; return fewer numbers per run"
+        )
 
 
 def evaluate(task: Task, points: Array) -> Rows:

@@ -158,7 +158,7 @@ class Kernel:
     def _careful(self, inputs: Sequence[ArrayLike], threads: int | None, out: Any) -> Any:
         """Check everything, evaluate, and find out what is wrong where something is."""
         if threads is not None and not (isinstance(threads, int) and threads > 0):
-            raise InvalidValueError(f"threads: expected a whole number above 0, or None for all cores, got {threads!r}")
+            raise InvalidValueError(f"threads: expected an integer above 0, or None for all cores, got {threads!r}")
         arrays, lead = self._checked(inputs)
         results = self._results(lead, out)
         status = self._run(arrays, lead, results, threads)
@@ -185,7 +185,7 @@ class Kernel:
             return arrays, np.broadcast_shapes(*leads)
         except ValueError as error:
             got = ", ".join(str(array.shape) for array in arrays)
-            raise ShapeError(f"{title}: leading axes must fit together, got {got}") from error
+            raise ShapeError(f"{title}: leading axes must broadcast together, got {got}") from error
 
     def _results(self, lead: Shape, out: Any) -> list[Array]:
         """Return the arrays to fill: new ones, or the caller's where they are fit for it."""

@@ -146,7 +146,7 @@ def changed(row: int, old: str, new: str) -> list[str]:
         (REST_ROWS[:1], ": no rows after the column names"),
         (
             changed(0, "x_mm,y_mm", "x_m,y_m"),
-            ":1: x_m: lengths have one unit in a file, and commanded",
+            ":1: x_m: lengths must have one unit in a file, but commanded",
         ),
         (changed(0, ",y_mm", ",y_m"), ":1: y_m: lengths must have one unit in a file, but commanded_x_mm has another"),
         (
@@ -155,7 +155,7 @@ def changed(row: int, old: str, new: str) -> list[str]:
         ),
         (changed(0, ",x_mm", ",x_inch"), ":1: x_inch: unknown unit 'inch': expected x_mm or x_m or"),
         (changed(0, ",x_mm", ",x"), ":1: x: the name has no unit: expected x_mm or x_m or"),
-        (changed(0, ",x_mm", ",y_mm"), ":1: y_mm: there twice, as y_mm too"),
+        (changed(0, ",x_mm", ",y_mm"), ":1: y_mm: a second column for this quantity, after y_mm"),
         (["pose,x_mm,y_mm", "P1,0,0"], ":1: commanded_x_mm: no such column; there are pose, x_mm, y_mm"),
         (
             ["commanded_x_mm,commanded_y_mm,x_mm,y_mm", "0,0,0,0"],
@@ -163,7 +163,7 @@ def changed(row: int, old: str, new: str) -> list[str]:
         ),
         (["a,b", "1,2"], ":1: a: no such column. Known: pose, path, t_s, commanded_x_mm"),
         (changed(2, ",150.1", ""), ":3: expected 5 values, one per column, got 4"),
-        (changed(1, "-150.1", "-150,1"), ":2: expected 5 values, one per column, got 6; is there a comma"),
+        (changed(1, "-150.1", "-150,1"), ":2: expected 5 values, one per column, got 6; does a number contain a comma"),
         (changed(2, "150.1", "nan"), ":3: x_mm: every number must be finite and no larger than 1e+100, got nan"),
         (changed(2, "150.1", "inf"), ":3: x_mm: every number must be finite and no larger than 1e+100, got inf"),
         (changed(2, "150.1", "-"), ":3: x_mm: expected a number, got '-'"),
@@ -203,7 +203,7 @@ def path_slip(change: Callable[[list[str]], list[str]]) -> list[str]:
         (path_slip(lambda rows: [rows[0].replace("mm", "m"), *rows[1:]]), "are the units right"),
         (
             path_slip(lambda rows: [rows[0].replace("x_mm", "x_m"), *rows[1:]]),
-            ":1: y_mm: lengths have one unit",
+            ":1: y_mm: lengths must have one unit",
         ),
         (
             path_slip(lambda rows: [rows[0].replace("t_s", "t_mm"), *rows[1:]]),
@@ -212,7 +212,7 @@ def path_slip(change: Callable[[list[str]], list[str]]) -> list[str]:
         (path_slip(lambda rows: [rows[0], "y1,nan,1,1", *rows[2:]]), ":2: t_s: every number must be finite"),
         (
             path_slip(lambda rows: [row.replace("path,", "").replace("y1,", "") for row in rows]),
-            "a column path, and the file has neither: t_s, x_mm",
+            "a column path, but the file has neither: t_s, x_mm",
         ),
     ],
 )

@@ -16,7 +16,7 @@ T = TypeVar("T")
 # What people call the types of JSON.
 _TYPES: Mapping[type, str] = {
     str: "a text",
-    int: "a whole number",
+    int: "an integer",
     bool: "true or false",
     list: "a list",
     dict: "an object",

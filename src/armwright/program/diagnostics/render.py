@@ -113,7 +113,7 @@ def _marks(label: Label, mark: str, style: str, source: Source, shown: tuple[int
     # What lies in a part that is not shown is marked at its edge.
     first = column if end == len(line) and column >= begin else min(max(column, begin), end)
     last = min(column + label.span.end - label.span.start, len(line), end)
-    # Beyond the end of the line every character that is not there counts one.
+    # Beyond the end of the line every character that does not exist counts one.
     indent = sum(map(_width, cells[: first - begin])) + max(0, first - len(line))
     length = sum(map(_width, cells[first - begin : max(0, last - begin)]))
     return [(" " * indent, ""), (mark * max(1, length), style), (f" {label.text}" if label.text else "", style)]
