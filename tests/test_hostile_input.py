@@ -162,7 +162,7 @@ def test_one_configuration_only(door: str) -> None:
 )
 def test_leading_axes_that_do_not_fit(call: Callable[[Any, Any], Any], said: str) -> None:
     """Two rows of one argument and three of another belong to nothing, and both shapes are told."""
-    with pytest.raises(ShapeError, match=rf"^{said}: leading axes must fit together, got .*\(2, 6\).*\(3, 6\)"):
+    with pytest.raises(ShapeError, match=rf"^{said}: leading axes must broadcast together, got .*\(2, 6\).*\(3, 6\)"):
         call(np.zeros((2, 6)), np.zeros((3, 6)))
 
 
@@ -228,7 +228,7 @@ def test_one_pose_only() -> None:
     """Where one pose is asked for many are refused, and none as well; the message says what takes many."""
     for poses in ([X, X], np.zeros((0, 4, 4))):
         with pytest.raises(
-            ShapeError, match=r"pose: expected one pose, shape \(4, 4\), got .* inverse_branches takes many"
+            ShapeError, match=r"pose: expected one pose, shape \(4, 4\), got .* inverse_branches accepts arrays"
         ):
             armwright.kinematics.inverse(PUMA, poses)
     q, singular = armwright.kinematics.inverse_branches(PUMA, np.zeros((0, 4, 4)))
@@ -309,15 +309,15 @@ def test_numbers_without_a_meaning(door: str, value: float) -> None:
         (
             lambda: armwright.motion.quintic(Q, OTHER, 1e-30),
             InvalidValueError,
-            "duration: expected more than 0 s, 1e-09 s",
+            "duration: expected at least 1e-09 s",
         ),
         (lambda: armwright.motion.quintic(0.0, 1.0, 1.0), ShapeError, "q_start: expected shape (n,), got ()"),
         (lambda: armwright.motion.xspline([0, 1], 3.0), ShapeError, "X-spline: expected k times and (k, n) knots"),
         (lambda: armwright.motion.xspline([0, 1], [[], []]), ShapeError, "X-spline: expected k times and (k, n) knots"),
-        (lambda: armwright.motion.xspline([0, 0], [Q, Q]), InvalidValueError, "times must rise, got 0 s and then 0 s"),
-        (lambda: armwright.motion.xspline([1, 2], [Q, Q]), InvalidValueError, "times: expected to begin at 0"),
+        (lambda: armwright.motion.xspline([0, 0], [Q, Q]), InvalidValueError, "times must increase, got 0 s"),
+        (lambda: armwright.motion.xspline([1, 2], [Q, Q]), InvalidValueError, "times: expected non-decreasing times"),
         (lambda: armwright.motion.quintic(Q, OTHER, 1.0)("x"), KindError, "t: expected numbers, got 'x'"),
-        (lambda: armwright.motion.quintic(Q, OTHER, 1.0)(0.5, 1.5), KindError, "order: expected a whole number from 0"),
+        (lambda: armwright.motion.quintic(Q, OTHER, 1.0)(0.5, 1.5), KindError, "order: expected an integer, got 1.5"),
         (lambda: armwright.Trajectory(times=[0, 1], coefficients=Q), ShapeError, "coefficients: expected (segments,"),
         (lambda: fitted(armwright.load_arm("stanford"), Q), ShapeError, "q: expected (m, 6) configurations"),
         (lambda: pd(PUMA, standing(Q), -1.0, 1.0), InvalidValueError, "kp: expected 0 or more for every joint"),
@@ -345,8 +345,8 @@ def test_arguments_without_a_meaning(call: Callable[[], object], kind: type[Armw
         (lambda: simulated(brakes=Brake(joint=0)), KindError, "brakes: expected a list of Brake, got Brake(joint=0"),
         (lambda: simulated(brakes=[0]), KindError, "brakes: expected a list of Brake, got [0]"),
         (lambda: simulated(brakes=[Brake(joint=6)]), InvalidValueError, "brake: expected a joint from 0 to 5, got 6"),
-        (lambda: Brake(joint=0.5), KindError, "brake: expected the number of a joint, from 0, got 0.5"),
-        (lambda: simulated(duration=1e9), InvalidValueError, "would be 1e+12 moments; expected at most 1e+07"),
+        (lambda: Brake(joint=0.5), KindError, "brake: expected the index of a joint, from 0, got 0.5"),
+        (lambda: simulated(duration=1e9), InvalidValueError, "would be 1e+12 samples; expected at most 1e+07"),
     ],
 )
 def test_simulations_that_cannot_be(call: Callable[[], object], kind: type[ArmwrightError], said: str) -> None:
@@ -396,5 +396,5 @@ def test_a_hand_without_inertia(ask: Door) -> None:
     joints = [Joint(kind="revolute", a=0.5), Joint(kind="revolute", a=0.5)]
     arm = Arm(name="light", joints=joints, links=[Link(mass=1.0), Link()])
 
-    with pytest.raises(UnsupportedArmError, match=r"'light': no acceleration can be found for joint 2: .* Give its"):
+    with pytest.raises(UnsupportedArmError, match=r"'light': the acceleration of joint 2 is undefined: .* Give its"):
         ask(arm)

@@ -393,7 +393,7 @@ def test_shapes(ur5: Arm) -> None:
     ("base", "words"),
     [
         (np.eye(3), r"base: expected a shape ending in \(4, 4\), got \(3, 3\)"),
-        (np.ones((4, 4)), "base: expected a rotation, a position and the row 0 0 0 1"),
+        (np.ones((4, 4)), "base: expected a homogeneous transformation"),
     ],
 )
 def test_no_base(base: Array, words: str, ur5: Arm, rng: np.random.Generator) -> None:

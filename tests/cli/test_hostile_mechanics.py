@@ -87,7 +87,7 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
         (("show", ""), 2, "no arm ''. Known: "),
         (("singularity", "nowhere/arm.toml", "-q", Q), 4, "nowhere/arm.toml: no such file"),
         (("simulate", "/", "-q", Q), 4, "/: expected a file, got a folder"),
-        (("torque", "\0.toml", "-q", Q), 4, "'\\x00.toml': no such file can be"),
+        (("torque", "\0.toml", "-q", Q), 4, "'\\x00.toml': no file can have this name"),
         (("kernel", "ur5", "jacobain"), 2, "no quantity 'jacobain'. Did you mean 'jacobian'?"),
         (("study", "stanford-torqe"), 2, "no study 'stanford-torqe'. Did you mean 'stanford-torque'?"),
         (("show",), 2, "Missing argument"),
@@ -113,7 +113,7 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
         ),
         (("simulate", "puma560", "-q", Q, "--duration", "-1"), 2, "duration: expected more than 0 s, got -1.0"),
         (("simulate", "puma560", "-q", Q, "--duration", "nan"), 2, "duration: expected more than 0 s, got nan"),
-        (("simulate", "puma560", "-q", Q, "--duration", "1e9"), 2, "would be 1e+12 moments; expected at most 1e+07"),
+        (("simulate", "puma560", "-q", Q, "--duration", "1e9"), 2, "would be 1e+12 samples; expected at most 1e+07"),
         (("simulate", "puma560", "-q", Q, "--duration", "long"), 2, "'--duration'"),
         (("simulate", "puma560", "-q", Q, "--step-ms", "nan"), 2, "--step-ms: expected 0.001 to 1000, got nan"),
         (
@@ -133,14 +133,14 @@ def test_mistakes_in_a_call(call: Call, arguments: tuple[str, ...], status: int,
 
 
 FILES = {
-    "empty": ("", ": the file is empty; its first line should name the columns"),
-    "columns without rows": (HEADER + "\n", ": no rows below the names of the columns"),
+    "empty": ("", ": the file is empty; expected column names in its first line"),
+    "columns without rows": (HEADER + "\n", ": no rows after the column names"),
     "a thousand and a decimal comma": (
         HEADER.replace(",", ";") + "\n1,5;2;3;4;5;1.000\n",
         ":2: q6: expected a decimal comma, as in line 2, got '1.000'",
     ),
-    "a column twice": (HEADER + ",q2\n1,1,1,1,1,1,1\n", ":1: q2: there twice, as q2 too"),
-    "a short row": (HEADER + "\n1,1\n", ":2: expected 6 values, as there are columns, got 2"),
+    "a column twice": (HEADER + ",q2\n1,1,1,1,1,1,1\n", ":1: q2: a second column for this quantity, after q2"),
+    "a short row": (HEADER + "\n1,1\n", ":2: expected 6 values, one per column, got 2"),
     "a word": (HEADER + "\n1,1,1,1,1,1\n\n1,1,one,1,1,1\n", ":4: q3: expected a number, got 'one'"),
     "an endless number": (HEADER + "\n1,1,1,1,1,inf\n", ":2: q6: every number must be finite"),
     "a zero byte": (HEADER + "\n1,1,1,1,1,\0001\n", ":2: q6: expected a number, got "),
@@ -186,7 +186,9 @@ def test_files_with_units(call: Call, tmp_path: Path) -> None:
     typed, written = call(*options, "A1=joint_1_deg"), call(*options, mapping)
 
     assert typed == written
-    assert f"armwright: warning: {file}: 1 row left out for empty cells, 1 read: joint_2 [deg] in line 2" in typed[2]
+    assert (
+        f"armwright: warning: {file}: 1 row omitted because of empty cells, 1 read: joint_2 [deg] in line 2" in typed[2]
+    )
     np.testing.assert_allclose(json.loads(typed[1])["q"], [*np.radians([90.5, -20]), 0.1, 0, 0, 0.25])
 
 
@@ -195,7 +197,7 @@ def test_files_with_units(call: Call, tmp_path: Path) -> None:
     [
         ("A1=", 2, "--columns: expected a column map such as A1=joint_1_deg,X=x_mm, got 'A1='"),
         ("nowhere.toml", 4, "nowhere.toml: no such file"),
-        ("A9=q1_deg", 4, "rows.csv:1: A9: no such column to be taken for q1_deg. There are q1, q2"),
+        ("A9=q1_deg", 4, "rows.csv:1: A9: no such column to map to q1_deg. There are q1, q2"),
     ],
 )
 def test_bad_column_maps(call: Call, tmp_path: Path, columns: str, status: int, said: str) -> None:
@@ -242,7 +244,7 @@ def test_files_in_degrees(call: Call, tmp_path: Path) -> None:
 
     assert status == 0
     assert [json.loads(line)["q"][0] for line in out.splitlines()] == [0.1, 10.0]
-    assert error.startswith(f"armwright: warning: {file}: joint 1 of 'puma560' stands at 10 rad")
+    assert error.startswith(f"armwright: warning: {file}: joint 1 of 'puma560' is at 10 rad")
     assert "Traceback" not in error
 
 
@@ -333,7 +335,7 @@ def test_simulation_with_a_load(call: Call) -> None:
     ],
 )
 def test_impossible_loads(call: Call, command: str, load: str, status: int, said: str) -> None:
-    """A load without a place, lighter than nothing, or in a file that is not there is refused."""
+    """A load without a place, lighter than nothing, or in a file that does not exist is refused."""
     got, out, error = call(command, "puma560", "-q", "0,0,90,0,0,0", "--load", load)
 
     assert (got, out) == (status, "")
@@ -346,7 +348,7 @@ def test_impossible_loads(call: Call, command: str, load: str, status: int, said
         ("", "mass_kg: missing, expected a number"),
         ("mass_kg = -1\n", ":1: mass_kg: expected 0 or more, got -1"),
         ("mass_kg = 1\ncon_mm = [0, 0, 1]\n", ":2: con_mm: unknown key; did you mean 'com_mm'?"),
-        ("mass_kg = 1\ninertia_kgm2 = [1, 1, 3]\n", ":2: inertia_kgm2: no body has the principal moments 1, 1, 3 kg"),
+        ("mass_kg = 1\ninertia_kgm2 = [1, 1, 3]\n", ":2: inertia_kgm2: a body cannot have the principal moments 1, 1,"),
     ],
 )
 def test_load_files(tmp_path: Path, text: str, said: str) -> None:

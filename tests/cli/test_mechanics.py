@@ -149,7 +149,7 @@ def test_rows_of_a_file(tmp_path: Path) -> None:
     [
         ("t,q1,q2\n0,1,2\n", ":1: q3: no such column; puma560 has 6 joints; there are q1, q2"),
         ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0,x\n", ":2: q6: expected a number, got 'x'"),
-        ("q1,q2,q3,q4,q5,q6\n0,0,0\n", ":2: expected 6 values, as there are columns, got 3"),
+        ("q1,q2,q3,q4,q5,q6\n0,0,0\n", ":2: expected 6 values, one per column, got 3"),
         ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0,nan\n", ":2: q6: every number must be finite"),
     ],
 )

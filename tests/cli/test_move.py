@@ -24,8 +24,10 @@ def test_joint_move(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
     assert "left, down, no-flip -> left, down, no-flip -> left, down, flip" in " ".join(done.stdout.split())
-    assert "line 10: the rotation of pose A is none, by 0.00096; the nearest is taken" in done.stderr
-    assert "the limits would hold 5.81 times slower, for the acceleration of joint 2: --keep-limits" in done.stderr
+    assert "line 10: the rotation matrix of pose A is not orthonormal (error 0.00096); the nearest" in done.stderr
+    assert (
+        "the limits require a motion 5.81 times slower, limited by the acceleration of joint 2; --keep" in done.stderr
+    )
     rows = np.loadtxt(tmp_path / "out" / "motion.csv", delimiter=",", skiprows=1)
     assert rows.shape == (501, 25)
     hand = forward(load_arm("puma560-seed"), rows[[0, -1], 1:7])[:, :3, 3]
@@ -78,7 +80,10 @@ def test_no_branch(tmp_path: Path) -> None:
 
     assert done.returncode == 3
     assert done.stdout == ""
-    assert "no branch carries the tool to its last pose. left, down, no-flip: at 0." in done.stderr
+    assert (
+        "no single branch of the inverse kinematics can be followed to the last pose. left, down, no-flip: "
+        in done.stderr
+    )
     assert "between poses 2 and 3" in done.stderr
     assert done.stderr.endswith("`--around damped` and `--around via` search for a detour\n")
     assert not (tmp_path / "out").exists()
@@ -100,7 +105,7 @@ def test_way_round() -> None:
     assert done.returncode == 0, done.stderr
     assert "A to B: a line: " in done.stdout
     said = " ".join(done.stdout.split())
-    assert "B to C: no line, on the line near (" in said
+    assert "B to C: line infeasible, on the line near (" in said
     assert "detour by damped: " in said
     assert " mm off the line, " in said
 

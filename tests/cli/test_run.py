@@ -320,7 +320,7 @@ def test_unreachable_goal(tmp_path: Path) -> None:
 
     assert "error[E402]: `far` cannot be reached by ARM_1" in said
     assert "--> far.rlo:4:" in said
-    assert "joint 3 would stand at 2996.5 mm, 1878.9 mm beyond its limit 1117.6 mm" in said
+    assert "joint 3 would be at 2996.5 mm, 1878.9 mm beyond its limit 1117.6 mm" in said
     assert "frames at 0.000 s" in said
     assert f"report up to the failure: {tmp_path / 'out' / 'report.html'}\n" in said
     assert {path.name for path in (tmp_path / "out").iterdir()} == FILES

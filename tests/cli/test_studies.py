@@ -50,7 +50,7 @@ def test_moves_of_the_puma(tmp_path: Path) -> None:
         assert ET.parse(tmp_path / name).getroot().tag.endswith("svg")
     tables = json.loads((tmp_path / "tables.json").read_text())
     assert [row["inverse"] for row in tables["moves"]] == [3, 501, 501, 501]
-    assert "no branch carries the tool to its last pose" in done.stdout
+    assert "no single branch of the inverse kinematics can be followed to the last pose" in done.stdout
 
 
 def test_unknown_study() -> None:

@@ -77,7 +77,9 @@ def test_slide_carries_its_weight() -> None:
 
 def test_only_stanford_arms() -> None:
     """A PUMA has no slide, and five joints are not six."""
-    with pytest.raises(UnsupportedArmError, match="'puma560' is no Stanford arm: of six joints, the third alone"):
+    with pytest.raises(
+        UnsupportedArmError, match="'puma560' is not a Stanford arm: expected six joints, of which only"
+    ):
         fitted(load_arm("puma560"), np.zeros((10, 6)))
     with pytest.raises(ShapeError, match="qdd: expected 6 numbers on the last axis"):
         bejczy_efforts(np.zeros(6), np.zeros(5))

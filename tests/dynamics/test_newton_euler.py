@@ -106,5 +106,5 @@ def test_floats_and_arrays_are_one_equation(rng: np.random.Generator) -> None:
 
 def test_shapes_that_do_not_fit() -> None:
     """Four positions and three speeds are refused with their shapes."""
-    with pytest.raises(ShapeError, match=r"leading axes must fit together, got \(4, 6\), \(3, 6\), \(6,\)"):
+    with pytest.raises(ShapeError, match=r"leading axes must broadcast together, got \(4, 6\), \(3, 6\), \(6,\)"):
         inverse_dynamics(load_arm("stanford"), np.zeros((4, 6)), np.zeros((3, 6)), np.zeros(6))

@@ -113,5 +113,5 @@ def test_leading_axes_stay() -> None:
 
 def test_speeds_that_do_not_fit() -> None:
     """Two positions and three speeds are refused with their shapes."""
-    with pytest.raises(ShapeError, match=r"q, qd: leading axes must fit together, got \(2, 6\), \(3, 6\)"):
+    with pytest.raises(ShapeError, match=r"q, qd: leading axes must broadcast together, got \(2, 6\), \(3, 6\)"):
         coriolis_efforts(load_arm("stanford"), np.zeros((2, 6)), np.zeros((3, 6)))

@@ -115,5 +115,5 @@ def test_axes_that_do_not_fit() -> None:
     """A motion of ten moments needs ten wrenches or one."""
     arm = load_arm("stanford")
     motion = np.zeros((10, 6))
-    with pytest.raises(ShapeError, match=r"q, qd, qdd, wrench: leading axes must fit together, .* \(9, 6\)"):
+    with pytest.raises(ShapeError, match=r"q, qd, qdd, wrench: leading axes must broadcast together, .* \(9, 6\)"):
         terms(arm, motion, motion, motion, wrench=np.zeros((9, 6)))

@@ -212,5 +212,5 @@ def test_refusals(puma: Arm) -> None:
         differential_inverse(puma, np.zeros(6), np.zeros(6), method="block")  # type: ignore[arg-type]
     with pytest.raises(InvalidValueError, match="'base' or 'tool', got 'hand'"):
         differential_inverse(puma, np.zeros(6), np.zeros(6), frame="hand")  # type: ignore[arg-type]
-    with pytest.raises(ShapeError, match=r"q, twist: leading axes must fit together"):
+    with pytest.raises(ShapeError, match=r"q, twist: leading axes must broadcast together"):
         differential_inverse(puma, np.zeros((2, 6)), np.zeros((3, 6)))

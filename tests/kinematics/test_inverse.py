@@ -183,7 +183,7 @@ def test_out_of_limits_says_which_joint() -> None:
 
     assert solution.outcome is Outcome.OUT_OF_LIMITS
     with pytest.raises(
-        NoSolutionError, match=r"joint 3 would stand at 2996\.5 mm, 1878\.9 mm beyond its limit 1117\.6 mm"
+        NoSolutionError, match=r"joint 3 would be at 2996\.5 mm, 1878\.9 mm beyond its limit 1117\.6 mm"
     ):
         _ = solution.best
 
@@ -231,7 +231,7 @@ def test_shapes_that_do_not_fit() -> None:
     """Two poses and three starting points are refused, and so are two starting points for one judged pose."""
     arm = load_arm("puma560-seed")
     with pytest.raises(
-        ShapeError, match=r"pose, near: leading axes must fit together, got shapes \(2, 4, 4\) and \(3, 6"
+        ShapeError, match=r"pose, near: leading axes must broadcast together, got shapes \(2, 4, 4\) and \(3, 6"
     ):
         inverse_branches(arm, np.tile(np.eye(4), (2, 1, 1)), np.zeros((3, 6)))
     with pytest.raises(ShapeError, match=r"near: expected shape \(6,\), got \(2, 6\)"):

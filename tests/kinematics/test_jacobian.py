@@ -85,7 +85,7 @@ def test_many_rates_at_once(rng: np.random.Generator) -> None:
 
 def test_leading_axes_must_fit() -> None:
     """Two configurations and three speeds are refused with both shapes."""
-    with pytest.raises(ShapeError, match=r"q, qd: leading axes must fit together, got shapes \(2, 6\) and \(3, 6\)"):
+    with pytest.raises(ShapeError, match=r"leading axes must broadcast together, got shapes \(2, 6\) and \(3, 6\)"):
         jacobian_rate(load_arm("puma560"), np.zeros((2, 6)), np.zeros((3, 6)))
 
 
@@ -167,5 +167,5 @@ def test_unknown_measure() -> None:
         manipulability(arm, np.zeros(6), measure="yosikawa")  # type: ignore[arg-type]
     with pytest.raises(UnknownNameError, match=r"no motion 'linar'\. Did you mean 'linear'"):
         manipulability(arm, np.zeros(6), motion="linar")  # type: ignore[arg-type]
-    with pytest.raises(InvalidValueError, match="length: expected a length above 0"):
+    with pytest.raises(InvalidValueError, match="length: expected a characteristic length above 0"):
         manipulability(arm, np.zeros(6), length=0.0)

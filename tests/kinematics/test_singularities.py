@@ -184,11 +184,11 @@ def test_lost_directions_are_measured_with_their_turn_in_metres() -> None:
 
 def test_refusals(rng: np.random.Generator) -> None:
     """Arms without known factors, many configurations at once and senseless thresholds are refused with what to do."""
-    with pytest.raises(UnsupportedArmError, match=r"'random': .* use its singular values"):
+    with pytest.raises(UnsupportedArmError, match=r"'random': .* use the singular values"):
         singularity_factors(random_arm(rng, 6), np.zeros(6))
     with pytest.raises(ShapeError, match=r"q: expected shape \(6,\), got \(2, 6\)"):
         singularities(PUMA, np.zeros((2, 6)))
-    with pytest.raises(InvalidValueError, match="threshold: expected a part of the scale between 0 and 1, got 2"):
+    with pytest.raises(InvalidValueError, match="threshold: expected a fraction of the scale between 0 and 1, got 2"):
         singularities(PUMA, np.zeros(6), threshold=2)
     with pytest.raises(InvalidValueError, match="damping: expected a singular value above 0"):
         damped_rates(PUMA, np.zeros(6), np.zeros(6), damping=0.0)

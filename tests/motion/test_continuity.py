@@ -42,7 +42,7 @@ def test_every_order() -> None:
 
         assert found.order == order - 1
         np.testing.assert_allclose(found.jumps[order, 1], 1)
-        assert ("not even position" in str(found)) == (order == 0)
+        assert ("position is discontinuous" in str(found)) == (order == 0)
 
 
 def test_the_text() -> None:

@@ -117,10 +117,10 @@ def test_what_no_slowing_helps() -> None:
     """What gravity and dry friction take they take at any speed: joint, time, effort and limit are named."""
     with pytest.raises(
         InvalidValueError,
-        match=r"at \d\.\d{3} s gravity and dry friction alone ask joint 1 for 29\.42 N, 29 N are allowed: no slowing",
+        match=r"at \d\.\d{3} s gravity and Coulomb friction alone require 29\.42 N of joint 1, 29 N are allowed",
     ):
         slowing_for_efforts(lift(29.0), quintic([0.0], [1.0], 1.0))
-    with pytest.raises(InvalidValueError, match="ask joint 1 for 6 N, 5 N are allowed"):
+    with pytest.raises(InvalidValueError, match="require 6 N of joint 1, 5 N are allowed"):
         slowing_for_efforts(block(5.0, coulomb_forward=6.0), quintic([0.0], [1.0], 1.0))
 
 

@@ -49,8 +49,8 @@ def test_certificate() -> None:
     line = straight_line(PUMA, Q, X, speed=120)
 
     assert all_called(str(line.certificate))
-    assert slower(PUMA, 2.0, ("effort", 2)) == "2.00 times slower, for the effort of joint 3 ('elbow')"
-    assert slower(load_arm("ur5"), 2.0, ("speed", 0)) == "2.00 times slower, for the speed of joint 1"
+    assert slower(PUMA, 2.0, ("effort", 2)) == "2.00 times slower, limited by the effort of joint 3 ('elbow')"
+    assert slower(load_arm("ur5"), 2.0, ("speed", 0)) == "2.00 times slower, limited by the speed of joint 1"
 
 
 def test_what_stops_a_line() -> None:
@@ -72,7 +72,7 @@ def test_what_stops_a_line() -> None:
     assert (limits.value.cause, singular.value.cause) == ("limits", "singular")
     assert all_called(str(limits.value))
     assert all_called(str(singular.value))
-    assert too_fast(PUMA, 5, 70) == "joint 5 ('bend') would have to move 70 times as fast as it may"
+    assert too_fast(PUMA, 5, 70) == "joint 5 ('bend') would have to move 70 times as fast as its limit"
 
 
 def test_detour() -> None:

@@ -202,7 +202,7 @@ def test_limit_on_the_way(stanford: Arm) -> None:
     A = homogeneous(rotation_from_vector([0, np.pi / 2, 0]), (0.9, 0.15367, 0.4125))
     B = homogeneous(A[:3, :3], (0.35, 0.15367, 0.4125))
 
-    with pytest.raises(StageError, match=r"joint 3 would stand at .* mm beyond its limit 140\.0 mm") as caught:
+    with pytest.raises(StageError, match=r"joint 3 would be at .* mm beyond its limit 140\.0 mm") as caught:
         plan(stanford, start(stanford, A), [StageGoal(kind="LINE", poses=B[None])], Manner())
 
     assert caught.value.obstacle.cause == "limits"
@@ -227,7 +227,7 @@ def test_line_past_a_singularity() -> None:
         return inverse(free, A, [0.1, -0.5, 0.8, 0, q5, 0]).best.q, B
 
     with pytest.raises(
-        PathError, match=r"singular there \(wrist\), joint [46] would have to move \d+ times as fast as it may"
+        PathError, match=r"singular there \(wrist\), joint [46] would have to move \d+ times as fast as its limit"
     ) as caught:
         coarse_line(free, *line(5e-3), deviation=1e-4, speed=100)
 

@@ -63,18 +63,18 @@ def test_four_turns() -> None:
 MISTAKES = {
     "one pose": ("[[pose]]\nxyz_mm = [1, 2, 3]\n", "1: pose: expected two poses or more, got 1"),
     "no pose": ('title = "none"\n', "pose: missing, expected one or more tables [[pose]]"),
-    "no unit": (TWO.replace("xyz_cm", "xyz"), "4: pose 2, xyz: the key must tell the unit: xyz_m, xyz_cm or xyz_mm"),
+    "no unit": (TWO.replace("xyz_cm", "xyz"), "4: pose 2, xyz: the key must contain the unit: xyz_m, xyz_cm or xyz_mm"),
     "angles without one": (
         TWO + "rpy = [0, 0, 90]\n",
-        "5: pose 2, rpy: the key must tell the unit: rpy_deg or rpy_rad",
+        "5: pose 2, rpy: the key must contain the unit: rpy_deg or rpy_rad",
     ),
     "a wrong rotation": (
         TWO + "rotation = [[1, 0, 0], [0, 1, 0], [0, 0.1, 1]]\n",
-        "5: pose 2, rotation: expected the rows of a rotation, got a matrix that is off by 0.1",
+        "5: pose 2, rotation: expected the rows of a rotation matrix, got an orthonormality error of 0.1",
     ),
     "two turns": (
         TWO + "rpy_deg = [0, 0, 0]\nquaternion_wxyz = [1, 0, 0, 0]\n",
-        "6: pose 2, quaternion_wxyz: the turn is given twice, as rpy and as quaternion_wxyz",
+        "6: pose 2, quaternion_wxyz: the rotation is specified twice, as rpy and as quaternion_wxyz",
     ),
     "a late start": (
         TIMED.replace("= 0", "= 0.1"),
@@ -82,25 +82,25 @@ MISTAKES = {
     ),
     "back in time": (
         TIMED + "[[pose]]\ntime_s = 1\n",
-        "6: pose 3, time_s: expected more than the 1 s of the pose before it, got 1",
+        "6: pose 3, time_s: expected more than the 1 s of the previous pose, got 1",
     ),
     "a time missing": (TIMED + "[[pose]]\n", "5: pose 3, time_s: missing, expected a number"),
     "a time too many": (
         TWO + "time_s = 1\n",
-        "5: pose 2, time_s: the first pose has none; give it to all poses or to none",
+        "5: pose 2, time_s: the first pose has none; specify it for all poses or for none",
     ),
     "a blend without times": (
         "blend_s = 0.1\n" + TWO,
-        "2: pose 1: blends belong to poses with times; give time_s",
+        "2: pose 1: blends are allowed only for poses with times; specify time_s",
     ),
     "a blend of none": (TIMED + "blend_s = 0\n", "5: pose 2, blend_s: expected a number above 0, got 0"),
     "one blend missing": (
         TIMED + "blend_s = 0.1\n",
-        "1: pose 1, blend_s: missing; other poses have one: give it to all, or once at the top",
+        "1: pose 1, blend_s: missing; other poses have one: specify it for all poses, or once at the top level",
     ),
     "a name twice": (
         '[[pose]]\nname = "A"\n[[pose]]\nname = "A"\n',
-        "4: pose 2, name: 'A' is the name of an earlier pose",
+        "4: pose 2, name: 'A' is already the name of an earlier pose",
     ),
     "a misspelt key": (TWO + "tiem_s = 1\n", "5: pose 2, tiem_s: unknown key; did you mean 'time_s'?"),
     "not a number": (TWO.replace("3]", "nan]"), "2: pose 1, xyz_mm 3: expected a finite number, got nan"),

@@ -194,7 +194,7 @@ def test_blends_that_overlap() -> None:
     """Overlapping blends are refused with the way, the times they need and the time there is; touching ones are not."""
     points = [[0.0], [1.0], [0.5], [2.0]]
     said = (
-        "blends overlap on the path from point 2 to point 3: they need 0.3 s and 0.25 s of it, 0.55 s together; "
+        "blends overlap on the segment from point 2 to point 3: they need 0.3 s and 0.25 s of it, 0.55 s together; "
         "it lasts 0.5 s"
     )
     with pytest.raises(InvalidValueError, match=re.escape(said)):
@@ -208,7 +208,7 @@ def test_blends_that_overlap() -> None:
 NONSENSE = [
     (([0.0], [[1.0]], 0.1), {}, ShapeError, "k at least 2"),
     (([0.0, 1.0, 1.0], np.zeros((3, 1)), 0.1), {}, InvalidValueError, "got 1 s and then 1 s at point 2"),
-    (([1.0, 2.0], np.zeros((2, 1)), 0.1), {}, InvalidValueError, "times must rise from 0, got 1 s at point 1"),
+    (([1.0, 2.0], np.zeros((2, 1)), 0.1), {}, InvalidValueError, "times must increase from 0, got 1 s at point 1"),
     (([0.0, 1.0], [[0.0], [np.nan]], 0.1), {}, InvalidValueError, r"points: every number must be finite, got nan"),
     (([0.0, 1.0], np.zeros((2, 1)), 0.0), {}, InvalidValueError, "blend: expected more than 0 s, got 0 s at point 1"),
     (([0.0, 1.0, 2.0], np.zeros((3, 1)), [9, -1, 9]), {"ends": "running"}, InvalidValueError, "got -1 s at point 2"),
@@ -230,7 +230,7 @@ def test_blends_of_nonsense(
 
 def test_limits_that_give_no_times() -> None:
     """Two equal neighbours, a way or a blend without a limit, too few points: each is named."""
-    with pytest.raises(InvalidValueError, match="points 2 and 3 are the same point"):
+    with pytest.raises(InvalidValueError, match="points 2 and 3 coincide"):
         blend_timing([[0.0], [1.0], [1.0]], 1.0, 1.0)
     with pytest.raises(InvalidValueError, match="no joint that moves from point 1 to point 2 has a limit"):
         blend_timing([[0.0, 0.0], [1.0, 0.0]], [np.inf, 1.0], 1.0)

@@ -63,7 +63,7 @@ def test_a_robot_file_without_speed() -> None:
     X = forward(arm, START).copy()
     X[2, 3] -= 0.1
 
-    with pytest.raises(InvalidValueError, match=r"paths in space need its reach and its tool speed \(\[hand\]"):
+    with pytest.raises(InvalidValueError, match=r"Cartesian paths need its reach and its tool speed \(\[hand\]"):
         straight_line(arm, START, X)
 
 

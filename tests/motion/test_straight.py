@@ -218,7 +218,7 @@ def test_what_stops_a_line() -> None:
     assert 0 < reach.value.fraction <= 1
 
     beyond = forward(puma, [2.9, 0.3, 0.2, 0.0, 0.8, 0.0])
-    with pytest.raises(PathError, match=r"on the line near .* mm from the base joint \d would stand at") as limits:
+    with pytest.raises(PathError, match=r"on the line near .* mm from the base joint \d would be at") as limits:
         straight_line(puma, [2.7, 0.3, 0.2, 0.0, 0.8, 0.0], beyond)
     assert limits.value.cause == "limits"
 

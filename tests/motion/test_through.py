@@ -54,5 +54,5 @@ def test_what_is_refused() -> None:
         through_frames(ARM, START, frames()[:1])
     far = frames()
     far[1, 0, 3] = 5.0
-    with pytest.raises(PathError, match="in the closest, joint 3 would stand at 48"):
+    with pytest.raises(PathError, match="in the closest, joint 3 would be at 48"):
         through_frames(ARM, START, far)

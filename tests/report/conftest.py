@@ -182,9 +182,7 @@ def bench_run() -> RunPage:
         command="armwright run bench.rlo --cell bench.toml --report run.html",
         duration=9.0,
         messages=(
-            Message(
-                severity="warning", code="W203", line=10, text="'part' is still attached to WORLD"
-            ),
+            Message(severity="warning", code="W203", line=10, text="'part' is still attached to WORLD"),
             Message(severity="note", text="two arms, one clock"),
         ),
         effects=effects,

@@ -159,7 +159,7 @@ def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: Array
     try:
         lead = np.broadcast_shapes(c.shape[:-1], mu.shape)
     except ValueError as error:
-        raise ShapeError(f"leading axes must fit together, got {c.shape[:-1]} and {mu.shape}") from error
+        raise ShapeError(f"leading axes must broadcast together, got {c.shape[:-1]} and {mu.shape}") from error
     return np.broadcast_to(c, (*lead, c.shape[-1])), np.broadcast_to(mu, lead)
 
 

@@ -99,7 +99,9 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     factor, reason = slowing_for_limits(planned.arm, planned.trajectory)
     if reason is not None and factor > 1 + ROUNDING:
         slowing = slower(planned.arm, factor, reason)
-        notes.append(f"run {slowing}" if keep_limits else f"the limits would hold {slowing}: --keep-limits does that")
+        notes.append(
+            f"run {slowing}" if keep_limits else f"the limits require a motion {slowing}; --keep-limits slows it down"
+        )
         planned = planned.slowed(factor) if keep_limits else planned
     for note in notes:
         print(f"armwright: {poses}: {note}", file=sys.stderr)

@@ -140,8 +140,8 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
         if not np.all(np.asarray(pivots[i].inertia) > NEGLIGIBLE * np.asarray(pivots[i].size)):
             what, amount = ("about", "moment of inertia") if arm.joints[i].revolute else ("along", "mass")
             raise UnsupportedArmError(
-                f"arm '{arm.name}': no acceleration can be found for {arm.called(i)}: nothing it moves resists {what} "
-                f"its axis while the joints beyond it are free. Give its link a {amount} or its motor an inertia."
+                f"arm '{arm.name}': the acceleration of {arm.called(i)} is undefined: what it moves has no inertia "
+                f"{what} its axis while the distal joints are free. Give its link a {amount} or its motor an inertia."
             )
 
 

@@ -58,7 +58,7 @@ def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> 
     except ValueError as error:
         names = ", ".join([*arrays, *([] if outside is None else ["wrench"])])
         shapes = ", ".join(str(array.shape) for array in everything)
-        raise ShapeError(f"{names}: leading axes must fit together, got {shapes}") from error
+        raise ShapeError(f"{names}: leading axes must broadcast together, got {shapes}") from error
     return Batch(
         lead=lead,
         scalars=[per_joint(np.broadcast_to(array, (*lead, arm.n))) for array in checked],
@@ -78,7 +78,7 @@ def weighed(arm: Arm) -> Arm:
             name = f" ('{link.name}')" if link.name else ""
             raise UnsupportedArmError(
                 f"arm '{arm.name}': no dynamics, for mass and inertia of link {i}{name} are unknown: {link.unknown}. "
-                "Kinematics does without them"
+                "Kinematics does not need them"
             )
     return arm
 

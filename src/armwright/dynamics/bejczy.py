@@ -178,7 +178,9 @@ def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
         UnsupportedArmError: the arm has other joints than a Stanford arm.
     """
     if [joint.revolute for joint in known_arm(arm).joints] != _KINDS:
-        raise UnsupportedArmError(f"arm '{arm.name}' is no Stanford arm: of six joints, the third alone must slide")
+        raise UnsupportedArmError(
+            f"arm '{arm.name}' is not a Stanford arm: expected six joints, of which only the third is prismatic"
+        )
     q = positions(arm, q)
     if q.ndim != 2 or len(q) < len(attrs.fields(Coefficients)):
         raise ShapeError(

@@ -174,7 +174,7 @@ def blend_timing(
     )
     way = np.diff(q, axis=0)
     for i in np.flatnonzero(np.abs(way).max(axis=1) <= NOWHERE):
-        raise InvalidValueError(f"blends: points {i + 1} and {i + 2} are the same point; leave one of them out")
+        raise InvalidValueError(f"blends: points {i + 1} and {i + 2} coincide; omit one of them")
     cruise = (np.abs(way) / speeds).max(axis=1)
     for i in np.flatnonzero(cruise == 0):
         raise InvalidValueError(f"speed: no joint that moves from point {i + 1} to point {i + 2} has a limit")
@@ -201,7 +201,7 @@ def blend_plan(times: ArrayLike, points: ArrayLike, blend: ArrayLike, ends: Ends
     t, q = timed_points("blends", times, points)
     one_of("kind of ends", ends, ("rest", "running"))
     if t[0] != 0:
-        raise InvalidValueError(f"blends: times must rise from 0, got {t[0]:g} s at point 1")
+        raise InvalidValueError(f"blends: times must increase from 0, got {t[0]:g} s at point 1")
     b = floats(blend, "blend", LARGEST)
     if b.shape not in ((), t.shape):
         raise ShapeError(f"blend: expected one number, or {len(t)}, one per point, got shape {b.shape}")
@@ -225,8 +225,8 @@ def _check_room(t: Array, b: Array) -> None:
     """Refuse blends that overlap."""
     for i in np.flatnonzero(b[:-1] + b[1:] > np.diff(t) * (1 + _ROUNDING)):
         raise InvalidValueError(
-            f"blends overlap on the path from point {i + 1} to point {i + 2}: they need {b[i]:g} s and {b[i + 1]:g} s "
-            f"of it, {b[i] + b[i + 1]:g} s together; it lasts {t[i + 1] - t[i]:g} s"
+            f"blends overlap on the segment from point {i + 1} to point {i + 2}: they need {b[i]:g} s and "
+            f"{b[i + 1]:g} s of it, {b[i] + b[i + 1]:g} s together; it lasts {t[i + 1] - t[i]:g} s"
         )
 
 

@@ -147,7 +147,7 @@ class Certificate:
         if uses := [f"{self.arm.called(joint)} uses {part:.0%} of its {name}" for name, joint, part in self._uses]:
             lines.append("; ".join(uses))
         if self.because is not None:
-            lines.append(slower(self.arm, self.factor, self.because, " than the tool speed has it"))
+            lines.append(slower(self.arm, self.factor, self.because, " than the tool speed requires"))
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -158,7 +158,7 @@ class Certificate:
 def slower(arm: Arm, factor: float, because: tuple[LimitName, int], than: str = "") -> str:
     """Say how many times slower a motion is, and for which limit of which joint, from 0."""
     limit, joint = because
-    return f"{factor:.2f} times slower{than}, for the {limit} of {arm.called(joint)}"
+    return f"{factor:.2f} times slower{than}, limited by the {limit} of {arm.called(joint)}"
 
 
 def slowing(arm: Arm, peaks: dict[LimitName, Array]) -> tuple[float, tuple[LimitName, int] | None]:

@@ -119,7 +119,7 @@ def _order(counted: Flags) -> int:
 
 def _smooth(order: int) -> str:
     if order < 0:
-        return "not even position is continuous"
+        return "position is discontinuous"
     names = NAMES[: order + 1]
     text = " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
     return f"{text} {'are' if len(names) > 1 else 'is'} continuous"

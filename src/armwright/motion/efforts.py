@@ -164,8 +164,8 @@ def refuse_lasting(arm: Arm, joint: int, effort: float, location: str) -> Incapa
     """Return the error for a position where holding the arm takes more than a joint, from 0, may give."""
     unit = arm.joints[joint].units.effort
     return IncapableArmError(
-        f"{location} gravity and dry friction alone ask {arm.called(joint)} for {abs(effort):.4g} {unit}, "
-        f"{arm.joints[joint].limits.effort:.4g} {unit} are allowed: no slowing helps"
+        f"{location} gravity and Coulomb friction alone require {abs(effort):.4g} {unit} of {arm.called(joint)}, "
+        f"{arm.joints[joint].limits.effort:.4g} {unit} are allowed: a slower motion is infeasible too"
     )
 
 
@@ -279,5 +279,5 @@ def _largest_part(arm: Arm, shares: _Shares, limits: Array) -> tuple[float, tupl
         u, binding = min(float(below[worst]), u * (1 - _ROUNDING)), (int(k[worst]), int(j[worst]))
         if u < _CRAWL:
             raise IncapableArmError(
-                f"{arm.called(binding[1])} would have to move {1 / u:.3g} times slower to keep its effort"
+                f"{arm.called(binding[1])} would have to move {1 / u:.3g} times slower to keep its effort limit"
             )

@@ -71,7 +71,7 @@ def through_knots(arm: Arm, knots: Array) -> Trajectory:
     """
     steps = np.abs(np.diff(knots, axis=0) / natural_speeds(arm, knots)).max(axis=1)
     for i in np.flatnonzero(steps <= _JUMP):
-        raise InvalidValueError(f"path: knots {i + 1} and {i + 2} are the same point; leave one of them out")
+        raise InvalidValueError(f"path: knots {i + 1} and {i + 2} coincide; omit one of them")
     times = np.concatenate([[0.0], np.cumsum(steps)])
     slopes = np.diff(knots, axis=0) / steps[:, None]
     if len(knots) == 2:

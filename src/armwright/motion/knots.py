@@ -31,7 +31,7 @@ def timed_points(title: str, times: ArrayLike, points: ArrayLike, what: str = "p
     if len(falls):
         i = int(falls[0])
         raise InvalidValueError(
-            f"{title}: times must rise, got {t[i]:g} s and then {t[i + 1]:g} s at {what[:-1]} {i + 1}"
+            f"{title}: times must increase, got {t[i]:g} s and then {t[i + 1]:g} s at {what[:-1]} {i + 1}"
         )
     return t, q
 
@@ -71,9 +71,9 @@ def check_duration(duration: float) -> float:
     """
     duration = number(duration, "duration")
     if not duration >= SHORTEST:
-        raise InvalidValueError(f"duration: expected more than 0 s, {SHORTEST:g} s at least, got {duration}")
+        raise InvalidValueError(f"duration: expected at least {SHORTEST:g} s, got {duration}")
     if duration > _MAX_LENGTH:
-        raise InvalidValueError(f"duration: expected {_MAX_LENGTH:g} s at most, got {duration:g}")
+        raise InvalidValueError(f"duration: expected at most {_MAX_LENGTH:g} s, got {duration:g}")
     return duration
 
 

@@ -41,7 +41,11 @@ class MoveAssessment:
         if move.certificate:
             notes.append(f"certificate {move.certificate}")
         for start, end, detour in zip(self.names, self.names[1:], move.detours, strict=False):
-            method = "a line" if detour.method == "line" else f"no line, {detour.obstacle}; detour by {detour.method}"
+            method = (
+                "a line"
+                if detour.method == "line"
+                else f"line infeasible, {detour.obstacle}; detour by {detour.method}"
+            )
             notes.append(f"{start} to {end}: {method}: {detour.price}")
         return tuple(notes)
 

@@ -31,7 +31,9 @@ _CLOSEST = 0.1
 def _poses(value: ArrayLike) -> Array:
     X = of_shape(value, (4, 4), "poses")
     if X.ndim != 3 or len(X) < 2:
-        raise InvalidValueError(f"path: expected at least two poses, got shape {X.shape}")
+        raise InvalidValueError(
+            f"path: expected an array of shape (n, 4, 4) with at least two poses, got shape {X.shape}"
+        )
     return X
 
 
@@ -112,7 +114,7 @@ def check_reach(arm: Arm) -> None:
     """
     if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
         raise IncapableArmError(
-            f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
+            f"arm '{arm.name}': Cartesian paths need its reach and its tool speed ([hand] in the arm file)"
         )
 
 

@@ -157,7 +157,7 @@ def _roots(rows: Array) -> Array:
 
 
 def _of_parabola(rows: Array) -> Array:
-    """Return the roots (r, 2) of a parabola, or of a line, without loss of digits; 0 for one that is not there."""
+    """Return the roots (r, 2) of a parabola, or of a line, without loss of digits; 0 for one that does not exist."""
     c, b, a = (rows[:, i] if i < rows.shape[1] else np.zeros(len(rows)) for i in range(3))
     q = -(b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * c, 0.0)), b)) / 2
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

@@ -66,20 +66,25 @@ def read_poses(path: Path | str) -> PosesFile:
     for i, table in enumerate(tables):
         name = table.text("name", default=str(i + 1))
         if name in names:
-            raise table.error("name", f"'{name}' is the name of an earlier pose")
+            raise table.error("name", f"'{name}' is already the name of an earlier pose")
         X, change = typed_pose(table)
         times.append(_time(table, times, timed=timed))
         blends.append(_blend(table, shared, timed=timed))
         table.finish()
         line = document.line(("pose", i)) or 1
         if change > _ROUNDING:
-            notes.append(f"line {line}: the rotation of pose {name} is none, by {change:.2g}; the nearest is taken")
+            notes.append(
+                f"line {line}: the rotation matrix of pose {name} is not orthonormal (error {change:.2g}); the "
+                "nearest rotation is used"
+            )
         names.append(name)
         poses.append(X)
         lines.append(line)
     if any(blend is not None for blend in blends) and None in blends:
         i = blends.index(None)
-        raise tables[i].error("blend_s", "missing; other poses have one: give it to all, or once at the top")
+        raise tables[i].error(
+            "blend_s", "missing; other poses have one: specify it for all poses, or once at the top level"
+        )
     return PosesFile(
         text=document.text,
         title=title,
@@ -96,19 +101,21 @@ def _time(table: Table, before: list[float | None], *, timed: bool) -> float | N
     """Read when a pose is passed: all of them report it, from 0 and rising, or none."""
     if not timed:
         if "time_s" in table:
-            raise table.error("time_s", "the first pose has none; give it to all poses or to none")
+            raise table.error("time_s", "the first pose has none; specify it for all poses or for none")
         table.allow("time_s")
         return None
     time = table.number("time_s")
     if not before and time != 0:
         raise table.error("time_s", f"the first pose is passed at 0 s, got {time:g}")
     if before and time <= (before[-1] or 0.0):
-        raise table.error("time_s", f"expected more than the {before[-1]:g} s of the pose before it, got {time:g}")
+        raise table.error("time_s", f"expected more than the {before[-1]:g} s of the previous pose, got {time:g}")
     return time
 
 
 def _blend(table: Table, shared: float | None, *, timed: bool) -> float | None:
     if not timed and (shared is not None or "blend_s" in table):
-        raise table.error("blend_s" if "blend_s" in table else None, "blends belong to poses with times; give time_s")
+        raise table.error(
+            "blend_s" if "blend_s" in table else None, "blends are allowed only for poses with times; specify time_s"
+        )
     table.allow("blend_s")
     return table.positive("blend_s") if "blend_s" in table else shared

@@ -80,7 +80,8 @@ def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float
     shortest = shortest_duration(arm, way)
     if shortest == 0:
         raise IncapableArmError(
-            f"arm '{arm.name}': no joint that moves has a limit of speed or acceleration, so the move has no duration"
+            f"arm '{arm.name}': no moving joint has a limit of speed or acceleration, so the duration of the move "
+            "is undefined"
         )
     return quintic(start, goal, shortest * TOP_SPEED / speed)
 

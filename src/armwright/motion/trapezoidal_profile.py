@@ -103,7 +103,7 @@ def _limits(way: Array, speed: ArrayLike, acceleration: ArrayLike) -> _Limits | 
     joints = int(by_speed.argmin()), int(by_acceleration.argmin())
     v, a = float(by_speed.min()), float(by_acceleration.min())
     if not math.isfinite(a):
-        raise InvalidValueError("acceleration: no joint that moves has a limit, so the speed would jump")
+        raise InvalidValueError("acceleration: no moving joint has a limit, so the velocity would be discontinuous")
     return _Limits(v, a, joints)
 
 
@@ -117,5 +117,5 @@ def _too_short(way: Array, limits: _Limits, requested: float, shortest: float) -
     j = fastest if v * v < a else hardest
     return (
         f"duration: {requested:g} s is too short for joint {j + 1}, whose travel of {abs(way[j]):.6g} takes "
-        f"{shortest:.6g} s inside the limits"
+        f"at least {shortest:.6g} s within the limits"
     )

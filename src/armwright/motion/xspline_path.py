@@ -158,8 +158,8 @@ def xspline_along(
     k, j = np.unravel_index(int((jumps / allowed).argmax()), jumps.shape)
     raise InvalidValueError(
         f"X-spline: with {len(spline.times)} knots the acceleration of joint {j + 1} still jumps by {jumps[k, j]:.6g} "
-        f"at {spline.times[k + 1]:g} s, {allowed[j]:g} is allowed; the curve has a corner there, or another rate at "
-        "its start or end than was given"
+        f"at {spline.times[k + 1]:g} s, {allowed[j]:g} is allowed; the curve has a corner there, or its rate at the "
+        "start or end differs from the specified one"
     )
 
 
@@ -175,7 +175,7 @@ def _parameters(h: Array, a: ArrayLike | None, b: ArrayLike | None) -> tuple[Arr
     sums = np.abs(given_a) + np.abs(given_b)
     for i in np.flatnonzero(sums >= 1):
         raise InvalidValueError(
-            f"X-spline: |a| + |b| must be below 1 for one spline to exist and no other, got {sums[i]:g} at knot "
+            f"X-spline: |a| + |b| must be below 1 for the spline to exist and be unique, got {sums[i]:g} at knot "
             f"{i + 1} (a = {given_a[i]:g}, b = {given_b[i]:g})"
         )
     return np.asarray(given_a), given_b

@@ -40,9 +40,9 @@ class Status(Enum):
     """How a simulation ended."""
 
     FINISHED = "finished"
-    IMPRECISE = "a step could not be made as precise as asked"
-    DIVERGED = "a position or speed became larger than any of a robot"
-    ENTANGLED = "events followed one another without time going on"
+    IMPRECISE = "a step could not reach the requested accuracy"
+    DIVERGED = "a position or speed became unreasonably large"
+    ENTANGLED = "events followed one another without time advancing"
 
 
 class Event(NamedTuple):
@@ -81,7 +81,7 @@ class Brake:
     def __attrs_post_init__(self) -> None:
         """Refuse a brake of no joint, and one that goes off before it goes on."""
         if isinstance(self.joint, bool) or not isinstance(self.joint, Integral):
-            raise KindError(f"brake: expected the number of a joint, from 0, got {shown(self.joint)}")
+            raise KindError(f"brake: expected the index of a joint, from 0, got {shown(self.joint)}")
         if not 0 <= number(self.start, "brake: start") < number(self.end, "brake: end"):
             raise InvalidValueError(f"brake: start {self.start} must be 0 or later, and before end {self.end}")
 

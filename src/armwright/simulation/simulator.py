@@ -34,8 +34,8 @@ _ENTANGLED = 50
 _INSTANT = 1e-9
 # Part of a period that rounding may shift a sample by.
 _CRUMB = 1e-9
-# More moments than this are no result that anybody checks, and fill the memory.
-_MOMENTS = 10**7
+# More samples than this would exhaust the memory.
+_MAX_SAMPLES = 10**7
 # No position or speed of a robot is as large; of larger angles no sine means anything.
 _LOST = LARGEST_ANGLE
 
@@ -62,7 +62,7 @@ def simulate(
         duration: how long [s].
         controller: gives the efforts of the drives; off when left out.
         integrator: ``Gill`` with its step, or ``Adaptive`` with its tolerances.
-        period: time between two moments of the result [s].
+        period: time between two samples of the result [s].
         brakes: which are on, and when.
         stops: whether position limits are stops, which take all energy of a joint that meets them.
         saturation: whether effort limits bound what the drives do.
@@ -74,7 +74,7 @@ def simulate(
         KindError: ``arm`` is no arm, a number none, or controller, integrator or a brake something else.
         ShapeError: ``q``, ``qd`` or what the controller returns are not n long.
         InvalidValueError: the arm starts outside its stops, a time is not above 0, a number is not finite, a brake has
-            no joint, or the result would have too many moments.
+            no joint, or the result would have too many samples.
         UnsupportedArmError: some joint moves nothing that resists an acceleration.
 
     Source:
@@ -84,10 +84,10 @@ def simulate(
     start = single_configuration(arm, q)
     speed = np.zeros(arm.n) if qd is None else one_per_joint(qd, arm.n, "qd")
     duration, period = positive(duration, "duration", "s"), positive(period, "period", "s")
-    if duration / period > _MOMENTS:
+    if duration / period > _MAX_SAMPLES:
         raise InvalidValueError(
-            f"duration: {duration:g} s, one moment every {period:g} s, would be {duration / period:.3g} moments; "
-            f"expected at most {_MOMENTS:g}: make the duration shorter or the period longer"
+            f"duration: {duration:g} s, one sample every {period:g} s, would be {duration / period:.3g} samples; "
+            f"expected at most {_MAX_SAMPLES:g}: make the duration shorter or the period longer"
         )
     _check_kinds(controller, integrator, brakes)
     unlimited = np.full(arm.n, np.inf)
@@ -141,7 +141,7 @@ def _check(plant: Plant, q: Array, qd: Array) -> None:
         position, lower, upper = (float(x[i]) / units.scale for x in (q, plant.lower, plant.upper))
         raise InvalidValueError(
             f"{arm.called(int(i))} starts at {position:g} {unit}, outside its stops at {lower:g} and {upper:g} {unit}; "
-            "start inside, or simulate without stops"
+            "start between them, or simulate without stops"
         )
     for brake in plant.brakes:
         if not 0 <= brake.joint < arm.n:

@@ -21,7 +21,9 @@ def one_pose(value: ArrayLike, what: str = "pose") -> Array:
     """
     X = exact_shape(value, (4, 4), what)
     if orthonormality_error(X[:3, :3]) > _ROUNDING or not np.array_equal(X[3], (0, 0, 0, 1)):
-        raise InvalidValueError(f"{what}: expected a rotation, a position and the row 0 0 0 1, got {X.tolist()}")
+        raise InvalidValueError(
+            f"{what}: expected a homogeneous transformation (rotation, position, last row 0 0 0 1), got {X.tolist()}"
+        )
     return X
 
 
