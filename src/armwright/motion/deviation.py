@@ -241,15 +241,16 @@ def cubic_peaks(c: Array, lengths: Array) -> tuple[Array, Array]:
     return speed, np.maximum(np.abs(bend), np.abs(bend_end))
 
 
-def turning_points(c: Array, lengths: Array) -> Array:
-    """Return the times (2, m, n) at which cubics (m, 4, n) reverse, exactly; an end where there is no such time."""
+def turning_positions(c: Array, lengths: Array) -> Array:
+    """Return the positions (2, m, n) where cubics (m, 4, n) reverse, exactly; at an end where they do not."""
     a, b, start = 3 * c[:, 3], c[:, 2], c[:, 1]
     root = np.sqrt(np.maximum(b * b - a * start, 0.0))
     # Of a t² + 2 b t + start = 0 the root of larger size without cancellation, and the other by their product.
     large = -b - np.copysign(root, b)
     with np.errstate(divide="ignore", invalid="ignore"):
         times = np.stack([large / a, start / large])
-    return np.clip(np.nan_to_num(times, nan=0.0, posinf=0.0, neginf=0.0), 0.0, lengths[:, None])
+    t = np.clip(np.nan_to_num(times, nan=0.0, posinf=0.0, neginf=0.0), 0.0, lengths[:, None])
+    return np.asarray(((c[:, 3] * t + c[:, 2]) * t + c[:, 1]) * t + c[:, 0])
 
 
 def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:

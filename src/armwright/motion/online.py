@@ -18,6 +18,7 @@ from armwright.arrays import LARGEST, Array, ArrayLike, floats, not_negative, on
 from armwright.errors import ArmwrightError, InvalidValueError
 from armwright.extras import import_extra
 from armwright.kinematics.inverse_kinematics.solution import violations
+from armwright.motion.deviation import turning_positions
 from armwright.motion.efforts import checked
 from armwright.motion.trajectory import Trajectory, hold, join
 
@@ -306,7 +307,14 @@ def _after(h: Array, q: Array, qd: Array, qdd: Array, jerk: Array) -> tuple[Arra
 
 def _check_range(task: _Task, motion: Trajectory) -> None:
     """Refuse a motion that passes the end of a joint's range; one that begins beyond it may come back."""
-    for extreme, worse in zip(motion.extremes(0), (np.less, np.greater), strict=True):
+    # The goal, with which the last segment ends, has been checked.
+    positions = np.concatenate(
+        [motion.coefficients[:, 0], *turning_positions(motion.coefficients, np.diff(motion.times))]
+    )
+    lowest, highest = positions.min(axis=0), positions.max(axis=0)
+    if (lowest >= task.arm.limit("lower")).all() and (highest <= task.arm.limit("upper")).all():
+        return
+    for extreme, worse in ((lowest, np.less), (highest, np.greater)):
         for fault in violations(task.arm, extreme):
             if worse(fault.value, fault.limit) and worse(fault.value, task.q[fault.joint - 1]):
                 raise OnlineError(f"on its motion to the new goal {fault}: it moves too fast to stop before")

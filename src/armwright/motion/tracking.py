@@ -22,7 +22,7 @@ from armwright.motion.deviation import (
     cubic_peaks,
     hand_bounds,
     tracking_error,
-    turning_points,
+    turning_positions,
 )
 from armwright.motion.knots import divided
 from armwright.motion.obstruction import (
@@ -68,7 +68,7 @@ class Task(NamedTuple):
         whole_turns: whether joints may start revolutions away, to be inside their limits later.
         clock: when times of the motion are passed at the speed that is asked for [s], where a motion is timed later;
             None where limits and speeds do not stop the arm when it is searched for what does.
-        max_slowdown: how many times as fast as it may a joint may have to be, before more knots are put for it.
+        max_slowdown: how many times as fast as its limit a joint may have to be, before more knots are put for it.
         max_knots: that are put.
     """
 
@@ -137,7 +137,7 @@ def too_far(task: Task, tracking: Tracking) -> Obstruction:
     joint, near = int(jump.argmax()) + 1, nearest_singularity(arm, q)
     reason = (
         f"the tool cannot be kept within {task.tolerance.position * 1e3:.3g} mm of its path: the arm is singular "
-        f"there ({near}), {arm.called(joint - 1)} would have to move at once"
+        f"there ({near}), {arm.called(joint - 1)} would have to move infinitely fast"
     )
     return Obstruction("singular", time, joint, reason)
 
@@ -153,7 +153,7 @@ def check_velocities(task: Task, tracking: Tracking) -> None:
     """Refuse a motion that could only be crawled along.
 
     Raises:
-        PathError: a joint would have to move so many times as fast as it may.
+        PathError: a joint would have to move so many times as fast as its limit.
     """
     ratio = _velocity_ratios(task, tracking.trajectory, tracking.speed)
     if ratio.max() > _TRACKED * MAX_SLOWDOWN:
@@ -164,7 +164,7 @@ def check_velocities(task: Task, tracking: Tracking) -> None:
 
 
 def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
-    """Return how many times as fast as it may each joint is on each interval (m, n), at the speed that is asked for.
+    """Return how many times as fast as its limit each joint is on each interval (m, n), at the speed that is asked for.
 
     Args:
         task: what is followed.
@@ -255,7 +255,5 @@ def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Arr
 
 def _between_knots(arm: Arm, trajectory: Trajectory) -> Obstruction | None:
     """Return the limit that a spline passes between two knots which keep it, if there is one."""
-    c = trajectory.coefficients
-    t = turning_points(c, np.diff(trajectory.times))
-    q = ((c[:, 3] * t + c[:, 2]) * t + c[:, 1]) * t + c[:, 0]
-    return beyond_limits(arm, q[0], trajectory.times) or beyond_limits(arm, q[1], trajectory.times)
+    first, second = turning_positions(trajectory.coefficients, np.diff(trajectory.times))
+    return beyond_limits(arm, first, trajectory.times) or beyond_limits(arm, second, trajectory.times)
