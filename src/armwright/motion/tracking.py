@@ -22,7 +22,7 @@ from armwright.motion.deviation import (
     cubic_peaks,
     hand_bounds,
     tracking_error,
-    turning_points,
+    turning_positions,
 )
 from armwright.motion.knots import divided
 from armwright.motion.obstruction import (
@@ -255,7 +255,5 @@ def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Arr
 
 def _between_knots(arm: Arm, trajectory: Trajectory) -> Obstruction | None:
     """Return the limit that a spline passes between two knots which keep it, if there is one."""
-    c = trajectory.coefficients
-    t = turning_points(c, np.diff(trajectory.times))
-    q = ((c[:, 3] * t + c[:, 2]) * t + c[:, 1]) * t + c[:, 0]
-    return beyond_limits(arm, q[0], trajectory.times) or beyond_limits(arm, q[1], trajectory.times)
+    first, second = turning_positions(trajectory.coefficients, np.diff(trajectory.times))
+    return beyond_limits(arm, first, trajectory.times) or beyond_limits(arm, second, trajectory.times)
