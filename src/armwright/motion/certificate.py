@@ -42,15 +42,15 @@ class Certificate:
 
     arm: Arm
     deviation_tolerance: float
-    deviation: float = 0.0
-    deviation_sampled: float = 0.0
+    deviation: float
+    deviation_sampled: float
     rotation_tolerance: float
-    rotation: float = 0.0
-    rotation_sampled: float | None = 0.0
-    worst_time: float = 0.0
+    rotation: float
+    rotation_sampled: float | None
+    worst_time: float
     worst_position: Array
-    knots: int = 1
-    samples: int = 0
+    knots: int
+    samples: int
     peaks: dict[LimitName, Array]
     factor: float = 1.0
     because: tuple[LimitName, int] | None = None

@@ -171,8 +171,15 @@ def standstill(solver: Solver, q: Array, allowed: Tolerance) -> CertifiedMotion:
     certificate = Certificate(
         arm=solver.arm,
         deviation_tolerance=allowed.position,
+        deviation=0.0,
+        deviation_sampled=0.0,
         rotation_tolerance=allowed.orientation,
+        rotation=0.0,
+        rotation_sampled=0.0,
+        worst_time=0.0,
         worst_position=solver.forward(q)[:3, 3],
+        knots=1,
+        samples=0,
         peaks=dict.fromkeys(LIMITS, np.zeros(solver.arm.n)),
         backward=0.0,
     )
