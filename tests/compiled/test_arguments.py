@@ -100,7 +100,7 @@ def test_degrees_by_mistake(fast: CompiledArm, lead: tuple[int, ...]) -> None:
     q[..., 1] = 90.0
 
     for function in (fast.forward, fast.kernel("forward")):
-        with pytest.warns(UnitWarning, match="q: joint 2 of 'puma560' stands at 90 rad, 14.3 turns") as caught:
+        with pytest.warns(UnitWarning, match="q: joint 2 of 'puma560' is at 90 rad, 14.3 revolutions") as caught:
             X = function(q)
         assert [one.filename for one in caught] == [__file__]
         np.testing.assert_allclose(X, np.broadcast_to(forward_in_silence(q[..., :].reshape(-1, 6)[0]), X.shape))

@@ -145,7 +145,7 @@ def test_an_arm_that_moves_nothing() -> None:
     light = Arm(name="light", joints=[Joint(kind="revolute", a=1.0)] * 2, links=[Link(mass=1.0), Link()])
 
     for shape in ((2,), (5, 2)):
-        with pytest.raises(UnsupportedArmError, match="no acceleration can be found for joint 2"):
+        with pytest.raises(UnsupportedArmError, match="the acceleration of joint 2 is undefined"):
             compile_arm(light).forward_dynamics(np.zeros(shape), np.zeros(shape), np.zeros(shape))
 
 

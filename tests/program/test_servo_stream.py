@@ -182,8 +182,8 @@ def test_too_deep() -> None:
     said = error.diagnostic
 
     assert (said.code, "deeper than 5 mm" in said.message) == ("E404", True)
-    assert any("cannot be avoided" in note for note in said.notes)
-    assert "come down more slowly" in said.helps[0]
+    assert any("unavoidable" in note for note in said.notes)
+    assert "use a lower speed" in said.helps[0]
     (stop,) = (effect for effect in recording.effects if effect.kind == "STOP")
     depth = 0.045 - recording.tree.world("ARM_1")[2, 3]
     assert depth > 0.005
