@@ -12,8 +12,8 @@ from armwright.errors import FileFormatError
 from armwright.program import Source, compile as translate
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.bytecode.instructions import Op
-from armwright.program.bytecode.verifier import CodeError
-from armwright.program.bytecode.verify import verify
+from armwright.program.bytecode.verifier import CodeError, Flow, State, Verifier
+from armwright.program.bytecode.verify import apply_rule, verify
 from armwright.program.vm.interpreter import Limits, RunError, interpret
 from program.running import cell_of, code_of, corpus_text
 from program.shelf import ACCEPTED, cell_of as told_cell
@@ -99,6 +99,68 @@ def test_refused(program: str, old: str, new: str, fault: str) -> None:
         assemble(changed, "x.rlc")
 
     assert re.match(r"x\.rlc:\d+: ", str(caught.value))
+
+
+def _assembled(steps: list[str], *constants: str) -> str:
+    """Return the text of intermediate code with one scalar, an array of scalars and three frames."""
+    names = "".join(f"var {name}\n" for name in ("N SCALAR", "S ARRAY [3] OF SCALAR", "A FRAME", "B FRAME"))
+    numbers = "".join(f"constant c{index} {value}\n" for index, value in enumerate(constants))
+    code = "".join(f"{number:04d} 1:1+0! {step}\n" for number, step in enumerate(steps))
+    return f'program "x.rlo"\nunits MM DEG\n{names}{numbers}code\n{code}source\n|\n'
+
+
+def _ladder(rungs: int) -> str:
+    """Return code with many jumps to one instruction, in front of each of which another value has been written."""
+    below = 2 * rungs + 2
+    climb = [step for rung in range(rungs) for step in (f"COPY %{rung} 1.0", f"JZ N @{below:04d}")]
+    return _assembled(["COPY N 1.0", *climb, "STOP", *["COPY N 1.0"] * rungs, "STOP"])
+
+
+def test_code_is_gone_through_once() -> None:
+    """What many jumps lead to is followed once, however much is certain in front of each of them."""
+    code = assemble(_ladder(200), "x.rlc")
+    followed = []
+
+    def rule(verifier: Verifier, state: State) -> Flow:
+        followed.append(verifier.at)
+        return apply_rule(verifier, state)
+
+    Verifier(code, rule).follow()
+
+    assert len(followed) <= 2 * len(code.instructions)
+
+
+@pytest.mark.parametrize(
+    ("steps", "fault"),
+    [
+        (["COPY N 1e101", "STOP"], "expected a number from -1e+100 to 1e+100, got 1e+101"),
+        (['PRINT "\\ud800"', "STOP"], 'expected text in ""'),
+        (
+            [*(f"TRY @{499 - n:04d}" for n in range(250)), *(f"ENDT @{n + 1:04d}" for n in range(250, 500)), "STOP"],
+            "more than 200 instructions TRY are nested",
+        ),
+    ],
+)
+def test_beyond_what_can_be_run(steps: list[str], fault: str) -> None:
+    """Numbers beyond the largest, half a character, and TRYs too deep in one another are refused when code is read."""
+    with pytest.raises(FileFormatError, match=re.escape(fault)):
+        assemble(_assembled(steps), "x.rlc")
+
+
+def test_constants_beyond_the_largest() -> None:
+    """Constants are bounded like the results of operations."""
+    with pytest.raises(FileFormatError, match=re.escape("expected numbers from -1e+100 to 1e+100")):
+        assemble(_assembled(["LOADS N c0", "STOP"], "1e200"), "x.rlc")
+
+
+def test_world_is_not_moved() -> None:
+    """Code that moves WORLD, which the compiler refuses, ends with the error of a frame that no arm carries."""
+    pose = "1 0 0 0 1 0 0 0 1 0.4 0 0.2"
+    code = assemble(_assembled(["LOADM A c0", "MVBEG WORLD A", "MVDIR", "MVEND", "STOP"], pose), "x.rlc")
+    cell = cell_of("cell1")
+
+    with pytest.raises(RunError, match="`WORLD` cannot be moved"):
+        interpret(code, cell, Simulator(cell), limits=LIMITS)
 
 
 def test_read_before_it_is_written() -> None:

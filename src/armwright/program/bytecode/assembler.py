@@ -178,10 +178,10 @@ class _Reader:
                 break
             if not row.startswith("| ") and row != "|":
                 self._fail("expected a line of the program text, which begins with `| `")
-            try:
-                lines.append(json.loads(f'"{row[2:]}"'))
-            except ValueError:
+            line = _json_text(f'"{row[2:]}"')
+            if line is None:
                 self._fail("expected the characters of a JSON string")
+            lines.append(line)
         return self._rows[:at], "\n".join(lines)
 
     def _read_program(self, rest: str) -> None:
@@ -311,11 +311,8 @@ class _Reader:
         return text.upper()
 
     def _string(self, text: str) -> str:
-        try:
-            value = json.loads(text)
-        except (ValueError, RecursionError):
-            value = None
-        if not isinstance(value, str):
+        value = _json_text(text)
+        if value is None:
             self._fail(f'expected text in "", got {shown(text)}')
         return value
 
@@ -331,3 +328,15 @@ class _Reader:
     def _fail(self, message: str, near: str | None = None) -> NoReturn:
         hint = f"; did you mean {near!r}?" if near else ""
         raise FileFormatError(self._file, self._number, "", f"{message}{hint}")
+
+
+def _json_text(text: str) -> str | None:
+    """Return the text that a JSON string stands for; None if it is none."""
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    # JSON can write half of a surrogate pair, which no file or terminal can.
+    if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):
+        return None
+    return value

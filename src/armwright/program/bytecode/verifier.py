@@ -1,6 +1,7 @@
 """Following intermediate code: what is certain in front of each instruction, on every way there."""
 
 import enum
+import heapq
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
@@ -164,39 +165,56 @@ class Verifier:
     def follow(self) -> None:
         """Follow every routine, until nothing new is learnt of any instruction.
 
+        Stretches are taken in the order of their instructions: what leads forward to one is known before it is
+        followed, so that code is gone through once, and loops again where less is certain at their end.
+
         Raises:
             CodeError: an instruction cannot be interpreted.
         """
         while self._entries:
             self.entry = self._entries.pop()
-            waiting = [(self.entry.at, self.entry.state)]
+            waiting: list[int] = []
+            self._lead_to(self.entry.at, self.entry.state, waiting)
             while waiting:
-                waiting += self._follow_on(*waiting.pop())
+                number = heapq.heappop(waiting)
+                if not waiting or waiting[0] != number:  # it may wait more than once
+                    self._follow_on(number, waiting)
 
-    def _follow_on(self, number: int, state: State) -> list[tuple[int, State]]:
-        """Follow one stretch to its end; return where else it leads."""
-        targets: list[tuple[int, State]] = []
+    def _follow_on(self, number: int, waiting: list[int]) -> None:
+        """Follow one stretch, up to where paths meet."""
+        state, last = self._known[number], len(self.code.instructions) - 1
         while True:
-            self.at = number
-            owner = self._owners.setdefault(number, self.entry)
-            if (owner.at, owner.routine, owner.begun) != (self.entry.at, self.entry.routine, self.entry.begun):
-                raise self.wrong(f"{self.entry.routine.value} leads to an instruction of another routine")
-            if number in self._merges or number == self.entry.at:
-                merged = self._merged(self._known.get(number), state)
-                if merged == self._known.get(number):
-                    return targets
-                self._known[number] = state = merged
+            self._enter(number)
             flow = self._rule(self, state)
-            targets += [] if flow.target is None else [flow.target]
+            if flow.target is not None:
+                self._lead_to(*flow.target, waiting)
+                self.at = number
             if not flow.falls:
-                return targets
-            state, number = flow.state, number + 1
-            if number == len(self.code.instructions):
+                return
+            if number == last:
                 raise self.wrong("execution would continue after the last instruction")
+            state, number = flow.state, number + 1
+            if number in self._merges:
+                self._lead_to(number, state, waiting)
+                return
 
-    def _merged(self, old: State | None, new: State) -> State:
-        if old is None:
-            return new
+    def _lead_to(self, number: int, state: State, waiting: list[int]) -> None:
+        """Let a path lead to an instruction; it is followed on from there where less is certain than before."""
+        self._enter(number)
+        old = self._known.get(number)
+        merged = state if old is None else self._merged(old, state)
+        if merged != old:
+            self._known[number] = merged
+            heapq.heappush(waiting, number)
+
+    def _enter(self, number: int) -> None:
+        """Go to an instruction, which belongs to one routine alone."""
+        self.at = number
+        owner = self._owners.setdefault(number, self.entry)
+        if (owner.at, owner.routine, owner.begun) != (self.entry.at, self.entry.routine, self.entry.begun):
+            raise self.wrong(f"{self.entry.routine.value} leads to an instruction of another routine")
+
+    def _merged(self, old: State, new: State) -> State:
         if (old.attempts, old.locks) != (new.attempts, new.locks):
             raise self.wrong("two paths lead here that differ in their open TRYs or LOCKs")
         return attrs.evolve(new, written=old.written & new.written)

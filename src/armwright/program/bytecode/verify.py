@@ -6,7 +6,6 @@ LOCK, FORK and MOVE are closed as they were opened. What depends on values or on
 arm that the cell does not have) is left to the run, which has messages for it.
 """
 
-import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeAlias
@@ -14,6 +13,7 @@ from typing import TypeAlias
 import attrs
 import numpy as np
 
+from armwright.arrays import LARGEST
 from armwright.errors import counted
 from armwright.program.bytecode.instructions import Code, Constant, JumpTarget, Op, Operand, Text
 from armwright.program.bytecode.verifier import (
@@ -136,6 +136,9 @@ _OF_CONDITIONS = {
 _PARTS = {Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON}
 _ENDS = {Op.STOP, Op.RET, Op.QUIT, Op.JMP, Op.HALT, Op.MVHLT, Op.ENDT, Op.RETRY}
 
+# TRYs and LOCKs in one another; the compiler refuses programs with as many.
+_MAX_NESTING = 200
+
 Rule: TypeAlias = Callable[[Verifier, State], Flow]
 
 
@@ -147,10 +150,10 @@ def verify(code: Code) -> None:
     """
     for fault in (*_wrong_operands(code), *_wrong_neighbours(code), *_wrong_ends(code)):
         raise fault
-    Verifier(code, _rule).follow()
+    Verifier(code, apply_rule).follow()
 
 
-def _rule(verifier: Verifier, state: State) -> Flow:
+def apply_rule(verifier: Verifier, state: State) -> Flow:
     """Check one instruction: its operands, what it writes, and what it does to the flow."""
     op, operands, signature = verifier.op, verifier.operands, _SIGNATURES[verifier.op]
     if verifier.entry.routine is Routine.CONDITION and op not in _OF_CONDITIONS:
@@ -220,8 +223,8 @@ def _wrong_ends(code: Code) -> Iterator[CodeError]:
         yield CodeError(last, "execution would continue after the last instruction")
     for index, value in enumerate(code.constants):
         numbers = np.array(value)
-        if not np.isfinite(numbers).all():
-            yield CodeError(0, f"constant c{index}: expected finite numbers")
+        if not (np.abs(numbers) <= LARGEST).all():
+            yield CodeError(0, f"constant c{index}: expected numbers from {-LARGEST:g} to {LARGEST:g}")
         elif numbers.size > 1 and not orthonormality_error(numbers[:9].reshape(3, 3).T) <= EXACT:
             yield CodeError(0, f"constant c{index}: expected a pose, but its first nine numbers are not a rotation")
 
@@ -246,8 +249,8 @@ def _fault(operand: Operand, instructions: int, constants: int) -> str:
             return f"there is no instruction @{index:04d}"
         case Constant(index=index) if not 0 <= index < constants:
             return f"there is no constant c{index}"
-        case float() | int() if not math.isfinite(operand):
-            return f"expected a finite number, got {operand:g}"
+        case float() | int() if not abs(operand) <= LARGEST:
+            return f"expected a number from {-LARGEST:g} to {LARGEST:g}, got {operand:g}"
         case _:
             return ""
 
@@ -293,7 +296,13 @@ def _guard(verifier: Verifier, state: State) -> Flow:
 def _lock(verifier: Verifier, state: State) -> Flow:
     for operand in verifier.operands:
         verifier.type_of(state, operand)
+    _check_nesting(verifier, state.locks)
     return Flow(attrs.evolve(state, locks=(*state.locks, verifier.operands)))
+
+
+def _check_nesting(verifier: Verifier, around: Sequence[object]) -> None:
+    if len(around) >= _MAX_NESTING:
+        raise verifier.wrong(f"more than {_MAX_NESTING} instructions {verifier.op} are nested")
 
 
 def _unlock(verifier: Verifier, state: State) -> Flow:
@@ -340,6 +349,7 @@ def _fork(verifier: Verifier, state: State) -> Flow:
 
 
 def _try(verifier: Verifier, state: State) -> Flow:
+    _check_nesting(verifier, state.attempts)
     trying, recovering = (
         attrs.evolve(state, attempts=(*state.attempts, Attempt(verifier.at, recovers, state.locks)))
         for recovers in (False, True)

@@ -1,5 +1,6 @@
 """Values of expressions: constants, operations, elements of arrays, measured forces."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 from armwright.program.bytecode.instructions import Constant, Instruction, Op
@@ -38,7 +39,7 @@ def _element(machine: Machine, process: Process, step: Instruction) -> None:
     indices = []
     for number, (operand, size) in enumerate(zip(step.operands[2:], sizes, strict=True), 1):
         value = machine.number(process, operand, step)
-        index = round(value)
+        index = round(value) if math.isfinite(value) else 0
         if abs(value - index) > _WHOLE or not 1 <= index <= size:
             which = f"index {number}" if len(sizes) > 1 else "the index"
             text = f"{which} of `{machine.spelled(array)}` is {value:g}, not an integer from 1 to {size}"

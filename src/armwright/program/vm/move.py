@@ -147,12 +147,13 @@ def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction)
             machine.grow(machine.state.tree.affix(moved, name), moved, begin.span)
             return name, True
     spelled, likely = machine.spelled(moved), process.last_arm or min(machine.cell.arms, default="ARM_1")
+    parent = next(iter(machine.state.tree.ancestors(moved)), None)
     raise machine.error(
         process,
         "E301",
         f"`{spelled}` cannot be moved: it is not affixed to an arm",
         begin.span,
-        f"is attached to {machine.spelled(machine.state.tree.ancestors(moved)[0])}, not to an arm",
+        "is the root of all frames" if parent is None else f"is attached to {machine.spelled(parent)}, not to an arm",
         secondary=machine.origin(moved, f"{spelled} got its pose here"),
         helps=[f"grasp it and write `AFFIX {spelled} TO {likely}`"],
     )
