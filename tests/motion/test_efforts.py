@@ -6,13 +6,18 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.errors import InvalidValueError, KindError, ShapeError
+from armwright.errors import ArmwrightError, InvalidValueError, KindError, ShapeError
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.efforts import _largest_part, _Shares, effort_peaks, slowing_for_efforts
 from armwright.motion.quintic_polynomials import PEAK_ACCELERATION, quintic
+from armwright.motion.straight import straight_line
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.motion.xspline_path import xspline
+from armwright.spatial import pose
+from samples import Sample
 
 PUMA = load_arm("puma560-seed")
 # Looks are so close that a peak between them is missed by no more than this part of it.
@@ -159,6 +164,64 @@ def test_compiled_arms_give_the_same(rng: np.random.Generator) -> None:
 
     assert compiled.factor == pytest.approx(plain.factor, rel=1e-9)
     assert compiled.joint == plain.joint
+
+
+def with_efforts(arm: Arm, efforts: Array) -> Arm:
+    """Return an arm with other limits of its efforts."""
+    joints = [
+        attrs.evolve(joint, limits=attrs.evolve(joint.limits, effort=float(effort)))
+        for joint, effort in zip(arm.joints, efforts, strict=True)
+    ]
+    return attrs.evolve(arm, joints=joints)
+
+
+def largest_efforts(arm: Arm, motion: Trajectory) -> Array:
+    """Return the largest efforts at 20,001 samples of a motion; a joint that stands has no dry friction."""
+    q, qd, qdd = (motion(np.linspace(0.0, motion.duration, 20_001), order) for order in range(3))
+    qd = np.where(np.abs(qd) > 1e-9 * np.abs(qd).max(axis=0), qd, 0.0)
+    return np.abs(inverse_dynamics(arm, q, qd, qdd)).max(axis=0)
+
+
+def test_a_peak_in_a_short_segment() -> None:
+    """A line of 28 s whose joint 4 needs most of its effort in the first 0.05 s is slowed for it."""
+    arm = load_arm("stanford")
+    q = [-0.09116367553301963, 2.5548051222950656, 0.8509637348433636, -0.2192383721565725, 0.0, -0.9985726058719773]
+    X = np.array([
+        [0.506390447178793, -0.7405468106669546, 0.4417681928535191, 0.6127010789618474],
+        [-0.7916464336590081, -0.6023553095365322, -0.10229371998379107, 0.058155257373951906],
+        [0.3418547046349309, -0.29792365177029906, -0.891278216178772, -0.5107244693167673],
+        [0.0, 0.0, 0.0, 1.0],
+    ])  # fmt: skip
+    limit = arm.limits.effort.copy()
+    limit[3] = 1.1155
+
+    line = straight_line(with_efforts(arm, limit), q, X, deviation=3.03e-3, rotation=1.99e-3, speed=1.0)
+
+    assert largest_efforts(arm, line.trajectory)[3] <= limit[3] * (1 + SEEN)
+    assert line.certificate.peaks["effort"][3] == pytest.approx(limit[3], rel=SEEN)
+
+
+@pytest.mark.share(0.03)
+def test_lines_keep_their_efforts(sample: Sample) -> None:
+    """Lines of arms whose motors are about as strong as they need keep the limits of efforts between samples, too."""
+    arms = [load_arm(name) for name in ("puma560", "stanford", "ur5")]
+    worst, run = 0.0, 0
+    for rng in sample.cases(1000):
+        arm = arms[rng.integers(3)]
+        lower, upper = np.maximum(arm.limits.lower, -np.pi), np.minimum(arm.limits.upper, np.pi)
+        q = lower + (upper - lower) * rng.uniform(0.05, 0.95, arm.n)
+        X = forward(arm, q) @ pose(rpy=rng.uniform(-0.3, 0.3, 3), position=rng.normal(size=3) * 0.15)
+        speed = float(rng.choice([1.0, 10.0, 100.0, 120.0]))
+        try:
+            needs = largest_efforts(arm, straight_line(arm, q, X, speed=speed).trajectory)
+            motion = straight_line(with_efforts(arm, needs * rng.uniform(0.75, 1.3)), q, X, speed=speed)
+        except ArmwrightError:  # it cannot be followed, or the arm cannot hold itself
+            continue
+        weak = motion.certificate.arm
+        use = (largest_efforts(weak, motion.trajectory) / weak.limits.effort).max()
+        run, worst = run + 1, max(worst, float(use))
+        assert use <= 1 + SEEN
+    sample.record("lines of weak arms, efforts at 20,001 samples", run, 0, largest_part_of_limit=f"{worst:.4f}")
 
 
 def test_bad_input() -> None:

@@ -18,8 +18,9 @@ from armwright.motion.tolerance import Tolerance
 from armwright.motion.tracking import Tracking
 from armwright.motion.trajectory import Trajectory, hold, join, whole_ticks
 
-# Efforts are sampled so often; those that come as near to a limit as this part of it are sampled closely.
-_SAMPLES, _NEAR = 101, 0.95
+# Efforts are sampled so often along a motion, and at the ends and in the middle of every segment, as the first ones of
+# a motion are short; those that come as near to a limit as this part of it are sampled closely.
+_SAMPLES, _NEAR = 101, 0.8
 # A joint that moves at less than this part of its top speed stands.
 _STANDS = 1e-9
 
@@ -197,7 +198,8 @@ def _efforts(arm: AnyArm, trajectory: Trajectory) -> Array:
     limits = solver.arm.limit("effort")
     if not np.isfinite(limits).any():
         return np.zeros(solver.arm.n)
-    t = np.linspace(0.0, trajectory.duration, _SAMPLES)
+    ends = trajectory.times
+    t = np.concatenate([np.linspace(0.0, trajectory.duration, _SAMPLES), ends, (ends[1:] + ends[:-1]) / 2])
     q, qd, qdd = (trajectory(t, order) for order in range(3))
     # The sign of the speed of a joint that stands is rounding, and would give it Coulomb friction.
     qd = np.where(np.abs(qd) > _STANDS * np.abs(qd).max(axis=0), qd, 0.0)
