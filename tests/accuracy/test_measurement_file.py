@@ -312,12 +312,15 @@ MISTAKES = {
         RUNS.replace("commanded,,100", "commanded,,0.1"),
         "4: cycle: the attained positions are 1000 times as large as the others: metres and millimetres?",
     ),
-    "no direction": (f"{HEAD}multidirectional,P1,1,0,0\n", "2: direction: empty; a test of multidirectional has a dir"),
-    "no robot": (f"{HEAD}exchangeability,P1,1,0,0\n", "2: robot: empty; a test of exchangeability has a robot in"),
-    "no time of drift": (f"{HEAD}drift,P1,1,0,0\n", "2: t: empty; a test of drift has the time of every row"),
+    "no direction": (f"{HEAD}multidirectional,P1,1,0,0\n", "2: direction: no such column; expected the direction in"),
+    "no robot": (f"{HEAD}exchangeability,P1,1,0,0\n", "2: robot: no such column; expected the robot in every row"),
+    "no time of drift": (
+        f"{HEAD}drift,P1,1,0,0\n",
+        "2: t_s: no such column; expected the time in every row of test drift",
+    ),
     "no load": (
         "test,pose,direction,cycle,x_mm,y_mm\ncompliance,P1,+x,1,0,0\n",
-        "2: load: empty; a test of compliance has the load of every row",
+        "2: load_n: no such column; expected the load in every row of test compliance; there are",
     ),
     "three poses": (
         HEAD + "".join(f"distance,{p},{c},0,0\n" for p in "ABC" for c in ("commanded", 1)),
@@ -332,11 +335,11 @@ MISTAKES = {
         "2: cycle: L has no commanded path: expected rows with cycle commanded",
     ),
     "time back": (RUNS.replace("L,1,1,", "L,1,0,"), "5: t_s: samples must be in order of time, but 0 s follows 0"),
-    "no time": (RUNS.replace("L,1,1,", "L,1,,"), "5: t_s: empty; expected a number, as in the rows before"),
+    "no time": (RUNS.replace("L,1,1,", "L,1,,"), "5: t_s: empty; expected the time, as in the rows of the run before"),
     "one sample": (RUNS + "path,L,3,0,0,0\n", "8: cycle: a run has two rows at least, and this is its only one"),
-    "no times": (f"{HEAD}settling,P1,1,0,0\nsettling,P1,1,1,0\n", "2: t_s: a test of settling needs the time of every"),
+    "no times": (f"{HEAD}settling,P1,1,0,0\nsettling,P1,1,1,0\n", "2: t_s: no such column; expected the time in"),
     "settling commanded": (
-        f"{HEAD}settling,P1,commanded,0,0\nsettling,P1,1,0,0\n",
+        "test,pose,cycle,t_s,x_mm,y_mm\nsettling,P1,commanded,,0,0\nsettling,P1,1,0,0,0\n",
         "2: cycle: a settling test must not have a commanded row",
     ),
     "no speed": (RUNS.replace("path,L", "velocity,L"), "2: speed_mm_per_s: a test of velocity has the commanded"),
@@ -352,6 +355,43 @@ def test_mistakes(name: str, read: Read) -> None:
         read(text)
 
     assert f"file0.csv{'' if message.startswith(':') else ':'}{message}" in str(caught.value)
+
+
+COLUMNS = "test,pose,cycle,direction,robot,t_s,load_n,x_mm,y_mm"
+
+
+@pytest.mark.parametrize(
+    ("test", "column"),
+    [
+        ("settling", "t_s"),
+        ("drift", "t_s"),
+        ("path", "t_s"),
+        ("compliance", "load_n"),
+        ("compliance", "direction"),
+        ("multidirectional", "direction"),
+        ("exchangeability", "robot"),
+    ],
+)
+def test_rows_that_lack_what_their_test_requires(test: str, column: str, tmp_path: Path) -> None:
+    """Rows without a time, a load, a direction or a robot that their test requires are all named, or all left out."""
+    complete = {"test": test, "pose": "P1", "cycle": "1", "direction": "+x", "robot": "A", "x_mm": "1", "y_mm": "2"}
+    goal = {**complete, "cycle": "commanded"}
+    goals = [goal, goal] if test == "path" else [goal] if test == "drift" else []
+    is_run = test in {"settling", "path"}
+    rows = [{**complete, "cycle": "1" if is_run else str(i), "t_s": str(i), "load_n": str(i)} for i in range(1, 7)]
+    rows[2][column] = rows[4][column] = ""
+    lines = [",".join(row.get(name, "") for name in COLUMNS.split(",")) for row in goals + rows]
+    path = tmp_path / "file.csv"
+    path.write_text("\n".join([COLUMNS, *lines, ""]), encoding="utf-8")
+    where = f"{column} in lines {len(goals) + 4}, {len(goals) + 6}"
+
+    with pytest.raises(FileFormatError, match=f"cells are empty: {where}; --skip-incomplete omits 2 rows"):
+        read_measurements(path)
+    with pytest.warns(IncompleteRowsWarning, match=f"2 rows omitted because of empty cells, .* read: {where}"):
+        (found,) = read_measurements(path, skip_incomplete=True)
+
+    part = found.clouds[0].positions if isinstance(found, PoseTest) else found.runs[0].positions
+    assert len(part) == (1 if test == "drift" else 4)
 
 
 def test_other_layout(read: Read) -> None:

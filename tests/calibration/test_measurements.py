@@ -251,7 +251,7 @@ def test_radians_for_degrees(arm: Arm, write: Write) -> None:
             "points.csv:1: speed: no such column. Known: joint_1_deg, joint_2_deg, x_mm, y_mm, z_mm, roll_deg",
         ),
         ("jiont_1_deg,joint_2_deg,x_mm,y_mm,z_mm", "jiont_1_deg: no such column. Did you mean 'joint_1_deg'? Known: "),
-        (f"{HEAD},", "points.csv:1: '': no such column."),
+        (f"{HEAD},", "points.csv:1: '': the last column has no name, but a value in line 2"),
         (f"{HEAD},X_mm", "points.csv:1: X_mm: a second column for this quantity, after x_mm"),
         (f"{HEAD},joint_1_rad", "points.csv:1: joint_1_rad: a second column for this quantity, after joint_1_deg"),
         (
@@ -377,7 +377,7 @@ def test_millimetres_of_a_slide(sliding: Arm, write: Write) -> None:
     ("words", "message"),
     [
         (("fit", "chek", "fit"), "points.csv:3: set: expected fit or check, got 'chek'; did you mean 'check'?"),
-        (("fit", "", "fit"), "points.csv:3: set: expected fit or check, got ''"),
+        (("fit", "", "fit"), "points.csv:3: set: empty; expected a name, or --skip-incomplete to omit the row"),
         (("check", "check", "check"), "points.csv: set: every row is held out to check with; none is left to fit"),
     ],
 )
@@ -478,22 +478,22 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
             "1,2,3,4,5,1,a",
             "points.csv:1: name: no such column; to has names of rows; there are",
         ),
-        (f"{HEAD},plane", "1,2,,,,", "points.csv:2: the row has no point, no plane and no distance"),
-        (f"{HEAD},frame", "1,2,3,4,5,", "points.csv:2: frame: empty; where one point has a frame all points have one"),
+        (f"{HEAD},plane", "1,2,,,,", "points.csv:2: x_mm or plane: empty; expected a position, a plane or a dist"),
+        (f"{HEAD},frame", "1,2,3,4,5,", "points.csv:2: frame: empty; expected a name; where one point has a frame all"),
         (
             f"{HEAD},plane,roll_deg,pitch_deg,yaw_deg",
             "1,2,,,,t,1,2,3",
-            "the row tells how the tool was turned, and not",
+            "points.csv:2: cells are empty: x_mm in line 2; y_mm in line 2; z_mm in line 2; --skip",
         ),
         (
             f"{HEAD},distance_mm,anchor",
             "1,2,3,4,5,7,",
-            "expected one place to be so far from; the row tells neither an",
+            "points.csv:2: anchor: empty; expected the anchor of the distance, or the name of another row",
         ),
         (
             f"{HEAD},distance_mm,anchor",
             "1,2,3,4,5,,w",
-            "empty; the row has the start of a distance, and not its length",
+            "points.csv:2: distance_mm: empty; expected the length of the distance, or --skip",
         ),
         (f"{HEAD},distance_mm,anchor", "1,2,3,4,5,-7,w", "expected a distance, got -0.007 m"),
         (
@@ -502,13 +502,40 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
             "to: expected the name of one row, got 'fist', which 0",
         ),
         (f"{HEAD},name,distance_mm,to", "1,2,3,4,5,first,7,first", "points.csv:2: to: a row is not away from itself"),
-        (f"{HEAD},name,distance_mm,to,anchor", "1,2,3,4,5,a,7,b,w", "tells both an anchor and another row"),
+        (f"{HEAD},name,distance_mm,to,anchor", "1,2,3,4,5,a,7,b,w", "got one from both"),
         (f"{HEAD},plan", "1,2,3,4,5,t", "plan: no such column. Did you mean 'plane'?"),
     ],
 )
 def test_more_than_points_wrong(head: str, row: str, message: str, arm: Arm, write: Write) -> None:
     """What does not belong together is named with its line and column."""
     assert message in refused(write(table(head, [row])), arm)
+
+
+ANYTHING = f"{HEAD},frame,plane,distance_mm,anchor,qw,qx,qy,qz,set"
+COMPLETE = "10,-20,300.5,10,5,A,,,,,,,,fit"
+
+
+@pytest.mark.parametrize(
+    ("row", "column"),
+    [
+        ("20,30,,,,,,,,,,,,fit", "x_mm or plane or distance_mm"),
+        ("20,30,-310,20,5,,,,,,,,,fit", "frame"),
+        ("20,30,-310,20,5,A,,100,,,,,,fit", "anchor"),
+        ("20,30,,,,,,,w,,,,,fit", "x_mm or plane or distance_mm"),
+        ("20,30,,,,,t,,w,,,,,fit", "distance_mm"),
+        ("20,30,-310,20,5,A,,,,1,0,,0,fit", "qy"),
+        ("20,30,-310,20,5,A,,,,,,,,", "set"),
+    ],
+)
+def test_rows_that_lack_a_required_cell(row: str, column: str, arm: Arm, write: Write) -> None:
+    """A row without a cell that its other cells require can be left out as any incomplete row, and is named if not."""
+    path = write(table(ANYTHING, [COMPLETE, row, COMPLETE.replace("10", "30")]))
+
+    assert f"{column} in line 3" in refused(path, arm) or f":3: {column}: empty; expected" in refused(path, arm)
+    with pytest.warns(
+        IncompleteRowsWarning, match=rf"1 row omitted because of empty cells, 2 read: .*{column} in line 3"
+    ):
+        assert len(read_measurements(path, arm, skip_incomplete=True).readings) == 2
 
 
 def test_memory_of_a_row(arm: Arm, write: Write) -> None:

@@ -92,7 +92,7 @@ def number(text: str, separator: str = ",") -> float:
 
 
 def test_number() -> None:
-    """A number is read as Python reads it; between semicolons or tabs it may have a decimal comma."""
+    """A number is read as every reader of CSV reads it; between semicolons or tabs it may have a decimal comma."""
     assert number("-1.5e-3") == -0.0015
     assert number("-1.5e-3", ";") == -0.0015
     assert number("-1,5e-3", ";") == -0.0015
@@ -104,6 +104,8 @@ def test_number() -> None:
     [
         ("abc", "t.csv:3: x_mm: expected a number, got 'abc'"),
         ("1,5", "t.csv:3: x_mm: expected a number, got '1,5'; write a decimal point"),
+        ("1_0", "t.csv:3: x_mm: expected a number, got '1_0'"),
+        ("\u0661\u0660", "t.csv:3: x_mm: expected a number, got '\u0661\u0660'"),
         ("nan", "t.csv:3: x_mm: every number must be finite and no larger than 1e+100, got nan"),
         ("1e101", "t.csv:3: x_mm: every number must be finite and no larger than 1e+100, got 1e101"),
     ],

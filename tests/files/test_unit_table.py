@@ -14,7 +14,7 @@ from armwright.files.column_map import column_map
 from armwright.files.column_names import ANGLE, LENGTH, NUMBER, TIME, VELOCITY, Column, Schema, headings_of, units_of
 from armwright.files.limits import raised
 from armwright.files.rows import Cells
-from armwright.files.unit_table import Header, UnitTable, read_header, read_headers
+from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, read_header, read_headers
 
 Write = Callable[..., Path]
 SCHEMA = Schema(
@@ -124,6 +124,35 @@ def test_unknown_names(header: str, message: str, write: Write) -> None:
     assert said.startswith(f"table.csv:1: {header}: {message}")
 
 
+@pytest.mark.parametrize(
+    "header", ["-x_mm", " - X [mm]", "[-x] mm", "nominal -x (mm)", "x_nominal (-mm)", "\uff0dx_mm"]
+)
+def test_minus_before_a_name(header: str, write: Write) -> None:
+    """A minus sign in a name is refused, as the numbers below have the other sign; a hyphen between words is none."""
+    message = "a minus sign in the name of a column does not apply to its numbers; negate them"
+
+    assert refused(lambda: read_header(write(f"{header}\n1\n"), SCHEMA)) == f"table.csv:1: {header.strip()}: {message}"
+    said = refused(lambda: read_header(write("A\n1\n"), SCHEMA, columns={"A": header}))
+    assert said == f"table.csv:1: A as {header}: {message}"
+    assert [*read_header(write("x-nominal-mm\n1\n"), SCHEMA).headings] == ["x_nominal"]
+
+
+@pytest.mark.parametrize("separator", [";", ",", "\t"])
+def test_separator_after_the_last_cell(separator: str, write: Write) -> None:
+    """A separator after the last cell of every line begins no column."""
+    text = "pose;x_mm;y_mm;;\nP1;1;2;;\nP2;3;4;;\n".replace(";", separator)
+
+    np.testing.assert_array_equal(
+        rows(read_header(write(text), SCHEMA), "x").numbers("xy"), [[1e-3, 2e-3], [3e-3, 4e-3]]
+    )
+    said = refused(lambda: rows(read_header(write(text.replace(f"4{separator}", "4")), SCHEMA)))
+    assert said.startswith("table.csv:3: expected 3 values, one per column, got 4")
+    said = refused(
+        lambda: rows(read_header(write(f"{text}P3{separator}5{separator}6{separator}{separator}7\n"), SCHEMA))
+    )
+    assert said == "table.csv:1: '': the last column has no name, but a value in line 4"
+
+
 def test_nameless_column(write: Write) -> None:
     """A column without a name is none."""
     assert refused(lambda: read_header(write("x_mm,,y_mm\n1,2,3\n"), SCHEMA)).startswith("table.csv:1: '': no such col")
@@ -205,6 +234,18 @@ def test_bad_column_maps(columns: Mapping[str, str], message: str, write: Write)
     assert said.startswith(f"table.csv:1: {message}")
 
 
+def test_column_maps_of_one_name(write: Write) -> None:
+    """Names of a map that a table does not distinguish are refused, not taken for one another."""
+    said = refused(lambda: read_header(write("A,b\n1,2\n"), SCHEMA, columns={"A": "x_mm", "a": "y_mm"}))
+
+    assert said == "table.csv:1: a: this name in the column map differs from 'A' only in case or blanks"
+
+
+def test_long_names_in_column_maps(write: Write) -> None:
+    """A name of a map that is not in the file is shortened in the message if it is very long."""
+    assert len(refused(lambda: read_header(write("A,b\n1,2\n"), SCHEMA, columns={"c" * 5000: "x_mm"}))) < 200
+
+
 def test_cells_of_mapped_columns(write: Write) -> None:
     """Messages about cells name the column as it is in the file, and what it is taken for."""
     header = read_header(write("A1\nfar\n"), SCHEMA, columns={"A1": "x_mm"})
@@ -229,7 +270,7 @@ def test_written_column_maps(write: Write) -> None:
     assert column_map(str(path)) == {"A1": "joint_1_deg", "X, of the flange": "x_mm"}
 
 
-@pytest.mark.parametrize("text", ["A1=", "=x_mm", "A1=x_mm,", "A1=x_mm,y", "A1=x_mm,A1=y_mm"])
+@pytest.mark.parametrize("text", ["A1=", "=x_mm", "A1=x_mm,", "A1=x_mm,y", "A1=x_mm,A1=y_mm", "", " "])
 def test_bad_pairs(text: str) -> None:
     """Pairs are a name and another, each name once."""
     with pytest.raises(
@@ -304,14 +345,22 @@ def test_incomplete_rows_left_out(write: Write) -> None:
     assert table.lines.tolist() == [2, 6]
 
 
-def test_cells_that_belong_together(write: Write) -> None:
-    """Of a group of columns a row fills all cells or none."""
-    header = read_header(write(GAPS), SCHEMA)
+def test_cells_that_other_cells_require(write: Write) -> None:
+    """A row may require a cell, or one of several, because of another cell; a column of it must be in the file."""
 
-    said = refused(lambda: header.rows(filled=(), together=[("x", "z"), ("y",)]))
+    def required(cell_text: CellText) -> list[RequiredCells]:
+        return [RequiredCells(("z", "y"), "a number")] if cell_text("pose") in {"P2", "P5"} else []
 
-    # In line 3 both cells of x and z are empty.
-    assert said == "table.csv:6: cells are empty: z_mm in lines 6, 7; --skip-incomplete omits 2 rows"
+    path = write(GAPS.replace("P2,,2", "P2,,"))
+    header = read_header(path, SCHEMA)
+    said = refused(lambda: header.rows(filled=("pose",), required=required))
+    assert said == (
+        "table.csv:3: cells are empty: z_mm or y_mm in lines 3, 7; pose in line 5; --skip-incomplete omits 3 rows"
+    )
+
+    header = read_header(path, SCHEMA)
+    said = refused(lambda: header.rows(filled=(), required=lambda _: [RequiredCells(("speed", "t"), "a number")]))
+    assert said == "table.csv:2: speed_mm_per_s: no such column; expected a number; there are pose, x_mm, y_mm, z_mm"
 
 
 def test_nothing_but_gaps(write: Write) -> None:

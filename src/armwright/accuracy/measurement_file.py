@@ -25,13 +25,6 @@ _COMMANDED: frozenset[Kind] = frozenset(
 )
 # The column that distinguishes the parts of a test, where it is not the name of the pose.
 _LABELS: Mapping[Kind, str] = {"multidirectional": "direction", "compliance": "direction", "exchangeability": "robot"}
-# The columns without empty cells in a test, and what the test has in them.
-_NEEDED: Mapping[Kind, Mapping[str, str]] = {
-    **{kind: {label: f"a {label} in every row"} for kind, label in _LABELS.items()},
-    "drift": {"t": "the time of every row: t_s, t_min or t_h"},
-    "compliance": {"direction": "a direction in every row", "load": "the load of every row: load_n or load_kn"},
-}
-_TIMED: frozenset[Kind] = frozenset({"settling", "posing", "velocity", "weaving"})
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -169,7 +162,6 @@ def _pose_test(rows: list[Row]) -> PoseTest:
         commanded[row.name] = row
     clouds: dict[tuple[str, float | None], list[Row]] = {}
     for row in (row for row in rows if row.cycle is not None):
-        _refuse_incomplete(row)
         clouds.setdefault(_part(row), []).append(row)
     for cloud in clouds.values():
         _refuse_repeated_cycles(cloud)
@@ -192,11 +184,6 @@ def _part(row: Row) -> tuple[str, float | None]:
     """Return the part of its test to which a row belongs: a direction, a robot or a pose, and for drift a time."""
     label = row.word(_LABELS[row.test]) if row.test in _LABELS else row.name
     return label, row.number("t") if row.test == "drift" else None
-
-
-def _refuse_incomplete(row: Row) -> None:
-    for column, content in _NEEDED.get(row.test, {}).items():
-        row.require([column], f"a test of {row.test} has {content}")
 
 
 def _refuse_repeated_cycles(rows: Sequence[Row]) -> None:
@@ -305,15 +292,11 @@ def _stacked(rows: Sequence[Row], what: str) -> Array:
 
 
 def _times(rows: list[Row]) -> list[float] | None:
-    """Return the times of a run; None where it has none and needs none."""
-    first = rows[0]
-    if first.number("t") is None:
-        if first.test in _TIMED:
-            raise first.error("t_s", f"a test of {first.test} needs the time of every sample")
+    """Return the times of a run; None where it has none."""
+    if rows[0].number("t") is None:
         return None
     times: list[float] = []
     for row in rows:
-        row.require(["t"], "expected a number, as in the rows before")
         t = row.number("t") or 0.0
         if times and not t > times[-1]:
             raise row.error("t_s", f"samples must be in order of time, but {t:g} s follows {times[-1]:g} s")

@@ -3,20 +3,36 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import get_args
 
 import attrs
 
-from armwright.accuracy.cycles import REQUIRED_CYCLES, Kind
+from armwright.accuracy.cycles import REQUIRED_CYCLES, Kind, PathKind
 from armwright.accuracy.trace import ANGLES
 from armwright.errors import FileFormatError, shown
 from armwright.files.column_names import ANGLE, FORCE, LENGTH, TIME, VELOCITY, Column, Schema
-from armwright.files.unit_table import Header, UnitTable, read_headers
+from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, read_headers
 
 COMMANDED = "commanded"
 _COORDINATES = ("x", "y", "z")
 _KINDS: dict[str, Kind] = {kind: kind for kind in REQUIRED_CYCLES}
+_PATH_TESTS = frozenset(get_args(PathKind))
+# Columns in which every attained row of a test has a value.
+_REQUIRED_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "multidirectional": ("direction",),
+    "exchangeability": ("robot",),
+    "compliance": ("direction", "load"),
+    **dict.fromkeys(("drift", "settling", "posing", "velocity", "weaving"), ("t",)),
+}
+_REQUIRED_CELLS: Mapping[str, Sequence[RequiredCells]] = {
+    test: [
+        RequiredCells((column,), f"the {'time' if column == 't' else column} in every row of test {test}")
+        for column in columns
+    ]
+    for test, columns in _REQUIRED_COLUMNS.items()
+}
 # The number of a cycle has fewer.
 _CYCLE_DIGITS = 10
 _SCHEMA = Schema(
@@ -94,14 +110,6 @@ class Row:
         """Return the number in a column of numbers, SI; None where the file has none."""
         return self._table.columns.number(name, self._row)
 
-    def require(self, names: Iterable[str], reason: str) -> None:
-        """Refuse a row whose cells of some columns are empty.
-
-        Raises:
-            FileFormatError: one of them is; the text says ``reason``.
-        """
-        self._table.columns.require(self._row, names, reason)
-
     def _numbers(self, names: tuple[str, ...]) -> tuple[float, ...]:
         suffix = "_nominal" if self._nominal else ""
         values = (self._table.columns.number(f"{name}{suffix}", self._row) for name in names)
@@ -173,7 +181,11 @@ def _table(header: Header, *, skip_incomplete: bool) -> Table:
             (f"{name}_nominal" for name in measured), "either all measured columns have nominal columns, or none has"
         )
         header.require((name.removesuffix("_nominal") for name in nominal), "it is nominal")
-    columns = header.rows(filled=(*identifiers, name, *measured, *nominal), skip_incomplete=skip_incomplete)
+    columns = header.rows(
+        filled=(*identifiers, name, *measured, *nominal),
+        required=_required_cells(),
+        skip_incomplete=skip_incomplete,
+    )
     for row in range(len(columns)) if "test" in columns else ():
         columns.choice("test", row, tuple(_KINDS))
     return Table(
@@ -183,6 +195,25 @@ def _table(header: Header, *, skip_incomplete: bool) -> Table:
         angles=header.present(ANGLES),
         nominal=bool(nominal),
     )
+
+
+def _required_cells() -> Callable[[CellText], Sequence[RequiredCells]]:
+    """Return a function that gives, row by row, the cells that a row of a test requires."""
+    timed_runs: set[tuple[str, ...]] = set()
+
+    def required_cells(cell_text: CellText) -> Sequence[RequiredCells]:
+        test, cycle = cell_text("test").lower() or "pose", cell_text("cycle")
+        if cycle.lower() == COMMANDED:
+            return []
+        if test in _PATH_TESTS and test not in _REQUIRED_CELLS:
+            run = (test, cell_text("path"), cell_text("pose"), cell_text("condition"), cycle)
+            if cell_text("t"):
+                timed_runs.add(run)
+            elif run in timed_runs:
+                return [RequiredCells(("t",), "the time, as in the rows of the run before")]
+        return _REQUIRED_CELLS.get(test, [])
+
+    return required_cells
 
 
 def _name(header: Header) -> str:

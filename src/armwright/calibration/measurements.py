@@ -15,7 +15,8 @@ names the rows. docs/tables.md says how columns may be named.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import attrs
@@ -29,7 +30,7 @@ from armwright.calibration.columns import DEVIATIONS, DISTANCE, NAMES, NOMINAL, 
 from armwright.calibration.readings import Readings, numbered
 from armwright.errors import FileFormatError, closest
 from armwright.files.column_names import Heading, units_of
-from armwright.files.unit_table import UnitTable, in_lines
+from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, in_lines
 from armwright.spatial.rotations import rotation_from_quaternion
 
 _SETS = ("fit", "check")
@@ -100,10 +101,10 @@ def read_measurements(
         UnknownNameError: there are no such ``units``.
     """
     header, position, orientation = read_columns(path, arm, columns=columns, units=units_of(*units) if units else {})
-    joints, partial = joint_columns(arm), bool(header.present(("plane", DISTANCE)))
+    joints = joint_columns(arm)
     table = header.rows(
-        filled=joints if partial else [*joints, *position],
-        together=[position, orientation] if partial else [orientation],
+        filled=[*joints, *header.present(["set"])],
+        required=partial(_required_cells, header, position, orientation),
         skip_incomplete=skip_incomplete,
     )
     readings = _readings(table, table.numbers(joints), position, orientation)
@@ -121,6 +122,26 @@ def read_measurements(
 # ---- rows ----------------------------------------------------------------------------------------------------------
 
 
+def _required_cells(
+    header: Header, position: Sequence[str], orientation: Sequence[str], cell_text: CellText
+) -> Iterator[RequiredCells]:
+    """Give the cells that a row requires, for it has one of a position, a plane and a distance, and that completely."""
+    others = header.present(("plane", DISTANCE))
+    has_position, has_orientation = any(map(cell_text, position)), any(map(cell_text, orientation))
+    if has_position or has_orientation or not others:
+        yield from (RequiredCells((name,), "a number") for name in position)
+    elif not any(map(cell_text, others)):
+        yield RequiredCells((*position[:1], *others), "a position, a plane or a distance")
+    if has_orientation:
+        yield from (RequiredCells((name,), "a number") for name in orientation)
+    if has_position and "frame" in header:
+        yield RequiredCells(("frame",), "a name; where one point has a frame all points have one")
+    if cell_text(DISTANCE):
+        yield RequiredCells(("anchor", "to"), "the anchor of the distance, or the name of another row")
+    elif cell_text("anchor") or cell_text("to"):
+        yield RequiredCells((DISTANCE,), "the length of the distance")
+
+
 def _names(table: UnitTable) -> tuple[str, ...]:
     """Return the names of the rows; their lines where the file names none."""
     label = next((name for name in NAMES if name in table), None)
@@ -136,15 +157,10 @@ def _readings(table: UnitTable, q: Array, position: Sequence[str], orientation: 
     rotations = _rotations(table, points, orientation)
     has_point = np.isfinite(points[:, 0])
     frames = [word if known else None for word, known in zip(table.words("frame"), has_point.tolist(), strict=True)]
-    if "" in frames and "frame" in table:
-        raise table.error(frames.index(""), "frame", "empty; where one point has a frame all points have one")
     planes, anchors = ([word or None for word in table.words(name)] for name in ("plane", "anchor"))
     labels = numbered(frame=frames, plane=planes, anchor=anchors)
     distances = table.numbers([DISTANCE])[:, 0] if DISTANCE in table else np.full(len(q), np.nan)
     other = _others(table, q, distances)
-    is_measured = has_point | (labels["plane"] >= 0) | np.isfinite(distances)
-    if not is_measured.all():
-        raise table.error(int(np.argmin(is_measured)), "", "the row has no point, no plane and no distance")
     return Readings(q=q, points=points, rotations=rotations, distances=distances, other=other, **labels)
 
 
@@ -155,8 +171,6 @@ def _rotations(table: UnitTable, points: Array, orientation: Sequence[str]) -> A
     numbers = table.numbers(orientation)
     rotations = np.full((len(points), 3, 3), np.nan)
     for i in np.flatnonzero(np.isfinite(numbers[:, 0])):
-        if not np.isfinite(points[i, 0]):
-            raise table.error(int(i), "", "the row tells how the tool was turned, and not where it was")
         if orientation is RPY:
             roll, pitch, yaw = numbers[i]
             rotations[i] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
@@ -178,7 +192,10 @@ def _others(table: UnitTable, q: Array, distances: Array) -> Array:
         if name in rows_by_name:
             rows_by_name[name].append(k)
     for i, (to, anchor) in enumerate(zip(table.words("to"), table.words("anchor"), strict=True)):
-        _refuse_half_a_distance(table, i, float(distances[i]), to=bool(to), anchor=bool(anchor))
+        if to and anchor:
+            raise table.error(i, DISTANCE, "expected a distance from an anchor or from another row, got one from both")
+        if distances[i] < 0:
+            raise table.error(i, DISTANCE, f"expected a distance, got {distances[i]:g} m")
         if not to:
             continue
         rows = rows_by_name[to]
@@ -190,19 +207,6 @@ def _others(table: UnitTable, q: Array, distances: Array) -> Array:
             raise table.error(i, "to", "a row is not away from itself")
         other[i] = q[rows[0]]
     return other
-
-
-def _refuse_half_a_distance(table: UnitTable, row: int, distance: float, *, to: bool, anchor: bool) -> None:
-    """Refuse a distance from nothing or from two places, no distance from one, and one below 0."""
-    if math.isnan(distance):
-        if to or anchor:
-            table.require(row, [DISTANCE], "the row has the start of a distance, and not its length")
-        return
-    if to == anchor:
-        both = "both an anchor and another row" if to else "neither an anchor nor another row"
-        raise table.error(row, DISTANCE, f"expected one place to be so far from; the row tells {both}")
-    if distance < 0:
-        raise table.error(row, DISTANCE, f"expected a distance, got {distance:g} m")
 
 
 def _checks(table: UnitTable) -> Flags:

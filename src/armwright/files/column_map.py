@@ -17,6 +17,8 @@ def column_map(text: str) -> dict[str, str]:
         InvalidValueError: the text is neither.
         FileFormatError: the file is missing or broken, or says something else.
     """
+    if not text.strip():
+        raise InvalidValueError("expected a column map such as A1=joint_1_deg,X=x_mm, got an empty text")
     if "=" not in text:
         return _in_file(Path(text))
     found: dict[str, str] = {}

@@ -23,6 +23,8 @@ _NOMINAL = {"nominal", "nom", "target", "commanded"}
 _MEASURED = {"measured", "meas", "actual"}
 # What parts words in the name of a column.
 _GAPS = re.compile(r"[\s_\-.,;:\[\](){}]+")
+# A minus sign before a name or a word in it, as in ``-x_mm``; a hyphen has a word on its left.
+_MINUS = re.compile(r"^\W*-|[\s_(\[{]-(?=\w)")
 
 
 class Quantity(NamedTuple):
@@ -161,6 +163,8 @@ def headings_of(
         column, unit = names.resolve(target or written, text, mapped=bool(target)) or (None, "")
         if column is None:
             continue
+        if _MINUS.search(unicodedata.normalize("NFKC", target or written)):
+            raise names.error(text, "a minus sign in the name of a column does not apply to its numbers; negate them")
         unit = unit or (units or {}).get(column.quantity.name, "") or column.unit
         if column.quantity.units and not unit:
             options = "--columns" if units is None else "--columns or --units"

@@ -82,7 +82,15 @@ def read_rows(path: Path | str) -> Rows:
     first = next(cells, None)
     if first is None:
         raise FileFormatError(path, None, "", "no rows after the column names")
-    return Rows(head, _of_one_width(path, head, itertools.chain([first], cells), separator), separator)
+    rows = _of_one_width(path, head, itertools.chain([first], cells), separator)
+    # Some programs write a separator after the last cell, too.
+    names = Cells(head.line, head.cells[: _width(head)])
+    return Rows(names, rows, separator)
+
+
+def _width(head: Cells) -> int:
+    """Return the number of columns up to the last that has a name."""
+    return max(i for i, name in enumerate(head.cells, 1) if name)
 
 
 def _empty(path: Path) -> FileFormatError:
@@ -106,11 +114,12 @@ def _cells(path: Path, lines: Iterable[str], separator: str, skipped: int) -> It
 
 
 def _of_one_width(path: Path, head: Cells, rows: Iterable[Cells], separator: str) -> Iterator[Cells]:
-    """Give the rows, each with as many cells as there are columns.
+    """Give the rows, each with as many cells as there are columns, without empty cells under empty names at the end.
 
     Raises:
-        FileFormatError: a row is longer or shorter.
+        FileFormatError: a row is longer or shorter, or has a value under an empty name at the end.
     """
+    width = _width(head)
     for row in rows:
         if len(row.cells) != len(head.cells):
             decimal = separator == "," and len(row.cells) > len(head.cells)
@@ -119,9 +128,12 @@ def _of_one_width(path: Path, head: Cells, rows: Iterable[Cells], separator: str
                 path,
                 row.line,
                 "",
-                f"expected {len(head.cells)} values, one per column, got {len(row.cells)}{hint}",
+                f"expected {width} values, one per column, got {len(row.cells)}{hint}",
             )
-        yield row
+        if any(row.cells[width:]):
+            message = f"the last column has no name, but a value in line {row.line}"
+            raise FileFormatError(path, head.line, "''", message)
+        yield Cells(row.line, row.cells[:width])
 
 
 class NumberFormat:
@@ -174,7 +186,8 @@ class NumberFormat:
 
 
 def _parsed(text: str) -> float | None:
+    # Python also reads underscores between digits, and digits of other scripts, which no other reader of CSV does.
     try:
-        return float(text)
+        return float(text) if text.isascii() and "_" not in text else None
     except ValueError:
         return None

@@ -8,8 +8,10 @@ about columns and cells come from here. docs/tables.md describes the format.
 import math
 import warnings
 from array import array
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple, TypeAlias
 
 import attrs
 import numpy as np
@@ -21,6 +23,22 @@ from armwright.files.rows import Cells, NumberFormat, read_rows
 
 # Of the lines in which a column is empty a message names this many.
 _MAX_LINES = 20
+
+
+class RequiredCells(NamedTuple):
+    """Cells of a row of which at least one must not be empty.
+
+    Attributes:
+        columns: their names in the schema.
+        expected: what should be there, for a message.
+    """
+
+    columns: tuple[str, ...]
+    expected: str
+
+
+# The text of a cell of one row by the name of its column; empty where the file has no such column.
+CellText: TypeAlias = Callable[[str], str]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -80,16 +98,6 @@ class UnitTable:
             raise self.error(row, name, f"expected {expected}, got {shown(word)}{hint}")
         return word.lower()
 
-    def require(self, row: int, names: Iterable[str], reason: str) -> None:
-        """Refuse a row whose cells of some columns are empty.
-
-        Raises:
-            FileFormatError: one of them is; the text says ``reason``.
-        """
-        for name in names:
-            if not self.word(name, row) and self.number(name, row) is None:
-                raise self.error(row, name, f"empty; {reason}")
-
     def error(self, row: int, name: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a cell; of a whole row where the name is empty."""
         return FileFormatError(self.path, self.lines[row], _text(self.headings, name), message)
@@ -142,9 +150,12 @@ class Header:
         """
         for name in names:
             if name not in self.headings:
-                column = next(column for column in self.schema.columns if column.name == name)
                 reason = f"{because}; " if because else ""
-                raise self.error(column.proposed, f"no such column; {reason}there are {self.listing}")
+                raise self.error(self.proposed(name), f"no such column; {reason}there are {self.listing}")
+
+    def proposed(self, name: str) -> str:
+        """Return the name of a column of the schema with its usual unit."""
+        return next(column.proposed for column in self.schema.columns if column.name == name)
 
     def exactly_one(self, first: str, second: str) -> str:
         """Return which of two columns the file has.
@@ -160,20 +171,24 @@ class Header:
         return names[0]
 
     def rows(
-        self, *, filled: Iterable[str], together: Sequence[Sequence[str]] = (), skip_incomplete: bool = False
+        self,
+        *,
+        filled: Iterable[str],
+        required: Callable[[CellText], Iterable[RequiredCells]] | None = None,
+        skip_incomplete: bool = False,
     ) -> UnitTable:
         """Read the rows.
 
         Args:
             filled: columns in which no cell may be empty.
-            together: groups of columns whose cells are all empty or all filled in every row.
+            required: returns the other cells that a row requires because of what it has in some of its cells.
             skip_incomplete: leave out the rows with cells that should not be empty, with a warning.
 
         Raises:
-            FileFormatError: a row is no CSV or has another width; a number is none; cells are empty that should not be.
+            FileFormatError: a row is no CSV or has another width; a number is none; cells are empty that should not be;
+                a row requires a cell of a column that the file lacks.
         """
         needed = [self.headings[name] for name in filled]
-        groups = [[self.headings[name] for name in names] for names in together]
         lines, known = array("q"), dict[str, str]()
         numbers: dict[str, array[float]] = {}
         words: dict[str, list[str]] = {}
@@ -186,11 +201,9 @@ class Header:
         number_columns = [(self.headings[name], self.headings[name].scale, numbers[name]) for name in numbers]
         word_columns = [(self.headings[name].cell, texts) for name, texts in words.items()]
         for line, cells in self._below:
-            empty = [heading for heading in needed if not cells[heading.cell]]
-            for group in groups:
-                gaps = [heading for heading in group if not cells[heading.cell]]
-                if len(gaps) < len(group):
-                    empty += gaps
+            empty = [(heading.text, _expected(heading)) for heading in needed if not cells[heading.cell]]
+            if required:
+                empty += self._empty_cells(line, cells, required)
             if empty:
                 incomplete.add(line, empty)
                 continue
@@ -200,8 +213,24 @@ class Header:
                 values.append(written.number(line, heading.text, text) * scale if text else math.nan)
             for index, texts in word_columns:
                 texts.append(known.setdefault(cells[index], cells[index]))
-        incomplete.tell(self.path, len(lines), skip=skip_incomplete)
+        incomplete.report(self.path, len(lines), skip=skip_incomplete)
         return UnitTable(path=self.path, headings=self.headings, lines=lines, numbers=numbers, words=words)
+
+    def _cell_text(self, cells: Sequence[str], name: str) -> str:
+        return cells[self.headings[name].cell] if name in self.headings else ""
+
+    def _empty_cells(
+        self, line: int, cells: Sequence[str], required: Callable[[CellText], Iterable[RequiredCells]]
+    ) -> Iterator[tuple[str, str]]:
+        """Give the columns of a row whose required cells are empty, and what was expected in them."""
+        cell_text = partial(self._cell_text, cells)
+        for names, expected in required(cell_text):
+            columns = self.present(names)
+            if not columns:
+                message = f"no such column; expected {expected}; there are {self.listing}"
+                raise FileFormatError(self.path, line, self.proposed(names[0]), message)
+            if not any(map(cell_text, columns)):
+                yield " or ".join(self.headings[name].text for name in columns), expected
 
 
 def read_header(
@@ -240,8 +269,14 @@ def read_headers(
     Raises:
         FileFormatError: as ``read_header``; a name of ``columns`` is in none of the files.
     """
-    mapping = {plain(name): (name, target) for name, target in (columns or {}).items()}
     files = [(Path(path), read_rows(path)) for path in paths]
+    mapping: dict[str, tuple[str, str]] = {}
+    for name, target in (columns or {}).items():
+        twin, _ = mapping.setdefault(plain(name), (name, target))
+        if twin != name:
+            path, rows = files[0]
+            message = f"this name in the column map differs from {shown(twin)} only in case or blanks"
+            raise FileFormatError(path, rows.head.line, shown(name).strip("'\""), message)
     headers = {plain(text): text for _, rows in files for text in rows.head.cells}
     for key, (name, target) in mapping.items():
         if key not in headers:
@@ -250,7 +285,10 @@ def read_headers(
             path, rows = files[0]
             there = ", ".join(rows.head.cells)
             raise FileFormatError(
-                path, rows.head.line, name, f"no such column to map to {target}{hint} There are {there}"
+                path,
+                rows.head.line,
+                shown(name).strip("'\""),
+                f"no such column to map to {target}{hint} There are {there}",
             )
     return [
         Header(
@@ -269,25 +307,29 @@ def _text(headings: Mapping[str, Heading], name: str) -> str:
     return headings[name].text if name in headings else name
 
 
+def _expected(heading: Heading) -> str:
+    return "a name" if heading.column.quantity is WORD else "a number"
+
+
 class _Incomplete:
     """Rows with cells that should not be empty."""
 
     def __init__(self) -> None:
         self._rows = 0
-        self._first: tuple[int, Heading] | None = None
+        self._first: tuple[int, str, str] | None = None
         self._columns: dict[str, tuple[int, list[int]]] = {}
 
-    def add(self, line: int, empty: Sequence[Heading]) -> None:
-        """Note the empty cells of a row."""
+    def add(self, line: int, empty: Sequence[tuple[str, str]]) -> None:
+        """Add a row with its empty cells: the text of their column, and what was expected."""
         self._rows += 1
-        self._first = self._first or (line, empty[0])
-        for heading in empty:
-            count, lines = self._columns.get(heading.text, (0, []))
+        self._first = self._first or (line, *empty[0])
+        for text, _ in empty:
+            count, lines = self._columns.get(text, (0, []))
             if len(lines) < _MAX_LINES:
                 lines.append(line)
-            self._columns[heading.text] = count + 1, lines
+            self._columns[text] = count + 1, lines
 
-    def tell(self, path: Path, complete: int, *, skip: bool) -> None:
+    def report(self, path: Path, complete: int, *, skip: bool) -> None:
         """Refuse the rows, or warn that they are left out.
 
         Raises:
@@ -295,7 +337,7 @@ class _Incomplete:
         """
         if self._first is None:
             return
-        line, heading = self._first
+        line, column, expected = self._first
         where = "; ".join(f"{text} in {in_lines(lines, count)}" for text, (count, lines) in self._columns.items())
         if skip and complete:
             text = f"{path}: {counted(self._rows, 'row')} omitted because of empty cells, {complete} read: {where}"
@@ -304,9 +346,8 @@ class _Incomplete:
         if skip:
             raise FileFormatError(path, line, "", f"every row has empty cells: {where}")
         if self._rows == 1 and len(self._columns) == 1:
-            kind = "a name" if heading.column.quantity is WORD else "a number"
             raise FileFormatError(
-                path, line, heading.text, f"empty; expected {kind}, or --skip-incomplete to omit the row"
+                path, line, column, f"empty; expected {expected}, or --skip-incomplete to omit the row"
             )
         raise FileFormatError(
             path, line, "", f"cells are empty: {where}; --skip-incomplete omits {counted(self._rows, 'row')}"
