@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from armwright.errors import FileFormatError
-from armwright.files.rows import Cells, NumberFormat, read_rows, text_cell
+from armwright.files.rows import CsvRow, NumberFormat, read_rows, text_cell
 
 Write = Callable[[str], Path]
 
@@ -25,8 +25,8 @@ def test_rows(write: Write) -> None:
     """Rows know their lines; blanks around cells, empty lines, a mark of byte order and ends of lines are nothing."""
     head, rows, separator = read_rows(write('\ufeffa, b\r\n\r\n1 ,"2,5"\r\n,\r\n3,4\r\n'))
 
-    assert (head, separator) == (Cells(1, ("a", "b")), ",")
-    assert [*rows] == [Cells(3, ("1", "2,5")), Cells(5, ("3", "4"))]
+    assert (head, separator) == (CsvRow(1, ("a", "b")), ",")
+    assert [*rows] == [CsvRow(3, ("1", "2,5")), CsvRow(5, ("3", "4"))]
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_widths(text: str, message: str, write: Write) -> None:
     """A row has as many cells as there are columns."""
     path = write(text)
     with pytest.raises(FileFormatError) as caught:
-        [*read_rows(path).below]
+        [*read_rows(path).rows]
 
     assert str(caught.value).replace(str(path), path.name) == message
 

@@ -10,10 +10,20 @@ import pytest
 from hypothesis import given, strategies as st
 
 from armwright.errors import FileFormatError, IncompleteRowsWarning, InvalidValueError, UnknownNameError
-from armwright.files.column_map import column_map
-from armwright.files.column_names import ANGLE, LENGTH, NUMBER, TIME, VELOCITY, Column, Schema, headings_of, units_of
+from armwright.files.column_map import parse_column_map
+from armwright.files.column_names import (
+    ANGLE,
+    LENGTH,
+    NUMBER,
+    TIME,
+    VELOCITY,
+    Column,
+    Schema,
+    default_units,
+    resolve_headings,
+)
 from armwright.files.limits import raised
-from armwright.files.rows import Cells
+from armwright.files.rows import CsvRow
 from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, read_header, read_headers
 
 Write = Callable[..., Path]
@@ -22,7 +32,7 @@ SCHEMA = Schema(
         Column(name="pose"),
         *(Column(name=name, quantity=LENGTH, group="coordinates") for name in "xyz"),
         *(Column(name=f"{name}_nominal", quantity=LENGTH, synonyms=(f"{name}_t",)) for name in "xyz"),
-        Column(name="joint_1", quantity=ANGLE, synonyms=("shoulder_pan",), about="joint 1 is revolute"),
+        Column(name="joint_1", quantity=ANGLE, synonyms=("shoulder_pan",), explanation="joint 1 is revolute"),
         Column(name="joint_2", quantity=ANGLE, synonyms=("joint_1",)),
         Column(name="speed", quantity=VELOCITY),
         Column(name="t", quantity=TIME, unit="s"),
@@ -173,7 +183,7 @@ def test_columns_that_do_not_agree(head: str, message: str, write: Write) -> Non
 
 def test_passed_over(write: Write) -> None:
     """Columns for people are passed over, and all that are not needed where a table may have others."""
-    some = Schema(columns=SCHEMA.columns, passes_over=True)
+    some = Schema(columns=SCHEMA.columns, ignores_unknown=True)
 
     assert [*read_header(write("note: warm,x_mm,Notes\n1,2,3\n"), SCHEMA).headings] == ["x"]
     assert [*read_header(write("x_mm,tau1,x_ft,pose_nr\n1,2,3,4\n"), some).headings] == ["x"]
@@ -183,11 +193,11 @@ def test_passed_over(write: Write) -> None:
 
 def test_stated_units(write: Write) -> None:
     """Units of a whole file are for columns whose names have none."""
-    header = read_header(write("x,y,joint_2\n1,2,3\n"), SCHEMA, units=units_of("cm", "mrad"))
+    header = read_header(write("x,y,joint_2\n1,2,3\n"), SCHEMA, units=default_units("cm", "mrad"))
 
     assert [heading.unit for heading in header.headings.values()] == ["cm", "cm", "mrad"]
     with pytest.raises(UnknownNameError, match="no unit of length 'mn'"):
-        units_of("mn", "deg")
+        default_units("mn", "deg")
     assert refused(lambda: read_header(write("x\n1\n"), SCHEMA, units={})).endswith("by --columns or --units")
 
 
@@ -265,9 +275,9 @@ def test_column_map_of_several_files(write: Write) -> None:
 
 def test_written_column_maps(write: Write) -> None:
     """A map is typed as pairs, or stands in a file whose names may have commas and equals signs."""
-    assert column_map(" A1 = joint_1_deg,X=x_mm") == {"A1": "joint_1_deg", "X": "x_mm"}
+    assert parse_column_map(" A1 = joint_1_deg,X=x_mm") == {"A1": "joint_1_deg", "X": "x_mm"}
     path = write('[columns]\nA1 = "joint_1_deg"\n"X, of the flange" = "x_mm"\n', "map.toml")
-    assert column_map(str(path)) == {"A1": "joint_1_deg", "X, of the flange": "x_mm"}
+    assert parse_column_map(str(path)) == {"A1": "joint_1_deg", "X, of the flange": "x_mm"}
 
 
 @pytest.mark.parametrize("text", ["A1=", "=x_mm", "A1=x_mm,", "A1=x_mm,y", "A1=x_mm,A1=y_mm", "", " "])
@@ -276,7 +286,7 @@ def test_bad_pairs(text: str) -> None:
     with pytest.raises(
         InvalidValueError, match=r"^expected (a column map such as A1=joint_1_deg,X=x_mm|every name once), g"
     ):
-        column_map(text)
+        parse_column_map(text)
 
 
 @pytest.mark.parametrize(
@@ -295,7 +305,7 @@ def test_bad_files_of_column_maps(text: str, message: str, write: Write) -> None
     path = write(text, "map.toml")
 
     with raised(table_columns=2):
-        assert refused(lambda: column_map(str(path))).startswith(message)
+        assert refused(lambda: parse_column_map(str(path))).startswith(message)
 
 
 # ---- rows ----------------------------------------------------------------------------------------------------------
@@ -395,5 +405,5 @@ def test_choices(word: str, hint: str, write: Write) -> None:
 def test_any_name(text: str) -> None:
     """Whatever the name of a column is, it is one of the schema, passed over, or refused by a message."""
     with suppress(FileFormatError):
-        found = headings_of(Path("t.csv"), Cells(1, (text,)), SCHEMA, {}, {"length": "mm"})
+        found = resolve_headings(Path("t.csv"), CsvRow(1, (text,)), SCHEMA, {}, {"length": "mm"})
         assert all(heading.column in SCHEMA.columns for heading in found.values())

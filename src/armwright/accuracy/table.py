@@ -172,10 +172,10 @@ def read_tables(
 
 
 def _table(header: Header, *, skip_incomplete: bool) -> Table:
-    name, nominal = _name(header), header.present(f"{name}_nominal" for name in (*_COORDINATES, *ANGLES))
-    identifiers = header.present(("test", "cycle"))
+    name, nominal = _name(header), header.columns_present(f"{name}_nominal" for name in (*_COORDINATES, *ANGLES))
+    identifiers = header.columns_present(("test", "cycle"))
     header.require(("x", "y") if nominal else ("test", "cycle", "x", "y"))
-    measured = header.present((*_COORDINATES, *ANGLES))
+    measured = header.columns_present((*_COORDINATES, *ANGLES))
     if nominal:
         header.require(
             (f"{name}_nominal" for name in measured), "either all measured columns have nominal columns, or none has"
@@ -191,8 +191,8 @@ def _table(header: Header, *, skip_incomplete: bool) -> Table:
     return Table(
         columns=columns,
         cycles=_cycles(columns) if "cycle" in columns else _counted(columns, name),
-        coordinates=header.present(_COORDINATES),
-        angles=header.present(ANGLES),
+        coordinates=header.columns_present(_COORDINATES),
+        angles=header.columns_present(ANGLES),
         nominal=bool(nominal),
     )
 
@@ -222,8 +222,8 @@ def _name(header: Header) -> str:
     Raises:
         FileFormatError: neither does, or both; or a path has nominal columns.
     """
-    name = header.exactly_one("pose", "path")
-    nominal = header.present(f"{name}_nominal" for name in _COORDINATES)
+    name = header.either_column("pose", "path")
+    nominal = header.columns_present(f"{name}_nominal" for name in _COORDINATES)
     if name == "path" and nominal:
         raise header.error(
             nominal[0], f"only poses have nominal columns; a path is commanded by rows of cycle {COMMANDED}"

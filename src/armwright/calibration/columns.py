@@ -33,7 +33,7 @@ def measured_columns(arm: Arm) -> Schema:
             name=name,
             quantity=ANGLE if joint.revolute else LENGTH,
             synonyms=(name, f"q{i}", joint.name),
-            about=f"{arm.called(i - 1)} of {arm.name} is {joint.kind}",
+            explanation=f"{arm.called(i - 1)} of {arm.name} is {joint.kind}",
         )
         for i, (name, joint) in enumerate(zip(joint_columns(arm), arm.joints, strict=True), 1)
     ]
@@ -77,10 +77,10 @@ def read_columns(
     """
     header = read_header(path, measured_columns(arm), columns=columns, units=units)
     joints = joint_columns(arm)
-    count = len(header.present(joints))
+    count = len(header.columns_present(joints))
     header.require(joints, f"{arm.name} has {arm.n} joints, and the file has {count}")
     points, deviations, angles, quaternion = (
-        bool(header.present(group)) for group in (POINTS, DEVIATIONS, RPY, QUATERNION)
+        bool(header.columns_present(group)) for group in (POINTS, DEVIATIONS, RPY, QUATERNION)
     )
     if points and deviations:
         raise header.error("x", f"give the points, or nominal points and deviations, not both: {header.listing}")
@@ -88,9 +88,9 @@ def read_columns(
         raise header.error("qw", f"give roll, pitch and yaw, or a quaternion, not both: {header.listing}")
     orientation = RPY if angles else QUATERNION if quaternion else ()
     position: tuple[str, ...] = POINTS
-    if not points and (deviations or header.present(NOMINAL)):
+    if not points and (deviations or header.columns_present(NOMINAL)):
         position = (*NOMINAL, *DEVIATIONS)
-    elif not points and not orientation and header.present(("plane", DISTANCE)):
+    elif not points and not orientation and header.columns_present(("plane", DISTANCE)):
         position = ()
     header.require((*position, *orientation))
     _require_related(header)
@@ -99,12 +99,12 @@ def read_columns(
 
 def _require_related(header: Header) -> None:
     """Refuse columns that lack what they belong to."""
-    labels = header.present(NAMES)
+    labels = header.columns_present(NAMES)
     if len(labels) > 1:
         raise header.error(labels[1], f"rows have one name, and column {labels[0]} has it")
-    if DISTANCE in header and not header.present(("anchor", "to")):
+    if DISTANCE in header and not header.columns_present(("anchor", "to")):
         raise header.error(DISTANCE, "from where? Expected a column anchor, or a column to with names of rows")
-    for name in header.present(("anchor", "to")):
+    for name in header.columns_present(("anchor", "to")):
         header.require([DISTANCE], f"{name} says from where it is")
     if "to" in header and not labels:
         header.require(["name"], "to has names of rows")

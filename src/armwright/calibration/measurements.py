@@ -29,8 +29,8 @@ from armwright.arrays import Array, Flags, read_only
 from armwright.calibration.columns import DEVIATIONS, DISTANCE, NAMES, NOMINAL, RPY, joint_columns, read_columns
 from armwright.calibration.readings import Readings, numbered
 from armwright.errors import FileFormatError, closest
-from armwright.files.column_names import Heading, units_of
-from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, in_lines
+from armwright.files.column_names import Heading, default_units
+from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, lines_text
 from armwright.spatial.rotations import rotation_from_quaternion
 
 _SETS = ("fit", "check")
@@ -100,10 +100,12 @@ def read_measurements(
             The text has file, line and column.
         UnknownNameError: there are no such ``units``.
     """
-    header, position, orientation = read_columns(path, arm, columns=columns, units=units_of(*units) if units else {})
+    header, position, orientation = read_columns(
+        path, arm, columns=columns, units=default_units(*units) if units else {}
+    )
     joints = joint_columns(arm)
     table = header.rows(
-        filled=[*joints, *header.present(["set"])],
+        filled=[*joints, *header.columns_present(["set"])],
         required=partial(_required_cells, header, position, orientation),
         skip_incomplete=skip_incomplete,
     )
@@ -126,7 +128,7 @@ def _required_cells(
     header: Header, position: Sequence[str], orientation: Sequence[str], cell_text: CellText
 ) -> Iterator[RequiredCells]:
     """Give the cells that a row requires, for it has one of a position, a plane and a distance, and that completely."""
-    others = header.present(("plane", DISTANCE))
+    others = header.columns_present(("plane", DISTANCE))
     has_position, has_orientation = any(map(cell_text, position)), any(map(cell_text, orientation))
     if has_position or has_orientation or not others:
         yield from (RequiredCells((name,), "a number") for name in position)
@@ -296,4 +298,4 @@ def _copies(readings: Readings, lines: Sequence[int]) -> list[str]:
 
 def _in_lines(numbers: Sequence[int], lines: Sequence[int]) -> str:
     """Name the lines of rows, not too many of them."""
-    return in_lines([lines[i] for i in numbers[:_SHOWN]], len(numbers))
+    return lines_text([lines[i] for i in numbers[:_SHOWN]], len(numbers))

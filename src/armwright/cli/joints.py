@@ -82,7 +82,7 @@ def _columns(arm: "Arm", quantities: tuple[str, ...]) -> "Schema":
             quantity, unit = units[not joint.revolute]
             synonyms = tuple(f"{name}{suffix}" for name in (f"joint_{i}", joint.name) if name)
             columns.append(names.Column(name=f"{symbol}{i}", quantity=quantity, unit=unit, synonyms=synonyms))
-    return names.Schema(columns=columns, passes_over=True)
+    return names.Schema(columns=columns, ignores_unknown=True)
 
 
 def _warn_of_degrees(arm: "Arm", path: Path, q: "Array") -> None:

@@ -42,10 +42,10 @@ def columns_of(text: str | None) -> dict[str, str] | None:
     if text is None:
         return None
     from armwright.errors import InvalidValueError
-    from armwright.files.column_map import column_map
+    from armwright.files.column_map import parse_column_map
 
     try:
-        return column_map(text)
+        return parse_column_map(text)
     except InvalidValueError as error:
         raise typer.BadParameter(str(error), param_hint="--columns") from error
 

@@ -7,7 +7,7 @@ from armwright.files.document import Document
 from armwright.files.limits import beyond, limit
 
 
-def column_map(text: str) -> dict[str, str]:
+def parse_column_map(text: str) -> dict[str, str]:
     """Return the names that columns are taken for, by their names in the file.
 
     Args:
@@ -20,7 +20,7 @@ def column_map(text: str) -> dict[str, str]:
     if not text.strip():
         raise InvalidValueError("expected a column map such as A1=joint_1_deg,X=x_mm, got an empty text")
     if "=" not in text:
-        return _in_file(Path(text))
+        return _read_column_map(Path(text))
     found: dict[str, str] = {}
     for part in text.split(","):
         name, _, target = (word.strip() for word in part.rpartition("="))
@@ -31,7 +31,7 @@ def column_map(text: str) -> dict[str, str]:
     return found
 
 
-def _in_file(path: Path) -> dict[str, str]:
+def _read_column_map(path: Path) -> dict[str, str]:
     root = Document.read(path).root
     table = root.table("columns", required=True)
     root.finish()

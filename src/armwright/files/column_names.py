@@ -14,15 +14,15 @@ from typing import NamedTuple
 import attrs
 
 from armwright.errors import FileFormatError, closest, one_of
-from armwright.files.rows import Cells
+from armwright.files.rows import CsvRow
 
-# Columns whose names begin so are for people.
+# Columns whose names begin with this are comments.
 NOTE = "note"
-# Words in the name of a column that say whether it was asked for or measured.
+# Words in the name of a column that mark commanded and measured values.
 _NOMINAL = {"nominal", "nom", "target", "commanded"}
 _MEASURED = {"measured", "meas", "actual"}
-# What parts words in the name of a column.
-_GAPS = re.compile(r"[\s_\-.,;:\[\](){}]+")
+# What separates words in the name of a column.
+_WORD_SEPARATORS = re.compile(r"[\s_\-.,;:\[\](){}]+")
 # A minus sign before a name or a word in it, as in ``-x_mm``; a hyphen has a word on its left.
 _MINUS = re.compile(r"^\W*-|[\s_(\[{]-(?=\w)")
 
@@ -39,7 +39,7 @@ class Quantity(NamedTuple):
     units: Mapping[str, float]
 
     @property
-    def usual(self) -> str:
+    def usual_unit(self) -> str:
         """The unit that is proposed."""
         return next(iter(self.units))
 
@@ -68,7 +68,7 @@ class Column:
         group: what columns that have one unit in a file are called together; empty where the unit is free.
         synonyms: other names that it may have.
         unit: of a column whose name has none; empty where the name must have one.
-        about: why it measures that, for who takes it for something else.
+        explanation: why it measures that, for the message about a unit of another quantity.
     """
 
     name: str
@@ -76,15 +76,15 @@ class Column:
     group: str = ""
     synonyms: tuple[str, ...] = ()
     unit: str = ""
-    about: str = ""
+    explanation: str = ""
 
     @property
-    def proposed(self) -> str:
+    def name_with_unit(self) -> str:
         """Its name, with the usual unit where it must have one."""
-        return self.name if self.unit or not self.quantity.units else f"{self.name}_{self.quantity.usual}"
+        return self.name if self.unit or not self.quantity.units else f"{self.name}_{self.quantity.usual_unit}"
 
     @property
-    def choices(self) -> str:
+    def names_with_units(self) -> str:
         """Its name with every unit that it may have."""
         return " or ".join(f"{self.name}_{unit}" for unit in self.quantity.units)
 
@@ -95,13 +95,13 @@ class Schema:
 
     Attributes:
         columns: all of them.
-        passes_over: whether a table may have others, which are passed over.
-        explain: what is to be said of a column that there is not, by its name in lower case with underscores; may be
-            empty.
+        ignores_unknown: whether a table may have others, which are ignored.
+        explain: returns what a message says of an unknown column, given its name in lower case with underscores; may
+            be empty.
     """
 
     columns: Sequence[Column]
-    passes_over: bool = False
+    ignores_unknown: bool = False
     explain: Callable[[str], str] = attrs.field(default=lambda _name: "")
 
 
@@ -109,13 +109,13 @@ class Heading(NamedTuple):
     """A column of a file.
 
     Attributes:
-        cell: which cell of a row is in it, from 0.
+        cell_index: which cell of a row is in it, from 0.
         column: what it is.
         unit: of its numbers; may be empty.
-        text: its name as messages show it: as it is written, and what it was mapped to.
+        text: its name for messages: as it is written, and what it was mapped to.
     """
 
-    cell: int
+    cell_index: int
     column: Column
     unit: str
     text: str
@@ -126,7 +126,7 @@ class Heading(NamedTuple):
         return self.column.quantity.units.get(self.unit, 1.0)
 
 
-def units_of(length: str, angle: str) -> dict[str, str]:
+def default_units(length: str, angle: str) -> dict[str, str]:
     """Return the units for columns whose names have none, by quantity.
 
     Raises:
@@ -138,8 +138,8 @@ def units_of(length: str, angle: str) -> dict[str, str]:
     }
 
 
-def headings_of(
-    path: Path, head: Cells, schema: Schema, mapping: Mapping[str, tuple[str, str]], units: Mapping[str, str] | None
+def resolve_headings(
+    path: Path, head: CsvRow, schema: Schema, mapping: Mapping[str, tuple[str, str]], units: Mapping[str, str] | None
 ) -> dict[str, Heading]:
     """Return the columns of a file by their names in the schema.
 
@@ -147,16 +147,16 @@ def headings_of(
         path: the file.
         head: its first line.
         schema: the columns that there may be.
-        mapping: what columns are taken for, by their ``plain`` names: as it was written, and a name with unit.
+        mapping: by ``normalised_name``, the name in the column map and the name with unit that it is mapped to.
         units: for columns whose names have none, by quantity; None where a reader takes none.
 
     Raises:
         FileFormatError: a column is unknown, there twice or without unit, or has another unit than its group.
     """
-    names = _Names(path, head.line, schema)
-    found: dict[str, Heading] = {}
+    names = _NameResolver(path, head.line, schema)
+    headings: dict[str, Heading] = {}
     for cell, written in enumerate(head.cells):
-        _, target = mapping.get(plain(written), ("", ""))
+        _, target = mapping.get(normalised_name(written), ("", ""))
         text = f"{written} as {target}" if target else written
         if (target or written).strip().lower().startswith(NOTE):
             continue
@@ -168,20 +168,22 @@ def headings_of(
         unit = unit or (units or {}).get(column.quantity.name, "") or column.unit
         if column.quantity.units and not unit:
             options = "--columns" if units is None else "--columns or --units"
-            raise names.error(text, f"the name has no unit: expected {column.choices}, in the file or by {options}")
-        if column.name in found:
-            raise names.error(text, f"a second column for this quantity, after {found[column.name].text}")
-        found[column.name] = Heading(cell, column, unit, text)
+            raise names.error(
+                text, f"the name has no unit: expected {column.names_with_units}, in the file or by {options}"
+            )
+        if column.name in headings:
+            raise names.error(text, f"a second column for this quantity, after {headings[column.name].text}")
+        headings[column.name] = Heading(cell, column, unit, text)
     first: dict[str, Heading] = {}
-    for heading in found.values():
+    for heading in headings.values():
         group = heading.column.group
         other = first.setdefault(group, heading) if group else heading
         if other.unit != heading.unit:
             raise names.error(heading.text, f"{group} must have one unit in a file, but {other.text} has another")
-    return found
+    return headings
 
 
-class _Names:
+class _NameResolver:
     """The names that the columns of a schema may have in a file."""
 
     def __init__(self, path: Path, line: int, schema: Schema) -> None:
@@ -199,7 +201,7 @@ class _Names:
         return FileFormatError(self._path, self._line, text or "''", message)
 
     def resolve(self, header: str, text: str, *, mapped: bool) -> tuple[Column, str] | None:
-        """Return which column a header is, and its unit, which may be empty; None where it is passed over.
+        """Return which column a header is, and its unit, which may be empty; None where it is ignored.
 
         Args:
             header: the name of a column.
@@ -210,14 +212,17 @@ class _Names:
             FileFormatError: there is no such column or unit, or several columns may be meant.
         """
         words = _words(header)
-        plainly = [word for word in words if word not in _NOMINAL | _MEASURED]
+        words_without_role = [word for word in words if word not in _NOMINAL | _MEASURED]
         nominal = ["nominal"] if _NOMINAL & set(words) else []
         # The longest name counts, as a name may begin with another: x_t_mm is no x.
         splits = [(words[:end], words[end:]) for end in range(len(words), 0, -1)]
-        if len(plainly) < len(words):
+        if len(words_without_role) < len(words):
             splits = [split for split in splits if set(split[1]).isdisjoint(_NOMINAL | _MEASURED)]
-            splits += [(plainly[:end] + nominal, plainly[end:]) for end in range(len(plainly), 0, -1)]
-        lenient = self._schema.passes_over and not mapped
+            splits += [
+                (words_without_role[:end] + nominal, words_without_role[end:])
+                for end in range(len(words_without_role), 0, -1)
+            ]
+        lenient = self._schema.ignores_unknown and not mapped
         for name, unit in (("_".join(name), "_".join(unit)) for name, unit in splits):
             columns = (self._own.get(name) if mapped else None) or self._all.get(name, [])
             if not columns:
@@ -229,12 +234,12 @@ class _Names:
                 return columns[0], unit
             # What is longer than a unit belongs to the name of a column that there is not.
             if columns[0].quantity.units and ("_" not in unit or "_per_" in unit) and not lenient:
-                raise self.error(text, _wrong_unit(columns[0], unit))
+                raise self.error(text, _unit_error_text(columns[0], unit))
         if lenient:
             return None
-        raise self._unknown("_".join(words), text)
+        raise self._unknown_name_error("_".join(words), text)
 
-    def _unknown(self, name: str, text: str) -> FileFormatError:
+    def _unknown_name_error(self, name: str, text: str) -> FileFormatError:
         explained = self._schema.explain(name)
         if explained:
             return self.error(text, explained)
@@ -245,11 +250,11 @@ class _Names:
         ]
         near = closest(name, spellings)
         hint = f" Did you mean '{near}'?" if near else ""
-        known = ", ".join(column.proposed for column in self._schema.columns)
+        known = ", ".join(column.name_with_unit for column in self._schema.columns)
         return self.error(text, f"no such column.{hint} Known: {known}; comments are columns named note...")
 
 
-def plain(header: str) -> str:
+def normalised_name(header: str) -> str:
     """Return the name of a column without what makes no difference in a column map: case and blanks."""
     return " ".join(header.lower().split())
 
@@ -259,12 +264,12 @@ def _words(header: str) -> list[str]:
     text = unicodedata.normalize("NFKC", header).lower()
     for sign, word in (("μ", "u"), ("°", "deg"), ("/", "_per_"), ("^", "")):
         text = text.replace(sign, word)
-    return [word for word in _GAPS.split(text) if word]
+    return [word for word in _WORD_SEPARATORS.split(text) if word]
 
 
-def _wrong_unit(column: Column, unit: str) -> str:
-    """Say that a column has no such unit."""
+def _unit_error_text(column: Column, unit: str) -> str:
+    """Return the message that a column has no such unit."""
     other = next((quantity.name for quantity in _QUANTITIES if unit in quantity.units), None)
     if other is None:
-        return f"unknown unit '{unit}': expected {column.choices}"
-    return f"{unit} is a unit of {other}{f', and {column.about}' if column.about else ''}: expected {column.choices}"
+        return f"unknown unit '{unit}': expected {column.names_with_units}"
+    return f"{unit} is a unit of {other}{f', and {column.explanation}' if column.explanation else ''}: expected {column.names_with_units}"

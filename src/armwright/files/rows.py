@@ -1,4 +1,4 @@
-"""Tables in CSV as people send them: rows of cells with their lines, between commas, semicolons or tabs."""
+"""Reading CSV: rows of cells with their line numbers, separated by commas, semicolons or tabs."""
 
 import csv
 import itertools
@@ -11,38 +11,38 @@ from armwright.errors import FileFormatError, shown
 from armwright.files.inputs import read_lines
 from armwright.files.limits import beyond, limit
 
-# The first is taken where a line has none of them.
+# The first is the default for a line with none of them.
 _SEPARATORS = (",", ";", "\t")
 # A line of these alone is empty.
-_NOTHING = ' ,;\t\r\n"'
+_BLANKS_AND_SEPARATORS = ' ,;\t\r\n"'
 # A number that is written longer is shown rounded.
-_MAX_LENGTH = 40
+_MAX_SHOWN_LENGTH = 40
 
 
-class Cells(NamedTuple):
+class CsvRow(NamedTuple):
     """One line of a table.
 
     Attributes:
         line: of the file, from 1.
-        cells: what stands in it, without blanks around.
+        cells: their texts, without surrounding blanks.
     """
 
     line: int
     cells: tuple[str, ...]
 
 
-class Rows(NamedTuple):
-    """A table as cells.
+class CsvTable(NamedTuple):
+    """A table, row by row.
 
     Attributes:
         head: the names of the columns as they are written.
-        below: the rows, each as wide as the head; they are read when they are asked for, so that a table of many
+        rows: the rows, each as wide as the head; they are read when they are asked for, so that a table of many
             millions needs no more memory than one row.
-        separator: what stands between cells: a comma, a semicolon or a tab.
+        separator: between cells: a comma, a semicolon or a tab.
     """
 
-    head: Cells
-    below: Iterator[Cells]
+    head: CsvRow
+    rows: Iterator[CsvRow]
     separator: str
 
 
@@ -54,8 +54,8 @@ def text_cell(text: str) -> str:
     return '"' + plain.replace('"', '""') + '"' if any(sign in plain for sign in ',;"\t') else plain
 
 
-def read_rows(path: Path | str) -> Rows:
-    """Read a table; the first line in which something stands names its columns, and empty lines are left out.
+def read_rows(path: Path | str) -> CsvTable:
+    """Read a table; its first line that is not empty names the columns, and other empty lines are ignored.
 
     Raises:
         FileFormatError: the file is missing, empty, has no rows or more columns than the limit; and while rows are
@@ -65,40 +65,40 @@ def read_rows(path: Path | str) -> Rows:
     lines = read_lines(path)
     skipped = 0
     for text in lines:
-        if text.strip(_NOTHING):
+        if text.strip(_BLANKS_AND_SEPARATORS):
             break
         skipped += 1
     else:
-        raise _empty(path)
+        raise _empty_file_error(path)
     # Most columns win: the name of a column may have a sign in it that separates cells elsewhere.
     begin = text[: csv.field_size_limit()]
     separator = max(_SEPARATORS, key=lambda sign: len(next(csv.reader([begin], delimiter=sign))))
-    cells = _cells(path, itertools.chain([text], lines), separator, skipped)
+    cells = _nonempty_rows(path, itertools.chain([text], lines), separator, skipped)
     head = next(cells, None)
     if head is None:
-        raise _empty(path)
+        raise _empty_file_error(path)
     if len(head.cells) > limit("table_columns"):
         raise FileFormatError(path, head.line, "", f"too many columns: {beyond('table_columns', len(head.cells))}")
     first = next(cells, None)
     if first is None:
         raise FileFormatError(path, None, "", "no rows after the column names")
-    rows = _of_one_width(path, head, itertools.chain([first], cells), separator)
+    rows = _check_widths(path, head, itertools.chain([first], cells), separator)
     # Some programs write a separator after the last cell, too.
-    names = Cells(head.line, head.cells[: _width(head)])
-    return Rows(names, rows, separator)
+    names = CsvRow(head.line, head.cells[: _column_count(head)])
+    return CsvTable(names, rows, separator)
 
 
-def _width(head: Cells) -> int:
+def _column_count(head: CsvRow) -> int:
     """Return the number of columns up to the last that has a name."""
     return max(i for i, name in enumerate(head.cells, 1) if name)
 
 
-def _empty(path: Path) -> FileFormatError:
+def _empty_file_error(path: Path) -> FileFormatError:
     return FileFormatError(path, None, "", "the file is empty; expected column names in its first line")
 
 
-def _cells(path: Path, lines: Iterable[str], separator: str, skipped: int) -> Iterator[Cells]:
-    """Give the lines in which something stands, below those that were skipped; the first names the columns."""
+def _nonempty_rows(path: Path, lines: Iterable[str], separator: str, skipped: int) -> Iterator[CsvRow]:
+    """Give the lines that are not empty, counted from those that were skipped; the first names the columns."""
     reader = csv.reader(lines, delimiter=separator)
     count, most = 0, limit("table_rows")
     try:
@@ -108,18 +108,18 @@ def _cells(path: Path, lines: Iterable[str], separator: str, skipped: int) -> It
                 if count > most:
                     raise FileFormatError(path, skipped + reader.line_num, "", f"too many rows: {beyond('table_rows')}")
                 count += 1
-                yield Cells(skipped + reader.line_num, cells)
+                yield CsvRow(skipped + reader.line_num, cells)
     except csv.Error as error:
         raise FileFormatError(path, skipped + reader.line_num, "", f"not valid CSV: {error}") from error
 
 
-def _of_one_width(path: Path, head: Cells, rows: Iterable[Cells], separator: str) -> Iterator[Cells]:
+def _check_widths(path: Path, head: CsvRow, rows: Iterable[CsvRow], separator: str) -> Iterator[CsvRow]:
     """Give the rows, each with as many cells as there are columns, without empty cells under empty names at the end.
 
     Raises:
         FileFormatError: a row is longer or shorter, or has a value under an empty name at the end.
     """
-    width = _width(head)
+    width = _column_count(head)
     for row in rows:
         if len(row.cells) != len(head.cells):
             decimal = separator == "," and len(row.cells) > len(head.cells)
@@ -133,7 +133,7 @@ def _of_one_width(path: Path, head: Cells, rows: Iterable[Cells], separator: str
         if any(row.cells[width:]):
             message = f"the last column has no name, but a value in line {row.line}"
             raise FileFormatError(path, head.line, "''", message)
-        yield Cells(row.line, row.cells[:width])
+        yield CsvRow(row.line, row.cells[:width])
 
 
 class NumberFormat:
@@ -142,39 +142,39 @@ class NumberFormat:
     def __init__(self, path: Path, separator: str) -> None:
         """Expect decimal points between commas; elsewhere the first number decides."""
         self._path, self._comma_separates = path, separator == ","
-        self._sign, self._line = "", 0
+        self._mark, self._line = "", 0
 
     def number(self, line: int, header: str, text: str) -> float:
-        """Return the number that stands in a cell.
+        """Return the number in a cell.
 
         Raises:
-            FileFormatError: there is none, or none that a robot has.
+            FileFormatError: it is no number, not finite or too large.
         """
         point = text
         if not self._comma_separates and ("," in text or "." in text):
             point = self._with_point(line, header, text)
-        value = _parsed(point)
+        value = _parse_number(point)
         if value is None:
-            hint = "; write a decimal point" if _parsed(text.replace(",", ".")) is not None else ""
+            hint = "; write a decimal point" if _parse_number(text.replace(",", ".")) is not None else ""
             raise FileFormatError(self._path, line, header, f"expected a number, got {shown(text)}{hint}")
         if not abs(value) <= LARGEST:
-            got = text if len(text) < _MAX_LENGTH else f"{value:g}"
+            got = text if len(text) < _MAX_SHOWN_LENGTH else f"{value:g}"
             raise FileFormatError(
                 self._path, line, header, f"every number must be finite and no larger than {LARGEST:g}, got {got}"
             )
         return value
 
     def _with_point(self, line: int, header: str, text: str) -> str:
-        """Return a number with a decimal point; where a file has both signs, one of them parts thousands.
+        """Return a number with a decimal point; in a file with both signs, one of them separates thousands.
 
         Raises:
             FileFormatError: other numbers of the file have the other sign.
         """
-        sign = "," if "," in text else "."
-        if not self._sign:
-            self._sign, self._line = sign, line
-        if sign != self._sign:
-            expected = "point" if sign == "," else "comma"
+        mark = "," if "," in text else "."
+        if not self._mark:
+            self._mark, self._line = mark, line
+        if mark != self._mark:
+            expected = "point" if mark == "," else "comma"
             raise FileFormatError(
                 self._path,
                 line,
@@ -185,7 +185,7 @@ class NumberFormat:
         return text.replace(",", ".")
 
 
-def _parsed(text: str) -> float | None:
+def _parse_number(text: str) -> float | None:
     # Python also reads underscores between digits, and digits of other scripts, which no other reader of CSV does.
     try:
         return float(text) if text.isascii() and "_" not in text else None

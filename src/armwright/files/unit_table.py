@@ -18,8 +18,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, IncompleteRowsWarning, closest, counted, shortened, shown
-from armwright.files.column_names import WORD, Heading, Schema, headings_of, plain
-from armwright.files.rows import Cells, NumberFormat, read_rows
+from armwright.files.column_names import WORD, Heading, Schema, normalised_name, resolve_headings
+from armwright.files.rows import CsvRow, NumberFormat, read_rows
 
 # Of the lines in which a column is empty a message names this many.
 _MAX_LINES = 20
@@ -100,7 +100,7 @@ class UnitTable:
 
     def error(self, row: int, name: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a cell; of a whole row where the name is empty."""
-        return FileFormatError(self.path, self.lines[row], _text(self.headings, name), message)
+        return FileFormatError(self.path, self.lines[row], _column_text(self.headings, name), message)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -118,14 +118,14 @@ class Header:
     line: int
     headings: Mapping[str, Heading]
     schema: Schema
-    _below: Iterator[Cells]
+    _rows: Iterator[CsvRow]
     _separator: str
 
     def __contains__(self, name: str) -> bool:
         """Whether there is a column of this name."""
         return name in self.headings
 
-    def present(self, names: Iterable[str]) -> tuple[str, ...]:
+    def columns_present(self, names: Iterable[str]) -> tuple[str, ...]:
         """Return which of some columns there are."""
         return tuple(name for name in names if name in self.headings)
 
@@ -136,7 +136,7 @@ class Header:
 
     def error(self, name: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a column."""
-        return FileFormatError(self.path, self.line, _text(self.headings, name), message)
+        return FileFormatError(self.path, self.line, _column_text(self.headings, name), message)
 
     def require(self, names: Iterable[str], because: str = "") -> None:
         """Refuse a file that lacks a column.
@@ -151,19 +151,19 @@ class Header:
         for name in names:
             if name not in self.headings:
                 reason = f"{because}; " if because else ""
-                raise self.error(self.proposed(name), f"no such column; {reason}there are {self.listing}")
+                raise self.error(self.name_with_unit(name), f"no such column; {reason}there are {self.listing}")
 
-    def proposed(self, name: str) -> str:
+    def name_with_unit(self, name: str) -> str:
         """Return the name of a column of the schema with its usual unit."""
-        return next(column.proposed for column in self.schema.columns if column.name == name)
+        return next(column.name_with_unit for column in self.schema.columns if column.name == name)
 
-    def exactly_one(self, first: str, second: str) -> str:
+    def either_column(self, first: str, second: str) -> str:
         """Return which of two columns the file has.
 
         Raises:
             FileFormatError: it has both, or neither.
         """
-        names = self.present((first, second))
+        names = self.columns_present((first, second))
         if len(names) != 1:
             there = "both" if names else "neither"
             text = f"expected a column {first} or a column {second}, but the file has {there}: {self.listing}"
@@ -197,11 +197,11 @@ class Header:
                 words[name] = []
             else:
                 numbers[name] = array("d")
-        incomplete, written = _Incomplete(), NumberFormat(self.path, self._separator)
+        incomplete, written = _IncompleteRows(), NumberFormat(self.path, self._separator)
         number_columns = [(self.headings[name], self.headings[name].scale, numbers[name]) for name in numbers]
-        word_columns = [(self.headings[name].cell, texts) for name, texts in words.items()]
-        for line, cells in self._below:
-            empty = [(heading.text, _expected(heading)) for heading in needed if not cells[heading.cell]]
+        word_columns = [(self.headings[name].cell_index, texts) for name, texts in words.items()]
+        for line, cells in self._rows:
+            empty = [(heading.text, _expected_content(heading)) for heading in needed if not cells[heading.cell_index]]
             if required:
                 empty += self._empty_cells(line, cells, required)
             if empty:
@@ -209,7 +209,7 @@ class Header:
                 continue
             lines.append(line)
             for heading, scale, values in number_columns:
-                text = cells[heading.cell]
+                text = cells[heading.cell_index]
                 values.append(written.number(line, heading.text, text) * scale if text else math.nan)
             for index, texts in word_columns:
                 texts.append(known.setdefault(cells[index], cells[index]))
@@ -217,7 +217,7 @@ class Header:
         return UnitTable(path=self.path, headings=self.headings, lines=lines, numbers=numbers, words=words)
 
     def _cell_text(self, cells: Sequence[str], name: str) -> str:
-        return cells[self.headings[name].cell] if name in self.headings else ""
+        return cells[self.headings[name].cell_index] if name in self.headings else ""
 
     def _empty_cells(
         self, line: int, cells: Sequence[str], required: Callable[[CellText], Iterable[RequiredCells]]
@@ -225,10 +225,10 @@ class Header:
         """Give the columns of a row whose required cells are empty, and what was expected in them."""
         cell_text = partial(self._cell_text, cells)
         for names, expected in required(cell_text):
-            columns = self.present(names)
+            columns = self.columns_present(names)
             if not columns:
                 message = f"no such column; expected {expected}; there are {self.listing}"
-                raise FileFormatError(self.path, line, self.proposed(names[0]), message)
+                raise FileFormatError(self.path, line, self.name_with_unit(names[0]), message)
             if not any(map(cell_text, columns)):
                 yield " or ".join(self.headings[name].text for name in columns), expected
 
@@ -272,12 +272,12 @@ def read_headers(
     files = [(Path(path), read_rows(path)) for path in paths]
     mapping: dict[str, tuple[str, str]] = {}
     for name, target in (columns or {}).items():
-        twin, _ = mapping.setdefault(plain(name), (name, target))
+        twin, _ = mapping.setdefault(normalised_name(name), (name, target))
         if twin != name:
             path, rows = files[0]
             message = f"this name in the column map differs from {shown(twin)} only in case or blanks"
             raise FileFormatError(path, rows.head.line, shown(name).strip("'\""), message)
-    headers = {plain(text): text for _, rows in files for text in rows.head.cells}
+    headers = {normalised_name(text): text for _, rows in files for text in rows.head.cells}
     for key, (name, target) in mapping.items():
         if key not in headers:
             near = closest(key, headers)
@@ -294,24 +294,24 @@ def read_headers(
         Header(
             path=path,
             line=rows.head.line,
-            headings=headings_of(path, rows.head, schema, mapping, units),
+            headings=resolve_headings(path, rows.head, schema, mapping, units),
             schema=schema,
-            below=rows.below,
+            rows=rows.rows,
             separator=rows.separator,
         )
         for path, rows in files
     ]
 
 
-def _text(headings: Mapping[str, Heading], name: str) -> str:
+def _column_text(headings: Mapping[str, Heading], name: str) -> str:
     return headings[name].text if name in headings else name
 
 
-def _expected(heading: Heading) -> str:
+def _expected_content(heading: Heading) -> str:
     return "a name" if heading.column.quantity is WORD else "a number"
 
 
-class _Incomplete:
+class _IncompleteRows:
     """Rows with cells that should not be empty."""
 
     def __init__(self) -> None:
@@ -338,7 +338,7 @@ class _Incomplete:
         if self._first is None:
             return
         line, column, expected = self._first
-        where = "; ".join(f"{text} in {in_lines(lines, count)}" for text, (count, lines) in self._columns.items())
+        where = "; ".join(f"{text} in {lines_text(lines, count)}" for text, (count, lines) in self._columns.items())
         if skip and complete:
             text = f"{path}: {counted(self._rows, 'row')} omitted because of empty cells, {complete} read: {where}"
             warnings.warn(shortened(text), IncompleteRowsWarning, stacklevel=2)
@@ -354,7 +354,7 @@ class _Incomplete:
         )
 
 
-def in_lines(lines: Sequence[int], count: int | None = None) -> str:
+def lines_text(lines: Sequence[int], count: int | None = None) -> str:
     """Name lines of a file, of which there may be more than are named: ``lines 3, 4 and 7 more``."""
     more = (count or len(lines)) - len(lines)
     return (

@@ -152,7 +152,7 @@ def read_measured(
             farther from its commanded position than any clearance allows. The text has file and line.
     """
     header = read_header(path, _SCHEMA, columns=columns)
-    column = header.exactly_one("pose", "path")
+    column = header.either_column("pose", "path")
     expected = _AT_REST if column == "pose" else _ON_PATHS
     header.require(expected)
     table = header.rows(filled=expected, skip_incomplete=skip_incomplete)
