@@ -212,16 +212,13 @@ class _NameResolver:
             FileFormatError: there is no such column or unit, or several columns may be meant.
         """
         words = _words(header)
-        words_without_role = [word for word in words if word not in _NOMINAL | _MEASURED]
+        base_words = [word for word in words if word not in _NOMINAL | _MEASURED]
         nominal = ["nominal"] if _NOMINAL & set(words) else []
         # The longest name counts, as a name may begin with another: x_t_mm is no x.
         splits = [(words[:end], words[end:]) for end in range(len(words), 0, -1)]
-        if len(words_without_role) < len(words):
+        if len(base_words) < len(words):
             splits = [split for split in splits if set(split[1]).isdisjoint(_NOMINAL | _MEASURED)]
-            splits += [
-                (words_without_role[:end] + nominal, words_without_role[end:])
-                for end in range(len(words_without_role), 0, -1)
-            ]
+            splits += [(base_words[:end] + nominal, base_words[end:]) for end in range(len(base_words), 0, -1)]
         lenient = self._schema.ignores_unknown and not mapped
         for name, unit in (("_".join(name), "_".join(unit)) for name, unit in splits):
             columns = (self._own.get(name) if mapped else None) or self._all.get(name, [])
@@ -272,4 +269,5 @@ def _unit_error_text(column: Column, unit: str) -> str:
     other = next((quantity.name for quantity in _QUANTITIES if unit in quantity.units), None)
     if other is None:
         return f"unknown unit '{unit}': expected {column.names_with_units}"
-    return f"{unit} is a unit of {other}{f', and {column.explanation}' if column.explanation else ''}: expected {column.names_with_units}"
+    explanation = f", and {column.explanation}" if column.explanation else ""
+    return f"{unit} is a unit of {other}{explanation}: expected {column.names_with_units}"

@@ -126,7 +126,7 @@ class Header:
         return name in self.headings
 
     def columns_present(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Return which of some columns there are."""
+        """Return those of some columns that the file has."""
         return tuple(name for name in names if name in self.headings)
 
     @property
