@@ -11,7 +11,7 @@ from hypothesis import example, given, settings, strategies as st
 
 from armwright.errors import FileFormatError
 from armwright.files.document import Document
-from armwright.files.lines import Keys, Line, TwinKeyError, json_lines, toml_lines
+from armwright.files.key_lines import DuplicateKeyError, Keys, LineTree, json_lines, toml_lines
 
 # What TOML is made of, and what a careless reader stumbles over.
 TOML_PIECES = (
@@ -92,10 +92,10 @@ def entries(value: Any, keys: Keys = ()) -> list[Keys]:
     return [way for key, entry in below for way in ((*keys, key), *entries(entry, (*keys, key)))]
 
 
-def every_line(tree: Line, keys: Keys = ()) -> Iterator[tuple[Keys, int]]:
+def every_line(tree: LineTree, keys: Keys = ()) -> Iterator[tuple[Keys, int]]:
     """Yield the keys of every value with its line."""
-    for key, below in tree.below.items():
-        if isinstance(below, Line):
+    for key, below in tree.children.items():
+        if isinstance(below, LineTree):
             yield (*keys, key), below.line
             yield from every_line(below, (*keys, key))
         else:
@@ -174,7 +174,7 @@ def test_what_json_accepts(text: str, braced: bool) -> None:  # noqa: FBT001
     except json.JSONDecodeError:
         return
     if any(len(keys) > len(set(keys)) for keys in objects):
-        with pytest.raises(TwinKeyError):
+        with pytest.raises(DuplicateKeyError):
             json_lines(text)
         return
     lines = dict(every_line(json_lines(text)))
@@ -211,6 +211,6 @@ def test_a_name_that_cannot_be_seen(tmp_path: Path) -> None:
         (tmp_path / "a.toml").write_text(f"\n{written} = 1\n")
 
         with pytest.raises(FileFormatError, match=r"a\.toml:2: ") as caught:
-            Document.read(tmp_path / "a.toml").root.finish()
+            Document.read(tmp_path / "a.toml").root.refuse_unknown_keys()
 
         assert str(caught.value).endswith(f": {name!r}: unknown key; no keys are allowed here")

@@ -47,7 +47,7 @@ def test_everything_is_read(at: Callable[..., Table]) -> None:
     assert top.choice("kind", ("a", "b")) == "b"
     assert top.table("hand").positive("reach_m") == 1.5
     assert [joint.number("d_m") for joint in top.tables("joint")] == [1.0, 2.0]
-    top.finish()
+    top.refuse_unknown_keys()
 
 
 def test_what_is_not_given_has_its_default(at: Callable[..., Table]) -> None:
@@ -61,7 +61,7 @@ def test_what_is_not_given_has_its_default(at: Callable[..., Table]) -> None:
     assert top.table("hand").positive("reach_m", default=1.0) == 1.0
     np.testing.assert_array_equal(top.vector("com_m", 3, default=(1, 2, 3)), (1, 2, 3))
     assert "name" not in top
-    top.finish()
+    top.refuse_unknown_keys()
 
 
 def test_toml_and_json_say_the_same(at: Callable[..., Table]) -> None:
@@ -78,8 +78,8 @@ def test_names_that_are_free(at: Callable[..., Table]) -> None:
     """The keys of a table of frames are names: they come in the order of the file."""
     frames = at("[frames.PART]\nx = 1\n[frames.BOX]\nx = 2\n").table("frames")
 
-    assert list(frames.free_keys()) == ["PART", "BOX"]
-    assert [frames.table(key).number("x") for key in frames.free_keys()] == [1, 2]
+    assert list(frames) == ["PART", "BOX"]
+    assert [frames.table(key).number("x") for key in frames] == [1, 2]
     assert frames.is_table("PART")
     assert not frames.table("PART").is_table("x")
 
@@ -242,7 +242,7 @@ def test_unknown_keys(case: str, at: Callable[..., Table], tmp_path: Path) -> No
     top.text("name", default="")
     top.allow("reach_m")
 
-    assert refused(tmp_path, top.finish) == f"thing.toml:{said}"
+    assert refused(tmp_path, top.refuse_unknown_keys) == f"thing.toml:{said}"
 
 
 def test_nothing_is_known(at: Callable[..., Table], tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ def test_nothing_is_known(at: Callable[..., Table], tmp_path: Path) -> None:
     top = at("[camera]\nx = 1")
 
     assert (
-        refused(tmp_path, top.table("camera").finish)
+        refused(tmp_path, top.table("camera").refuse_unknown_keys)
         == "thing.toml:2: camera, x: unknown key; no keys are allowed here"
     )
 
@@ -334,7 +334,7 @@ def test_any_text(pieces: list[str], ending: str, tmp_path: Path) -> None:
     except FileFormatError as error:
         said = str(error)
     else:
-        keys = list(root.free_keys())
-        said = refused(tmp_path, root.finish) if keys else f"{path}"
+        keys = list(root)
+        said = refused(tmp_path, root.refuse_unknown_keys) if keys else f"{path}"
 
     assert said.startswith((str(path), path.name))

@@ -19,8 +19,8 @@ from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError,
 from armwright.files import inputs, limits
 from armwright.files.document import Document
 from armwright.files.inputs import read_lines, read_text, read_typed_program
+from armwright.files.key_lines import longest_dotted_key
 from armwright.files.limits import LIMITS, limit, parsed, raised
-from armwright.files.lines import longest_dotted_key
 from armwright.files.rows import read_rows
 from armwright.motion.poses_file import read_poses
 from armwright.program import compile as compile_program
@@ -276,7 +276,7 @@ def test_the_page() -> None:
 
 def test_every_file_is_read_in_one_place() -> None:
     """Nobody but the readers opens a file that a user names, or parses what it holds."""
-    own = {"files/inputs.py", "files/document.py", "files/lines.py", "files/rows.py", "arm/urdf/elements.py"}
+    own = {"files/inputs.py", "files/document.py", "files/key_lines.py", "files/rows.py", "arm/urdf/elements.py"}
     opening = re.compile(
         r"tomllib\.|csv\.reader|etree\.(parse|fromstring)|stdin\.buffer\.read\(|\bread_bytes\(\)|\.read_text\("
     )

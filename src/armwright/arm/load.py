@@ -73,7 +73,7 @@ def read_arm(path: Path | str) -> Arm:
         joints.append(_joint(table))
         links.append(_link(table.table("link")))
         motors.append(_motor(table.table("motor"), joints[-1].revolute))
-        table.finish()
+        table.refuse_unknown_keys()
     base, tool = pose_in(top.table("base")), pose_in(top.table("tool"))
     if convention == "modified":
         before, joints, links = from_modified(joints, links)
@@ -99,7 +99,7 @@ def read_arm(path: Path | str) -> Arm:
         uncertainty=_uncertainty(top.table("uncertainty")),
     )
     for table in (hand, gravity, top):
-        table.finish()
+        table.refuse_unknown_keys()
     return arm
 
 
@@ -118,12 +118,12 @@ def read_load(path: Path | str) -> Link:
 
 
 def _uncertainty(table: Table) -> Uncertainty | None:
-    if not [*table.free_keys()]:
+    if not list(table):
         return None
     errors = table.texts("errors")
     rows = table.vectors("covariance", len(errors))
     noise = number_in(table, "noise", LENGTH, default=0.0)
-    table.finish()
+    table.refuse_unknown_keys()
     try:
         return Uncertainty(errors=errors, covariance=np.array(rows), noise=noise)
     except (InvalidValueError, ShapeError) as error:
@@ -143,7 +143,7 @@ def _joint(table: Table) -> Joint:
         "acceleration": number_in(limits, "acceleration", per(units, "per_s2"), default=math.inf, positive=True),
         "effort": number_in(limits, "effort", effort, default=math.inf, positive=True),
     }
-    limits.finish()
+    limits.refuse_unknown_keys()
     if not values["lower"] < values["upper"]:
         lower, upper = (_written(kind, values[name]) for name in ("lower", "upper"))
         raise limits.error(None, f"the lower limit must be below the upper, got {lower} and {upper}")
@@ -173,13 +173,13 @@ def _link(table: Table) -> Link:
         for key in ("mass_kg", "com_m", "inertia_kgm2"):
             if key in table:
                 raise table.error(key, "mass and inertia are declared unknown; specify either them or the reason")
-        table.finish()
+        table.refuse_unknown_keys()
         return Link(unknown=unknown, name=name)
     mass = table.number("mass_kg", default=0.0, lower=0.0)
     com = vector_in(table, "com", LENGTH, default=np.zeros(3))
     numbers = table.vector("inertia_kgm2", (3, 6), default=np.zeros(3))
     about = table.choice("inertia_about", ("com", "frame"), default="com")
-    table.finish()
+    table.refuse_unknown_keys()
     xx, yy, zz, xy, xz, yz = (*numbers, 0.0, 0.0, 0.0)[:6]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if about == "frame":
@@ -212,7 +212,7 @@ def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
         coulomb_forward=table.number(f"coulomb_forward_{force}", default=0.0, lower=0.0),
         coulomb_backward=table.number(f"coulomb_backward_{force}", default=0.0, lower=0.0),
     )
-    table.finish()
+    table.refuse_unknown_keys()
     return motor
 
 

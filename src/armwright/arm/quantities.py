@@ -71,7 +71,7 @@ def typed_pose(table: Table) -> TypedPose:
 def pose_in(table: Table) -> Array:
     """Read a table that is a pose and nothing else, (4, 4); see ``typed_pose``."""
     X = typed_pose(table).X
-    table.finish()
+    table.refuse_unknown_keys()
     return X
 
 

@@ -90,7 +90,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):
-        table.finish()
+        table.refuse_unknown_keys()
     return cell
 
 
@@ -121,7 +121,7 @@ def _around(motion: Table) -> Around | None:
 def _arms(table: Table, folder: Path) -> dict[str, CellArm]:
     arms: dict[str, CellArm] = {}
     _refuse_more(table, "arms")
-    for key in table.free_keys():
+    for key in table:
         match = _ARM_NAME.fullmatch(key)
         if match is None:
             raise table.error(key, "expected the name of an arm, such as ARM_1")
@@ -164,7 +164,7 @@ def _arm(table: Table, folder: Path) -> CellArm:
         name: table.number(key, default=0.3, lower=0.0, upper=_MAX_WAIT)
         for name, key in (("open_time", "open_s"), ("grasp_time", "grasp_s"))
     }
-    table.finish()
+    table.refuse_unknown_keys()
     return CellArm(arm=arm, base=base, start=start, **waits)
 
 
@@ -193,7 +193,7 @@ def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
     _refuse_more(table, "frames")
     frames: dict[str, Node] = {}
     keys: dict[str, str] = {}
-    for key in table.free_keys():
+    for key in table:
         name = _name(table, key, frames)
         keys[name] = key
         if table.is_table(key):
@@ -201,7 +201,7 @@ def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
             frames[name] = Node(
                 parent=_name(place, "on", (), place.text("on", default=WORLD)), relation=_pose(place, "at")
             )
-            place.finish()
+            place.refuse_unknown_keys()
         else:
             frames[name] = Node(parent=WORLD, relation=_pose(table, key))
     known = {WORLD, "STATION", *arms, *frames}
@@ -233,7 +233,7 @@ def _way_up(name: str, frames: Mapping[str, Node], most: int) -> list[str]:
 
 def _refuse_more(table: Table, bound: str) -> None:
     """Refuse a table with more keys than a limit."""
-    got = sum(1 for _ in table.free_keys())
+    got = sum(1 for _ in table)
     if got > limit(bound):
         raise table.error(None, f"too many: {beyond(bound, got)}")
 
@@ -241,7 +241,7 @@ def _refuse_more(table: Table, bound: str) -> None:
 def _visions(table: Table) -> dict[str, tuple[Array, ...]]:
     _refuse_more(table, "entries")
     visions: dict[str, tuple[Array, ...]] = {}
-    for key in table.free_keys():
+    for key in table:
         name = _name(table, key, visions)
         answers = enumerate(table.vectors(key, 12))
         visions[name] = tuple(_checked(table, key, numbers, index) for index, numbers in answers)
@@ -251,9 +251,9 @@ def _visions(table: Table) -> dict[str, tuple[Array, ...]]:
 def _devices(table: Table) -> frozenset[str]:
     _refuse_more(table, "entries")
     devices: set[str] = set()
-    for key in table.free_keys():
+    for key in table:
         devices.add(_name(table, key, devices))
-        table.table(key).finish()
+        table.table(key).refuse_unknown_keys()
     return frozenset(devices)
 
 

@@ -69,7 +69,7 @@ def read_linkage(path: Path) -> Linkage:
         "gravity": top.vector("gravity", 2, default=GRAVITY),
         "tip": _body_point(top, "tip"),
     }
-    top.finish()
+    top.refuse_unknown_keys()
     try:
         return Linkage(**fields)
     except ArmwrightError as error:
@@ -86,8 +86,8 @@ def _body_point(table: Table, key: str) -> BodyPoint:
 
 def _points(table: Table) -> dict[str, list[float]]:
     points = table.table("points")
-    positions = {key: [float(x) for x in points.vector(key, 2)] for key in points.free_keys()}
-    table.finish()
+    positions = {key: [float(x) for x in points.vector(key, 2)] for key in points}
+    table.refuse_unknown_keys()
     return positions
 
 
@@ -105,7 +105,7 @@ def _joint(table: Table) -> Pin | Guide:
     if kind == "guide":
         direction, angle = (math.radians(table.number(key, default=0.0)) for key in ("direction_deg", "angle_deg"))
         joint = Guide(body=body, point=point, on=on, direction=direction, angle=angle)
-    table.finish()
+    table.refuse_unknown_keys()
     return joint
 
 
@@ -113,31 +113,31 @@ def _clearance_pin(table: Table) -> ClearancePin:
     name, bearing, journal = table.text("name"), _body_point(table, "bearing"), _body_point(table, "journal")
     clearance = table.number("clearance_mm", lower=0.0) * 1e-3
     radius = table.positive("journal_radius_mm") * 1e-3
-    table.finish()
+    table.refuse_unknown_keys()
     return ClearancePin(name=name, bearing=bearing, journal=journal, clearance=clearance, journal_radius=radius)
 
 
 def _drive(table: Table) -> Drive:
     body, kind = table.text("body"), table.choice("kind", ("effort", "motion"), default="effort")
-    table.finish()
+    table.refuse_unknown_keys()
     return Drive(body=body, kind="motion" if kind == "motion" else "effort")
 
 
 def _load(table: Table) -> Load:
     load = Load(point=_body_point(table, "at"), force=table.vector("force", 2))
-    table.finish()
+    table.refuse_unknown_keys()
     return load
 
 
 def _assembly(table: Table) -> dict[str, float]:
     """Return approximate coordinates by body: an angle as ``link1_deg = -70``, a slide as ``slider_mm = 170``."""
     values = {}
-    for key in table.free_keys():
+    for key in table:
         body, _, unit = key.rpartition("_")
         if not body or unit not in ("deg", "mm"):
             raise table.error(key, "expected the name of a body with its unit, such as link1_deg or slider_mm")
         values[body] = math.radians(table.number(key)) if unit == "deg" else table.number(key) * 1e-3
-    table.finish()
+    table.refuse_unknown_keys()
     return values
 
 
@@ -149,5 +149,5 @@ def _material(table: Table) -> Material:
         restitution=table.number("restitution", default=usual.restitution, lower=1e-3, upper=1.0),
         friction=table.number("friction", default=usual.friction, lower=0.0),
     )
-    table.finish()
+    table.refuse_unknown_keys()
     return material

@@ -34,8 +34,8 @@ def parse_column_map(text: str) -> dict[str, str]:
 def _read_column_map(path: Path) -> dict[str, str]:
     root = Document.read(path).root
     table = root.table("columns", required=True)
-    root.finish()
-    names = list(table.free_keys())
+    root.refuse_unknown_keys()
+    names = list(table)
     if len(names) > limit("table_columns"):
         raise root.error("columns", f"too many: {beyond('table_columns', len(names))}")
     return {name: table.text(name) for name in names}

@@ -1,4 +1,4 @@
-"""Reading TOML and JSON that people write: a cursor that checks what it reads and names file, line and key."""
+"""Reading TOML and JSON: tables that check their values, with errors that name file, line and key."""
 
 import json
 import math
@@ -13,14 +13,14 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, closest
 from armwright.files.inputs import read_text
+from armwright.files.key_lines import DuplicateKeyError, Keys, LineTree, json_lines, longest_dotted_key, toml_lines
 from armwright.files.limits import beyond, limit
-from armwright.files.lines import Keys, Line, TwinKeyError, json_lines, longest_dotted_key, toml_lines
 
 _MISSING: Any = object()
 # No quantity of a robot is larger, and products of three such numbers are still numbers.
 _LARGEST = 1e100
-# Of a text that is not what was expected, a message shows this many characters.
-_SHOWN_TEXT = 60
+# Number of characters that a message shows of a text.
+_MAX_SHOWN_LENGTH = 60
 
 
 class Document:
@@ -29,7 +29,7 @@ class Document:
     Attributes:
         path: where it was read.
         text: of the file, its line ends line feeds.
-        root: the cursor at its top.
+        root: its table at the top.
     """
 
     def __init__(self, path: Path, text: str, data: Mapping[str, Any], *, is_json: bool) -> None:
@@ -48,34 +48,34 @@ class Document:
         path = Path(path)
         text = read_text(path)
         is_json = path.suffix.lower() == ".json" or (path.suffix.lower() != ".toml" and text.lstrip().startswith("{"))
-        data = _parsed(path, text, is_json=is_json)
+        data = _parse(path, text, is_json=is_json)
         if not isinstance(data, dict):
-            raise FileFormatError(path, 1, "", f"expected keys and values in braces, got {_kind(data)}")
+            raise FileFormatError(path, 1, "", f"expected keys and values in braces, got {_value_text(data)}")
         return cls(path, text, data, is_json=is_json)
 
     def line(self, keys: Keys) -> int | None:
         """Return the line of a key, or of the nearest table around it."""
-        return self._lines.of(keys)
+        return self._lines.line_of(keys)
 
     @cached_property
-    def _lines(self) -> Line:
-        # Only who has something to say of a key asks where it stands.
+    def _lines(self) -> LineTree:
+        # Lines are needed for messages only.
         return json_lines(self.text) if self._is_json else toml_lines(self.text)
 
 
 class Table:
-    """A cursor at one table of a document: every key is read once, with its kind, and what is left over is refused.
+    """A table of a document whose keys are read one by one, each with its type; keys that were not read are refused.
 
     Tables that are not there read as empty ones, so that optional tables need no special case.
     """
 
     def __init__(self, document: Document, keys: Keys, data: Mapping[str, Any]) -> None:
-        """Stand at ``keys`` of a document."""
+        """Take the table at ``keys`` of a document."""
         self._document, self.keys, self._data = document, keys, data
         self._read: set[str] = set()
 
     def __contains__(self, key: str) -> bool:
-        """Whether the key is given."""
+        """Whether the table has the key."""
         return key in self._data
 
     def error(self, key: str | None, message: str, index: int | None = None) -> FileFormatError:
@@ -121,7 +121,7 @@ class Table:
         Raises:
             FileFormatError: it is missing without a default, or not such an array.
         """
-        value = self._value(key, default, f"a list of {_counted(length)}")
+        value = self._value(key, default, f"a list of {_numbers_text(length)}")
         return np.asarray(default, dtype=np.float64) if value is default else self._numbers((key,), value, length)
 
     def vectors(self, key: str, length: int) -> list[Array]:
@@ -133,7 +133,7 @@ class Table:
         expected = f"a list of lists of {length} numbers"
         value = self._value(key, _MISSING, expected)
         if not isinstance(value, list):
-            raise self.error(key, f"expected {expected}, got {_kind(value)}")
+            raise self.error(key, f"expected {expected}, got {_value_text(value)}")
         return [self._numbers((key, i), row, length) for i, row in enumerate(value)]
 
     def text(self, key: str, default: Any = _MISSING) -> str:
@@ -144,7 +144,7 @@ class Table:
         """
         value = self._value(key, default, "a text in quotes")
         if value is not default and not isinstance(value, str):
-            raise self.error(key, f"expected a text in quotes, got {_kind(value)}")
+            raise self.error(key, f"expected a text in quotes, got {_value_text(value)}")
         return str(value)
 
     def texts(self, key: str) -> list[str]:
@@ -155,7 +155,7 @@ class Table:
         """
         value = self._value(key, _MISSING, "a list of texts in quotes")
         if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
-            raise self.error(key, f"expected a list of texts in quotes, got {_kind(value)}")
+            raise self.error(key, f"expected a list of texts in quotes, got {_value_text(value)}")
         return value
 
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
@@ -169,22 +169,22 @@ class Table:
         if value not in choices:
             near = closest(value, choices)
             hint = f"; did you mean '{near}'?" if near else ""
-            raise self.error(key, f"expected one of {', '.join(sorted(choices))}, got {_kind(value)}{hint}")
+            raise self.error(key, f"expected one of {', '.join(sorted(choices))}, got {_value_text(value)}{hint}")
         return str(value)
 
     def table(self, key: str, *, required: bool = False) -> "Table":
-        """Return the cursor at a table below; an empty one when it is missing and not required.
+        """Return a table in this one; an empty one when it is missing and not required.
 
         Raises:
             FileFormatError: it is required and missing, or no table.
         """
         value = self._value(key, _MISSING if required else {}, "a table")
         if not isinstance(value, dict):
-            raise self.error(key, f"expected a table, got {_kind(value)}")
+            raise self.error(key, f"expected a table, got {_value_text(value)}")
         return Table(self._document, (*self.keys, key), value)
 
     def tables(self, key: str, bound: str = "entries") -> list["Table"]:
-        """Return the cursors at the tables of an array such as ``[[joint]]``.
+        """Return the tables of an array such as ``[[joint]]``.
 
         Args:
             key: of the array.
@@ -195,34 +195,35 @@ class Table:
         """
         value = self._value(key, _MISSING, f"one or more tables [[{key}]]")
         if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
-            raise self.error(key, f"expected one or more tables [[{key}]], got {_kind(value)}")
+            raise self.error(key, f"expected one or more tables [[{key}]], got {_value_text(value)}")
         most = limit(bound)
         if len(value) > most:
             raise self.error(key, f"too many: {beyond(bound, len(value))}", most)
         return [Table(self._document, (*self.keys, key, i), row) for i, row in enumerate(value)]
 
-    def free_keys(self) -> Iterator[str]:
-        """Walk through the keys of a table whose names are free, such as those of frames."""
-        yield from self._data
+    def __iter__(self) -> Iterator[str]:
+        """Give the keys, for tables whose keys have any name, such as those of frames."""
+        return iter(self._data)
 
     def is_table(self, key: str) -> bool:
         """Whether the value of a key is a table."""
         return isinstance(self._data.get(key), dict)
 
     def allow(self, *keys: str) -> None:
-        """Make keys known that need not be given: ``finish`` may name them as the nearest to a misspelt one."""
+        """Make optional keys known: ``refuse_unknown_keys`` may name them as the nearest to a misspelt one."""
         self._read.update(keys)
 
-    def finish(self) -> None:
-        """Refuse the first key that nobody has read.
+    def refuse_unknown_keys(self) -> None:
+        """Refuse the first key that was not read.
 
         Raises:
             FileFormatError: there is one; the nearest known key is named.
         """
         for key in self._data:
             if key not in self._read:
-                left = self._read - set(self._data)
-                near = closest(key, left) or next((one for one in sorted(left) if one.startswith(f"{key}_")), None)
+                unused = self._read - set(self._data)
+                longer = sorted(name for name in unused if name.startswith(f"{key}_"))
+                near = closest(key, unused) or next(iter(longer), None)
                 known = f"known keys: {', '.join(sorted(self._read))}" if self._read else "no keys are allowed here"
                 hint = f"did you mean '{near}'?" if near else known
                 raise self.error(key, f"unknown key; {hint}")
@@ -239,7 +240,7 @@ class Table:
 
     def _require_number(self, keys: Keys, value: Any) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._error_at(keys, f"expected a number, got {_kind(value)}")
+            raise self._error_at(keys, f"expected a number, got {_value_text(value)}")
         if isinstance(value, float) and not math.isfinite(value):
             raise self._error_at(keys, f"expected a finite number, got {value}")
         if abs(value) > _LARGEST:
@@ -248,20 +249,20 @@ class Table:
 
     def _numbers(self, keys: Keys, value: Any, length: int | Collection[int]) -> Array:
         if not isinstance(value, list):
-            raise self._error_at(keys, f"expected a list of {_counted(length)}, got {_kind(value)}")
+            raise self._error_at(keys, f"expected a list of {_numbers_text(length)}, got {_value_text(value)}")
         for i, item in enumerate(value):
             self._require_number((*keys, i), item)
         if len(value) not in ((length,) if isinstance(length, int) else length):
-            raise self._error_at(keys, f"expected {_counted(length)}, got {len(value)}")
+            raise self._error_at(keys, f"expected {_numbers_text(length)}, got {len(value)}")
         return np.array(value, dtype=np.float64)
 
     def _error_at(self, below: Keys, message: str) -> FileFormatError:
         keys = (*self.keys, *below)
-        return FileFormatError(self._document.path, self._document.line(keys), _shown(keys), message)
+        return FileFormatError(self._document.path, self._document.line(keys), _keys_text(keys), message)
 
 
-def _parsed(path: Path, text: str, *, is_json: bool) -> Any:
-    """Return what a text says, in tables and lists that are not deeper than the limit.
+def _parse(path: Path, text: str, *, is_json: bool) -> Any:
+    """Return the data of a text, in tables and lists that are not deeper than the limit.
 
     Raises:
         FileFormatError: it has a slip of syntax, or is beyond a limit.
@@ -270,9 +271,9 @@ def _parsed(path: Path, text: str, *, is_json: bool) -> Any:
     if not is_json and longest_dotted_key(text) > limit("nesting"):
         raise too_deep
     try:
-        data = json.loads(text, object_pairs_hook=_object) if is_json else tomllib.loads(text)
-    except _TwinError as error:
-        raise _twin(path, text) or too_deep from error
+        data = json.loads(text, object_pairs_hook=_object_without_duplicates) if is_json else tomllib.loads(text)
+    except _DuplicateKeyError as error:
+        raise _duplicate_key_error(path, text) or too_deep from error
     except tomllib.TOMLDecodeError as error:
         raise _toml_error(path, text, error) from error
     except json.JSONDecodeError as error:
@@ -280,34 +281,34 @@ def _parsed(path: Path, text: str, *, is_json: bool) -> Any:
     except RecursionError as error:
         raise too_deep from error
     except ValueError as error:  # what remains: Python reads no integers of many thousand digits
-        raise _too_many_digits(path) from error
-    if not _measured(path, data):
+        raise _digits_error(path) from error
+    if not _is_within_nesting_limit(path, data):
         raise too_deep
     return data
 
 
-class _TwinError(Exception):
+class _DuplicateKeyError(Exception):
     """A key of a JSON object is given twice; JSON lets that pass, and the first value would be lost."""
 
 
-def _object(members: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(members)
-    if len(found) < len(members):
-        raise _TwinError
-    return found
+def _object_without_duplicates(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    result = dict(members)
+    if len(result) < len(members):
+        raise _DuplicateKeyError
+    return result
 
 
-def _twin(path: Path, text: str) -> FileFormatError | None:
+def _duplicate_key_error(path: Path, text: str) -> FileFormatError | None:
     try:
         json_lines(text)
-    except TwinKeyError as error:
-        return FileFormatError(path, error.line, _shown(error.keys), "this key occurs twice")
+    except DuplicateKeyError as error:
+        return FileFormatError(path, error.line, _keys_text(error.keys), "this key occurs twice")
     except RecursionError:
         pass
     return None
 
 
-def _measured(path: Path, data: Any) -> bool:
+def _is_within_nesting_limit(path: Path, data: Any) -> bool:
     """Whether nothing is deeper than the limit.
 
     Raises:
@@ -317,7 +318,7 @@ def _measured(path: Path, data: Any) -> bool:
     row = [data]
     for _ in range(limit("nesting") + 1):
         if any(type(value) is int and abs(value) >= largest for value in row):
-            raise _too_many_digits(path)
+            raise _digits_error(path)
         row = [
             below
             for value in row
@@ -329,50 +330,50 @@ def _measured(path: Path, data: Any) -> bool:
     return False
 
 
-def _too_many_digits(path: Path) -> FileFormatError:
+def _digits_error(path: Path) -> FileFormatError:
     return FileFormatError(path, None, "", f"an integer in it has too many digits: {beyond('digits')}")
 
 
 def _toml_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> FileFormatError:
-    """Take the line out of the parser's message, where it tells one, and put it in front."""
-    message, _, place = str(error).partition(" (at ")
+    """Return the error of the parser with the line of its message in front, if it has one."""
+    message, _, location = str(error).partition(" (at ")
     line = None
-    if place.startswith("line "):
-        line = int(place.removeprefix("line ").partition(",")[0])
-        message += f", {place.partition(', ')[2].rstrip(')')}"
-    elif place:
+    if location.startswith("line "):
+        line = int(location.removeprefix("line ").partition(",")[0])
+        message += f", {location.partition(', ')[2].rstrip(')')}"
+    elif location:
         line = text.rstrip("\n").count("\n") + 1
         message += ", at the end of the file"
     return FileFormatError(path, line, "", f"not valid TOML: {message}")
 
 
-def _shown(keys: Keys) -> str:
-    """Write a way as people would: ``joint 3, mass_kg`` counts from 1; a key that cannot be seen is quoted."""
+def _keys_text(keys: Keys) -> str:
+    """Return keys as text, ``joint 3, mass_kg``: numbers count from 1, and invisible keys are quoted."""
     words: list[str] = []
     for key in keys:
         if isinstance(key, int):
             words[-1] += f" {key + 1}"
         else:
-            words.append(key if key.isprintable() and key.strip() else _quoted(key))
+            words.append(key if key.isprintable() and key.strip() else _quote(key))
     return ", ".join(words)
 
 
-def _counted(length: int | Collection[int]) -> str:
+def _numbers_text(length: int | Collection[int]) -> str:
     return f"{length if isinstance(length, int) else ' or '.join(map(str, length))} numbers"
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     """Write a text on one line, not too long."""
-    return repr(text if len(text) <= _SHOWN_TEXT else f"{text[:_SHOWN_TEXT]}...")
+    return repr(text if len(text) <= _MAX_SHOWN_LENGTH else f"{text[:_MAX_SHOWN_LENGTH]}...")
 
 
-def _kind(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if value is None:
         return "null"
     if isinstance(value, bool):
         return f"the truth value {str(value).lower()}"
     if isinstance(value, str):
-        return f"the text {_quoted(value)}"
+        return f"the text {_quote(value)}"
     if isinstance(value, list):
         return f"a list of {len(value)}"
     if isinstance(value, dict):

@@ -56,7 +56,7 @@ def read_poses(path: Path | str) -> PosesFile:
     shared = top.positive("blend_s") if "blend_s" in top else None
     top.allow("blend_s")
     tables = top.tables("pose")
-    top.finish()
+    top.refuse_unknown_keys()
     if len(tables) < 2:
         raise top.error("pose", f"expected two poses or more, got {len(tables)}")
     timed = "time_s" in tables[0]
@@ -70,7 +70,7 @@ def read_poses(path: Path | str) -> PosesFile:
         X, change = typed_pose(table)
         times.append(_time(table, times, timed=timed))
         blends.append(_blend(table, shared, timed=timed))
-        table.finish()
+        table.refuse_unknown_keys()
         line = document.line(("pose", i)) or 1
         if change > _ROUNDING:
             notes.append(

@@ -134,7 +134,7 @@ def _lines(path: Path) -> dict[str, int]:
     for table in ("visions", "frames", "arms"):
         if not document.root.is_table(table):
             continue
-        for key in document.root.table(table).free_keys():
+        for key in document.root.table(table):
             line = document.line((table, key))
             arm = _ARM.fullmatch(key)
             if line is not None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from armwright.files.lines import Keys, Line, TwinKeyError, json_lines, toml_lines
+from armwright.files.key_lines import DuplicateKeyError, Keys, LineTree, json_lines, toml_lines
 
 # Names that need quotes, name nothing or look like something else; a number makes each unique.
 WORDS = ("mass_kg", "a-b", "12", "true", "", "a b", "x.y", "[t]", "k = 1", "#no", "it's", 'say "q"', "tab\t", "é", "\\")
@@ -38,10 +38,10 @@ SCALARS = (
 )
 
 
-def every_line(tree: Line, keys: Keys = ()) -> Iterator[tuple[Keys, int]]:
+def every_line(tree: LineTree, keys: Keys = ()) -> Iterator[tuple[Keys, int]]:
     """Give the way to every value with its line."""
-    for key, below in tree.below.items():
-        if isinstance(below, Line):
+    for key, below in tree.children.items():
+        if isinstance(below, LineTree):
             yield (*keys, key), below.line
             yield from every_line(below, (*keys, key))
         else:
@@ -170,7 +170,7 @@ def test_values_do_not_hide_the_next_key(value: str) -> None:
     text = f"first = {value}\nsecond = 2\n"
 
     assert tomllib.loads(text)["second"] == 2
-    assert toml_lines(text).of(("second",)) == text.count("\n")
+    assert toml_lines(text).line_of(("second",)) == text.count("\n")
 
 
 def test_arm_file() -> None:
@@ -187,7 +187,7 @@ def test_arm_file() -> None:
 
 def test_a_table_opened_after_its_child() -> None:
     """[a.b] names a in passing; once [a] has a header of its own, that is where it stands."""
-    assert toml_lines("[a.b]\nx = 1\n[a]\ny = 2\n").of(("a",)) == 3
+    assert toml_lines("[a.b]\nx = 1\n[a]\ny = 2\n").line_of(("a",)) == 3
 
 
 json_values = st.recursive(
@@ -225,8 +225,8 @@ def test_json_in_one_line(value: dict[str, Any]) -> None:
 
 def test_twin_keys() -> None:
     """The second of two keys of one object is found; the same key in another object, or as a value, is none."""
-    assert json_lines('{"a": "b", "b": {"a": 1},\n "c": [{"a": 1}, {"a": 2}]}').of(("c", 1, "a")) == 2
-    with pytest.raises(TwinKeyError) as caught:
+    assert json_lines('{"a": "b", "b": {"a": 1},\n "c": [{"a": 1}, {"a": 2}]}').line_of(("c", 1, "a")) == 2
+    with pytest.raises(DuplicateKeyError) as caught:
         json_lines('{"a": "b",\n "c": {"b": 1},\n "b": 0,\n "c": {"x": 1}}')
 
     assert (caught.value.keys, caught.value.line) == (("c",), 4)
