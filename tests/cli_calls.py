@@ -91,7 +91,7 @@ def _as_started(argv: list[str], columns: int, cwd: Path | None, environment: Ma
     sys.argv = argv
     os.environ |= {"COLUMNS": str(columns), "NO_COLOR": "1", **environment}
     os.chdir(cwd or before[2])
-    inputs.forget()
+    inputs.forget_read_files()
     try:
         with warnings.catch_warnings():
             warnings.resetwarnings()

@@ -19,7 +19,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.files.output import strays
+from armwright.files.output import stray_files
 from cli_calls import armwright, armwright_process
 
 ROOT = Path(__file__).parents[2]
@@ -519,7 +519,7 @@ def test_a_failed_run_shows_itself(code: str, tmp_path: Path) -> None:
     assert f"failed: {code} at " in page
     assert f"report up to the failure: {out / 'report.html'}\n" in said
     assert (out / "mine.txt").exists()
-    assert not strays(out)
+    assert not stray_files(out)
 
 
 def test_a_program_with_errors_leaves_old_results(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.files.output import RECORD, is_stray, strays
+from armwright.files.output import RECORD, is_stray, stray_files
 from armwright.files.result_folder import PREFIX
 from samples import Sample
 
@@ -109,7 +109,7 @@ def struck(bench: Bench, out: Path, number: signal.Signals, rng: np.random.Gener
 
 def held(out: Path) -> str:
     """Say whose results a folder holds: a mix is told by its hashes alone."""
-    if strays(out):
+    if stray_files(out):
         return MIX
     said = json.loads((out / RECORD).read_text())
     assert {path.name for path in out.iterdir()} == {*said["files"], RECORD, "mine.txt"}

@@ -20,7 +20,7 @@ from armwright.files import inputs, limits
 from armwright.files.document import Document
 from armwright.files.inputs import read_lines, read_text, read_typed_program
 from armwright.files.key_lines import longest_dotted_key
-from armwright.files.limits import LIMITS, limit, parsed, raised
+from armwright.files.limits import LIMITS, limit, parse_limits, raised
 from armwright.files.rows import read_rows
 from armwright.motion.poses_file import read_poses
 from armwright.program import compile as compile_program
@@ -232,15 +232,15 @@ def test_raising(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_no_limit(text: str) -> None:
     """A limit is a name and a whole number."""
     with pytest.raises(InvalidValueError, match="expected limits such as table_rows=10000000, got"):
-        parsed(text)
+        parse_limits(text)
 
 
 def test_wrong_limits() -> None:
     """An unknown limit is answered with the nearest; none is nothing."""
     with pytest.raises(UnknownNameError, match=r"no limit .frame.\. Did you mean .frames."):
-        parsed("frame=1")
+        parse_limits("frame=1")
     with pytest.raises(InvalidValueError, match="frames: expected an integer of 1 or more, got 0"):
-        parsed("frames=0")
+        parse_limits("frames=0")
     with (
         pytest.raises(InvalidValueError, match="frames: expected an integer of 1 or more, got True"),
         raised(frames=True),
@@ -321,7 +321,7 @@ def test_dotted_keys() -> None:
 
 def test_a_table_is_not_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A table of many rows is read in the memory of a few, whatever its size: its rows would take ten times as much."""
-    monkeypatch.setattr(inputs, "_PIECE", 1 << 12)
+    monkeypatch.setattr(inputs, "_PIECE_BYTES", 1 << 12)
     path = tmp_path / "long.csv"
     path.write_text("a,b\n" + "1.25,2.5\n" * 5000)
     tracemalloc.start()

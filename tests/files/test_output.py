@@ -9,7 +9,7 @@ import pytest
 
 from armwright.errors import OutputError
 from armwright.files import output
-from armwright.files.inputs import forget, read_text
+from armwright.files.inputs import forget_read_files, read_text
 from armwright.files.output import descriptor, write_file, write_folder
 
 
@@ -213,7 +213,7 @@ def test_what_was_read_stays(tmp_path: Path) -> None:
 
     write_file(source, "changed", back=True)
     assert source.read_text() == "changed"
-    forget()
+    forget_read_files()
     write_file(source, "other")
 
 
@@ -272,7 +272,7 @@ def test_owner_that_cannot_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     def refuse(*_: object) -> None:
         raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
 
-    monkeypatch.setattr(output, "_give", refuse)
+    monkeypatch.setattr(output, "_copy_owner_and_mode", refuse)
     write_file(path, "two")
 
     assert path.read_text() == "two"

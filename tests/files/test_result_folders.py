@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from armwright.errors import OutputError
-from armwright.files.output import RECORD, is_stray, strays, write_folder
-from armwright.files.result_folder import PREFIX, remove_abandoned, staging
+from armwright.files.output import RECORD, is_stray, stray_files, write_folder
+from armwright.files.result_folder import PREFIX, remove_abandoned_folders, staging_folder
 from samples import Sample
 
 OLD = {f"figure-old{i}.svg": "old" for i in range(20)} | {f"figure-both{i}.svg": "old" for i in range(20)}
@@ -64,7 +64,7 @@ def test_signals(sample: Sample, tmp_path: Path, number: signal.Signals) -> None
         struck(folder, number, rng.uniform(0.0, 0.12))
 
         assert held(folder) in (OLD, NEW)
-        assert strays(folder) == ()
+        assert stray_files(folder) == ()
         write_folder(folder, NEW)
         assert held(folder) == NEW
         assert (folder / "figure-mine.svg").read_text() == "mine"
@@ -84,7 +84,7 @@ def test_kill(sample: Sample, tmp_path: Path) -> None:
 
         found = held(folder)
         is_mix = found not in (OLD, NEW)
-        assert bool(strays(folder)) == is_mix
+        assert bool(stray_files(folder)) == is_mix
         write_folder(folder, NEW)
         assert held(folder) == NEW
         assert [path.name for path in folder.parent.iterdir()] == ["out"]
@@ -116,7 +116,7 @@ def test_killed_between_two_moves(tmp_path: Path, moves: int) -> None:
     write_folder(folder, OLD)
     killed_between(folder, moves)
 
-    named = strays(folder)
+    named = stray_files(folder)
     assert set(named) >= {f"figure-old{i}.svg" for i in range(20)}
     assert all(is_stray(folder / name) for name in named)
     assert len(list(tmp_path.iterdir())) == 2  # the results, and what the dead process has left
@@ -151,7 +151,7 @@ def test_killed_while_clearing_up(tmp_path: Path, removals: int) -> None:
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path), str(removals)], check=False, timeout=60)
 
-    remove_abandoned(tmp_path)
+    remove_abandoned_folders(tmp_path)
 
     assert not list(tmp_path.iterdir())
 
@@ -183,7 +183,7 @@ def test_changed_files_are_the_users(tmp_path: Path) -> None:
     """A file of the old run that somebody has changed since is not removed; one as it was written is."""
     write_folder(tmp_path, {"figure-a.svg": "a", "figure-b.svg": "b"})
     (tmp_path / "figure-a.svg").write_text("mine")
-    assert strays(tmp_path) == ("figure-a.svg",)
+    assert stray_files(tmp_path) == ("figure-a.svg",)
 
     write_folder(tmp_path, {"figure-c.svg": "c"})
 
@@ -261,8 +261,8 @@ def test_folders_of_the_living_stay(tmp_path: Path) -> None:
     dead = tmp_path / f"{PREFIX}0000000000000000"
     dead.mkdir()
     (dead / "lock").touch()
-    with staging(tmp_path, tmp_path / "out") as new:
-        remove_abandoned(tmp_path)
+    with staging_folder(tmp_path, tmp_path / "out") as new:
+        remove_abandoned_folders(tmp_path)
         assert new.is_dir()
         assert not dead.exists()
     left = {path.name for path in tmp_path.iterdir()}

@@ -14,13 +14,23 @@ import pytest
 
 from armwright.errors import CacheWarning
 from armwright.files import store as store_module
-from armwright.files.store import Store, cache_folder, distrust, make_private, user_store
+from armwright.files.store import Store, cache_folder, make_private, reason_for_distrust, user_store
 from samples import Sample
 
 KEY, OTHER = "ab12", "cd34"
 DATA = bytes(range(256)) * 40
 
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only the administrator can give files away")
+
+
+def get_or_make(store: Store, key: str, make: Callable[[], bytes]) -> bytes:
+    """Use a store as the compiler of kernels does."""
+    with store.locked(key):
+        data = store.get(key)
+        if data is None:
+            data = make()
+            store.put(key, data)
+    return data
 
 
 def truncated(path: Path) -> None:
@@ -114,7 +124,7 @@ def test_damaged_entries_count_as_absent(store: Store, damage: Callable[[Path], 
     damage(store.folder / KEY)
 
     assert store.get(KEY) is None
-    assert store.made(KEY, lambda: b"new") == b"new"
+    assert get_or_make(store, KEY, lambda: b"new") == b"new"
     assert store.get(KEY) == b"new"
 
 
@@ -142,7 +152,7 @@ def test_random_damage(store: Store, sample: Sample) -> None:
 
 def test_private_whatever_the_mask(store: Store, no_mask: None) -> None:  # noqa: ARG001
     """Folders are 0700 and files 0600, also where nothing is masked."""
-    store.made(KEY, lambda: DATA)
+    get_or_make(store, KEY, lambda: DATA)
 
     assert store.folder is not None
     modes = {path: stat.S_IMODE(path.stat().st_mode) for path in store.folder.parent.rglob("*")}
@@ -156,7 +166,7 @@ def test_parents_are_private_too(tmp_path: Path, no_mask: None) -> None:  # noqa
     make_private(tmp_path / "home" / ".cache" / "armwright")
 
     assert [stat.S_IMODE((tmp_path / part).stat().st_mode) for part in ("home", "home/.cache")] == [0o700, 0o700]
-    assert not distrust(tmp_path / "home" / ".cache" / "armwright")
+    assert not reason_for_distrust(tmp_path / "home" / ".cache" / "armwright")
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o770, 0o707, 0o1777, 0o720])
@@ -179,7 +189,7 @@ def test_folders_that_others_may_write_to(
         f"compiled code is not cached: other users may write to '{weak}' (mode {mode:o}). Make the folder private, or "
         "name another one in ARMWRIGHT_CACHE"
     )
-    assert opened.made(KEY, lambda: DATA) == DATA
+    assert get_or_make(opened, KEY, lambda: DATA) == DATA
     assert not any(mine.iterdir())
 
 
@@ -188,9 +198,9 @@ def test_parent_that_others_may_write_to(tmp_path: Path) -> None:
     below = tmp_path / "open" / "cache" / "store"
     below.mkdir(parents=True)
     (tmp_path / "open").chmod(0o777)
-    assert distrust(below) == f"other users may write to '{tmp_path / 'open'}' (mode 777)"
+    assert reason_for_distrust(below) == f"other users may write to '{tmp_path / 'open'}' (mode 777)"
     (tmp_path / "open").chmod(0o1777)
-    assert not distrust(below)
+    assert not reason_for_distrust(below)
 
 
 @needs_root
@@ -203,10 +213,13 @@ def test_folders_and_files_of_others(tmp_path: Path) -> None:
     assert store.get(KEY) is None
 
     os.chown(mine, 4242, 4242)
-    assert distrust(mine) == f"'{mine}' belongs to another user"
+    assert reason_for_distrust(mine) == f"'{mine}' belongs to another user"
     (tmp_path / "link").symlink_to(tmp_path / "cache")
     os.chown(tmp_path / "link", 4242, 4242, follow_symlinks=False)
-    assert distrust(tmp_path / "link" / "elsewhere") == f"'{tmp_path / 'link'}' is a link that belongs to another user"
+    assert (
+        reason_for_distrust(tmp_path / "link" / "elsewhere")
+        == f"'{tmp_path / 'link'}' is a link that belongs to another user"
+    )
 
 
 def test_links_count_as_what_they_lead_to(tmp_path: Path) -> None:
@@ -217,10 +230,10 @@ def test_links_count_as_what_they_lead_to(tmp_path: Path) -> None:
         (tmp_path / f"to_{name}").symlink_to(tmp_path / name)
     (tmp_path / "ring").symlink_to(tmp_path / "ring")
 
-    assert not distrust(tmp_path / "to_private" / "store")
-    assert distrust(tmp_path / "to_open" / "store").startswith("other users may write to")
-    assert not distrust(tmp_path / "ring" / "store")
-    assert Store(tmp_path / "ring" / "store").made(KEY, lambda: DATA) == DATA
+    assert not reason_for_distrust(tmp_path / "to_private" / "store")
+    assert reason_for_distrust(tmp_path / "to_open" / "store").startswith("other users may write to")
+    assert not reason_for_distrust(tmp_path / "ring" / "store")
+    assert get_or_make(Store(tmp_path / "ring" / "store"), KEY, lambda: DATA) == DATA
 
 
 def test_a_file_in_the_way(tmp_path: Path) -> None:
@@ -228,7 +241,7 @@ def test_a_file_in_the_way(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
 
     for folder in (tmp_path / "file", tmp_path / "file" / "store"):
-        assert Store(folder).made(KEY, lambda: DATA) == DATA
+        assert get_or_make(Store(folder), KEY, lambda: DATA) == DATA
         assert not Store(folder).put(KEY, DATA)
 
     assert (tmp_path / "file").read_text() == "in the way"
@@ -265,7 +278,7 @@ def test_without_a_home(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Path, "home", nobody)
 
     assert cache_folder() is None
-    assert user_store("things").made(KEY, lambda: DATA) == DATA
+    assert get_or_make(user_store("things"), KEY, lambda: DATA) == DATA
 
 
 def test_half_written_files_are_cleared(store: Store) -> None:
@@ -284,9 +297,9 @@ def test_half_written_files_are_cleared(store: Store) -> None:
 
 def test_who_holds_a_lock_for_ever_costs_time_only(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """A process that was stopped while it made an entry does not stop the others."""
-    monkeypatch.setattr(store_module, "_PATIENCE", 0.1)
-    with store.alone(KEY):
-        assert store.made(KEY, lambda: DATA) == DATA
+    monkeypatch.setattr(store_module, "_LOCK_TIMEOUT", 0.1)
+    with store.locked(KEY):
+        assert get_or_make(store, KEY, lambda: DATA) == DATA
 
 
 _FILL = """
@@ -321,13 +334,13 @@ def test_full_disk(store: Store) -> None:
     code = (
         "import resource, sys; from pathlib import Path; from armwright.files.store import Store\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
-        f"store = Store(Path(sys.argv[1])); data = store.made('{KEY}', lambda: bytes(100000))\n"
-        f"print(len(data), store.get('{KEY}'))"
+        "store = Store(Path(sys.argv[1]))\n"
+        f"with store.locked('{KEY}'): print(store.put('{KEY}', bytes(100000)), store.get('{KEY}'))"
     )
     done = subprocess.run([sys.executable, "-c", code, str(store.folder)], capture_output=True, text=True, check=False)
 
-    assert (done.stdout, done.stderr) == ("100000 None\n", "")
+    assert (done.stdout, done.stderr) == ("False None\n", "")
     assert store.folder is not None
     assert sorted(path.name for path in store.folder.iterdir()) == ["ab.lock"]
-    assert store.made(KEY, lambda: DATA) == DATA == store.get(KEY)
+    assert get_or_make(store, KEY, lambda: DATA) == DATA == store.get(KEY)
     np.testing.assert_equal(store.get(KEY), DATA)

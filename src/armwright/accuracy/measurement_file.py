@@ -15,7 +15,7 @@ from armwright.accuracy.table import Row, read_tables
 from armwright.accuracy.trace import Trace
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 
 # Tests of which every row is one attained pose; of the others a cycle is a run of many rows.
 POSES: frozenset[Kind] = frozenset(get_args(PoseKind))
@@ -149,7 +149,7 @@ def _refuse_many(groups: Mapping[tuple[str, ...], Sequence[Row]]) -> None:
         for row in rows:
             parts.add((group, _part(row) if row.test in POSES else row.cycle))
             if len(parts) > most:
-                raise row.error("test", f"too many tests, and poses and runs in them: {beyond('entries')}")
+                raise row.error("test", f"too many tests, and poses and runs in them: {limit_message('entries')}")
 
 
 def _pose_test(rows: list[Row]) -> PoseTest:

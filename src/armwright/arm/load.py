@@ -15,7 +15,7 @@ from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 
 _CATALOGUE = Path(__file__).parent / "catalogue"
 
@@ -152,7 +152,7 @@ def _joint(table: Table) -> Joint:
         if kind == "revolute" and most < abs(values[name]) < math.inf:
             raise limits.error(
                 unit_of(limits, name, units) and f"{name}_{unit_of(limits, name, units)}",
-                f"too far from zero: {beyond('revolutions', _written(kind, values[name]))}; for a joint without "
+                f"too far from zero: {limit_message('revolutions', _written(kind, values[name]))}; for a joint without "
                 "limits omit it",
             )
     return Joint(

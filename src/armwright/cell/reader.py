@@ -20,8 +20,8 @@ from armwright.cell.names import arm_name
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
-from armwright.files.inputs import regular
-from armwright.files.limits import beyond, limit
+from armwright.files.inputs import regular_file
+from armwright.files.limits import limit, limit_message
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.spatial.poses import from_noap, homogeneous, inverse as inverse_pose
@@ -143,7 +143,7 @@ def _arm(table: Table, folder: Path) -> CellArm:
     name = table.text("model", default=_REPORT_ARM)
     try:
         # The file of an arm is looked for from the folder of the cell, wherever the command was started.
-        arm = load_arm(regular(folder / name) if is_path(name) else name)
+        arm = load_arm(regular_file(folder / name) if is_path(name) else name)
     except ArmwrightError as error:
         raise table.error("model", str(error)) from error
     if arm.n < _PLACE_AND_TURN:
@@ -218,7 +218,9 @@ def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
             by = f" by way of {', '.join(way[1:])}" if len(way) > 1 else ""
             raise table.table(keys[name]).error("on", f"{name} is attached to itself{by}")
         if len(way) > most:
-            raise table.table(keys[name]).error("on", f"{name} is too deep in the frame tree: {beyond('hanging')}")
+            raise table.table(keys[name]).error(
+                "on", f"{name} is too deep in the frame tree: {limit_message('hanging')}"
+            )
     return frames
 
 
@@ -235,7 +237,7 @@ def _refuse_more(table: Table, bound: str) -> None:
     """Refuse a table with more keys than a limit."""
     got = sum(1 for _ in table)
     if got > limit(bound):
-        raise table.error(None, f"too many: {beyond(bound, got)}")
+        raise table.error(None, f"too many: {limit_message(bound, got)}")
 
 
 def _visions(table: Table) -> dict[str, tuple[Array, ...]]:

@@ -37,10 +37,10 @@ def _install_completion(shell: Shell | None) -> None:
 def _raise_limits(texts: list[str]) -> list[str]:
     """Raise limits on the size of inputs for this command and for the processes that it starts."""
     from armwright.errors import ArmwrightError
-    from armwright.files.limits import VARIABLE, parsed
+    from armwright.files.limits import VARIABLE, parse_limits
 
     try:
-        raised = {name: number for text in texts for name, number in parsed(text).items()}
+        raised = {name: number for text in texts for name, number in parse_limits(text).items()}
     except ArmwrightError as error:
         raise typer.BadParameter(str(error)) from error
     if raised:

@@ -164,7 +164,7 @@ class Commands:
 
     def report(self, argument: str) -> Reply:
         """Write the program and its results: motion, events, frames, and a page that shows the arms moving."""
-        from armwright.files.output import reason
+        from armwright.files.output import folder_error_text
 
         folder = _target(argument)
         missing = [path for path in (folder, *folder.parents) if not path.exists()]
@@ -172,7 +172,9 @@ class Commands:
             # The imports of the program are relative to this folder.
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"cannot write to '{folder}': {reason(error, folder)}; nothing was written") from error
+            raise OutputError(
+                f"cannot write to '{folder}': {folder_error_text(error, folder)}; nothing was written"
+            ) from error
         try:
             self._report(folder)
         except BaseException:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armwright.errors import FileFormatError
-from armwright.files.limits import MEGABYTE, beyond, limit
+from armwright.files.limits import MEGABYTE, limit, limit_message
 
 if TYPE_CHECKING:
     from armwright.program.repl.session import Session
@@ -37,7 +37,7 @@ class Script:
         most = limit("program_mb") * MEGABYTE
         line = sys.stdin.buffer.readline(most + 1)
         if len(line) > most:
-            raise FileFormatError("standard input", None, "", f"a line is too long: {beyond('program_mb')}")
+            raise FileFormatError("standard input", None, "", f"a line is too long: {limit_message('program_mb')}")
         text, self._encoding = line.decode(self._encoding, errors="replace"), "utf-8"
         return text.rstrip("\r\n") if line else None
 
@@ -92,10 +92,10 @@ def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
 
 def history_file() -> Path | None:
     """Return the file of the lines of sessions, in the user's cache folder if there is one and it is private."""
-    from armwright.files.store import cache_folder, distrust
+    from armwright.files.store import cache_folder, reason_for_distrust
 
     folder = cache_folder()
-    return None if folder is None or distrust(folder) else folder / "repl_history"
+    return None if folder is None or reason_for_distrust(folder) else folder / "repl_history"
 
 
 def completions(session: "Session", commands: tuple[str, ...], before: str, word: str) -> list[str]:

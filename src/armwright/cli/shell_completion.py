@@ -40,11 +40,11 @@ def install(shell: Shell) -> Path:
     from typer.completion import install as install_script  # type: ignore[attr-defined]
 
     from armwright.errors import OutputError
-    from armwright.files.inputs import regular
+    from armwright.files.inputs import regular_file
 
     try:
         for name in (".bashrc", ".zshrc"):
-            regular(Path.home() / name)
+            regular_file(Path.home() / name)
         return install_script(shell=shell, prog_name=NAME, complete_var=COMPLETE)[1]
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: the home folder is unknown
         text = f"cannot install the completion for {shell}: {error}; --show-completion {shell} prints its script"

@@ -68,11 +68,11 @@ def write_back(source: "Source", path: Path, text: str) -> None:
     from codecs import BOM_UTF8
 
     from armwright.errors import OutputError
-    from armwright.files.inputs import decoded, read_bytes
+    from armwright.files.inputs import decode, read_bytes
     from armwright.files.output import write_file
 
     data = read_bytes(path, "program_mb")
-    if decoded(data, path) != source.text:
+    if decode(data, path) != source.text:
         raise OutputError(f"cannot write '{path}': it has changed since it was read; nothing was written")
     mark = "\ufeff" if data.startswith(BOM_UTF8) else ""
     end = "\r\n" if 2 * data.count(b"\r\n") > data.count(b"\n") else "\n"

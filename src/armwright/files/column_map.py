@@ -4,7 +4,7 @@ from pathlib import Path
 
 from armwright.errors import InvalidValueError, shown
 from armwright.files.document import Document
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 
 
 def parse_column_map(text: str) -> dict[str, str]:
@@ -37,5 +37,5 @@ def _read_column_map(path: Path) -> dict[str, str]:
     root.refuse_unknown_keys()
     names = list(table)
     if len(names) > limit("table_columns"):
-        raise root.error("columns", f"too many: {beyond('table_columns', len(names))}")
+        raise root.error("columns", f"too many: {limit_message('table_columns', len(names))}")
     return {name: table.text(name) for name in names}

@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.errors import FileFormatError, closest
 from armwright.files.inputs import read_text
 from armwright.files.key_lines import DuplicateKeyError, Keys, LineTree, json_lines, longest_dotted_key, toml_lines
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 
 _MISSING: Any = object()
 # No quantity of a robot is larger, and products of three such numbers are still numbers.
@@ -198,7 +198,7 @@ class Table:
             raise self.error(key, f"expected one or more tables [[{key}]], got {_value_text(value)}")
         most = limit(bound)
         if len(value) > most:
-            raise self.error(key, f"too many: {beyond(bound, len(value))}", most)
+            raise self.error(key, f"too many: {limit_message(bound, len(value))}", most)
         return [Table(self._document, (*self.keys, key, i), row) for i, row in enumerate(value)]
 
     def __iter__(self) -> Iterator[str]:
@@ -267,7 +267,7 @@ def _parse(path: Path, text: str, *, is_json: bool) -> Any:
     Raises:
         FileFormatError: it has a slip of syntax, or is beyond a limit.
     """
-    too_deep = FileFormatError(path, None, "", f"nested too deeply: {beyond('nesting')}")
+    too_deep = FileFormatError(path, None, "", f"nested too deeply: {limit_message('nesting')}")
     if not is_json and longest_dotted_key(text) > limit("nesting"):
         raise too_deep
     try:
@@ -331,7 +331,7 @@ def _is_within_nesting_limit(path: Path, data: Any) -> bool:
 
 
 def _digits_error(path: Path) -> FileFormatError:
-    return FileFormatError(path, None, "", f"an integer in it has too many digits: {beyond('digits')}")
+    return FileFormatError(path, None, "", f"an integer in it has too many digits: {limit_message('digits')}")
 
 
 def _toml_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> FileFormatError:

@@ -7,7 +7,7 @@ from io import FileIO
 from pathlib import Path
 
 
-def exchange(folder: Path, new: Path, kept: Path, names: Iterable[str], gone: Iterable[str]) -> None:
+def exchange_files(folder: Path, new: Path, kept: Path, names: Iterable[str], gone: Iterable[str]) -> None:
     """Move files into a folder; where one cannot be moved, those that were there come back.
 
     A file that is mounted by itself cannot be replaced, nor one of somebody else in a folder like /tmp; that shows
@@ -30,7 +30,7 @@ def exchange(folder: Path, new: Path, kept: Path, names: Iterable[str], gone: It
             (folder / name).replace(kept / name)
             aside.append(name)
         for name in names:
-            if _keep(folder / name, kept / name):
+            if _back_up(folder / name, kept / name):
                 aside.append(name)
             (new / name).replace(folder / name)
             placed.append(name)
@@ -57,14 +57,14 @@ def overwrite(path: Path, data: bytes) -> None:
     with path.open("r+b", buffering=0) as file:
         old = file.read()
         try:
-            _put(file, data)
+            _write_in_place(file, data)
         except BaseException:
             with contextlib.suppress(OSError):
-                _put(file, old)
+                _write_in_place(file, old)
             raise
 
 
-def _keep(path: Path, kept: Path) -> bool:
+def _back_up(path: Path, kept: Path) -> bool:
     """Keep a file under a second name, or move it there; return whether there was one."""
     try:
         os.link(path, kept, follow_symlinks=False)
@@ -75,7 +75,7 @@ def _keep(path: Path, kept: Path) -> bool:
     return True
 
 
-def _put(file: FileIO, data: bytes) -> None:
+def _write_in_place(file: FileIO, data: bytes) -> None:
     """Write bytes over those of a file; its space is given back last, so that the old ones would find it again."""
     file.seek(0)
     left = memoryview(data)

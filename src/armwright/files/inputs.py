@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import BinaryIO
 
 from armwright.errors import FileFormatError, closest
-from armwright.files.limits import MEGABYTE, beyond, limit
+from armwright.files.limits import MEGABYTE, limit, limit_message
 
-_PIECE = 1 << 20
-_KINDS = {
+_PIECE_BYTES = 1 << 20
+_FILE_TYPES = {
     stat.S_IFIFO: "a pipe",
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
@@ -25,12 +25,12 @@ _KINDS = {
 # Names of a folder among which the nearest to a missing one is looked for.
 _MAX_NAMES = 1000
 # The SHA-256 hash of what was read last of every file: the file may be another by now, or a pipe, which is empty then.
-_READ: dict[Path, str] = {}
+_HASHES_OF_READ_FILES: dict[Path, str] = {}
 # The files that this process has read, by where they were then.
 _SOURCES: dict[Path, None] = {}
 
 
-def regular(path: Path) -> Path:
+def regular_file(path: Path) -> Path:
     """Return the path of a file that data name: an import, the model of an arm. It must be a regular file.
 
     What the user names on the command line may be a pipe; what a file names may not, as reading it might never end.
@@ -43,12 +43,12 @@ def regular(path: Path) -> Path:
     except (OSError, ValueError):
         return path  # reading it says what is wrong
     if not stat.S_ISREG(mode):
-        kind = _KINDS.get(stat.S_IFMT(mode), "something else")
+        kind = _FILE_TYPES.get(stat.S_IFMT(mode), "something else")
         raise FileFormatError(path, None, "", f"expected a file, got {kind}")
     return path
 
 
-def pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
+def read_pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
     """Give what a file holds, piece by piece, not more than a limit.
 
     Args:
@@ -68,11 +68,11 @@ def pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
         try:
             size = os.fstat(handle).st_size
             if size > most:
-                raise _too_large(path, bound, size)
-            while piece := os.read(handle, _PIECE):
+                raise _size_error(path, bound, size)
+            while piece := os.read(handle, _PIECE_BYTES):
                 got += len(piece)
                 if got > most:
-                    raise _too_large(path, bound, None)
+                    raise _size_error(path, bound, None)
                 yield piece
         finally:
             os.close(handle)
@@ -100,19 +100,19 @@ def read_bytes(path: Path | str, bound: str = "file_mb") -> bytes:
     Raises:
         FileFormatError: it is missing (the nearest name in its folder is told), a folder, or larger than the limit.
     """
-    data = b"".join(pieces(path, bound))
-    _READ[Path(path)] = hashlib.sha256(data).hexdigest()
+    data = b"".join(read_pieces(path, bound))
+    _HASHES_OF_READ_FILES[Path(path)] = hashlib.sha256(data).hexdigest()
     return data
 
 
-def hash_read(path: Path) -> str | None:
+def hash_of_read_file(path: Path) -> str | None:
     """Return the SHA-256 hash of what this process has read last of a file; None where it has not read it."""
-    return _READ.get(path)
+    return _HASHES_OF_READ_FILES.get(path)
 
 
-def forget() -> None:
+def forget_read_files() -> None:
     """Forget what was read, as a new process does."""
-    _READ.clear()
+    _HASHES_OF_READ_FILES.clear()
     _SOURCES.clear()
 
 
@@ -122,10 +122,10 @@ def is_source(path: Path) -> bool:
         there = path.stat()
     except (OSError, ValueError):
         return False
-    return stat.S_ISREG(there.st_mode) and any(_is_there(source, there) for source in _SOURCES)
+    return stat.S_ISREG(there.st_mode) and any(_is_same_file(source, there) for source in _SOURCES)
 
 
-def _is_there(path: Path, state: os.stat_result) -> bool:
+def _is_same_file(path: Path, state: os.stat_result) -> bool:
     with contextlib.suppress(OSError):
         return os.path.samestat(path.stat(), state)
     return False
@@ -142,7 +142,7 @@ def read_text(path: Path | str, bound: str = "file_mb") -> str:
         FileFormatError: it is missing (the nearest name in its folder is told), a folder, larger than the limit, or not
             UTF-8.
     """
-    return decoded(read_bytes(path, bound), path)
+    return decode(read_bytes(path, bound), path)
 
 
 def read_lines(path: Path | str, bound: str = "table_mb") -> Iterator[str]:
@@ -157,22 +157,22 @@ def read_lines(path: Path | str, bound: str = "table_mb") -> Iterator[str]:
     """
     decoder = codecs.getincrementaldecoder("utf-8-sig")()
     rest, number, longest = "", 0, limit("line_characters")
-    for piece in itertools.chain(pieces(path, bound), [b""]):
+    for piece in itertools.chain(read_pieces(path, bound), [b""]):
         try:
             text = rest + decoder.decode(piece, final=not piece)
         except UnicodeDecodeError as error:
             line = number + 1 + rest.count("\n") + error.object[: error.start].count(b"\n")
-            raise not_utf8(path, line, error.object[error.start]) from error
+            raise utf8_error(path, line, error.object[error.start]) from error
         # What follows the last line feed waits for its end; where there is none, carriage returns may end lines.
         whole = len(text) if not piece else max(text.rfind("\n"), text.rfind("\r", 0, -1)) + 1
         rest = text[whole:]
         for line_text in io.StringIO(text[:whole], newline=""):
             number += 1
             if len(line_text) > longest:
-                raise _line_too_long(path, number)
+                raise _line_length_error(path, number)
             yield line_text
         if len(rest) > longest:
-            raise _line_too_long(path, number + 1)
+            raise _line_length_error(path, number + 1)
 
 
 def read_program(path: Path | str) -> str:
@@ -193,11 +193,11 @@ def read_typed_program(stream: BinaryIO) -> str:
     most = limit("program_mb") * MEGABYTE
     data = stream.read(most + 1)
     if len(data) > most:
-        raise FileFormatError("standard input", None, "", f"too large: {beyond('program_mb')}")
-    return decoded(data, "standard input")
+        raise FileFormatError("standard input", None, "", f"too large: {limit_message('program_mb')}")
+    return decode(data, "standard input")
 
 
-def decoded(data: bytes, path: Path | str) -> str:
+def decode(data: bytes, path: Path | str) -> str:
     """Return the text that bytes are; a mark of byte order is dropped, line ends become line feeds.
 
     Raises:
@@ -208,21 +208,21 @@ def decoded(data: bytes, path: Path | str) -> str:
     except UnicodeDecodeError as error:
         # The decoder counts behind a mark of byte order, so its own bytes are those to look at.
         line = error.object[: error.start].count(b"\n") + 1
-        raise not_utf8(path, line, error.object[error.start]) from error
+        raise utf8_error(path, line, error.object[error.start]) from error
 
 
-def not_utf8(path: Path | str, line: int, byte: int) -> FileFormatError:
+def utf8_error(path: Path | str, line: int, byte: int) -> FileFormatError:
     """Return the error that says which byte of a line is no UTF-8."""
     return FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} is invalid; save it as UTF-8")
 
 
-def _too_large(path: Path, bound: str, size: int | None) -> FileFormatError:
+def _size_error(path: Path, bound: str, size: int | None) -> FileFormatError:
     got = None if size is None else f"{size / MEGABYTE:,.1f}"
-    return FileFormatError(path, None, "", f"too large: {beyond(bound, got)}")
+    return FileFormatError(path, None, "", f"too large: {limit_message(bound, got)}")
 
 
-def _line_too_long(path: Path | str, line: int) -> FileFormatError:
-    return FileFormatError(path, line, "", f"a line is too long: {beyond('line_characters')}")
+def _line_length_error(path: Path | str, line: int) -> FileFormatError:
+    return FileFormatError(path, line, "", f"a line is too long: {limit_message('line_characters')}")
 
 
 def _names_in(folder: Path) -> list[str]:

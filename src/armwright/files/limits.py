@@ -74,7 +74,7 @@ def limit(name: str) -> int:
     if here is not None and name in here:
         return here[name]
     told = os.environ.get(VARIABLE, "")
-    return (parsed(told) if told else {}).get(name, LIMITS[name].usual)
+    return (parse_limits(told) if told else {}).get(name, LIMITS[name].usual)
 
 
 @contextmanager
@@ -97,7 +97,7 @@ def raised(**limits: int) -> Iterator[None]:
         _raised.reset(token)
 
 
-def parsed(text: str) -> dict[str, int]:
+def parse_limits(text: str) -> dict[str, int]:
     """Return limits from a text such as ``table_rows=10000000,table_mb=2000``.
 
     Raises:
@@ -114,7 +114,7 @@ def parsed(text: str) -> dict[str, int]:
     return found
 
 
-def beyond(name: str, got: int | str | None = None) -> str:
+def limit_message(name: str, got: int | str | None = None) -> str:
     """Return the end of a message that something is beyond a limit: what was got, what is allowed, how to raise it."""
     one = LIMITS[name]
     amount = "" if got is None else f"{got:,}; " if isinstance(got, int) else f"{got}; "

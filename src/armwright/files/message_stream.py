@@ -8,7 +8,7 @@ Source:
 import re
 from typing import BinaryIO
 
-from armwright.files.limits import MEGABYTE, beyond, limit
+from armwright.files.limits import MEGABYTE, limit, limit_message
 
 CONTENT_LENGTH = re.compile(rb"(?im)^content-length[ \t]*:[ \t]*([0-9]+)[ \t]*\r?\n")
 
@@ -34,13 +34,13 @@ class MessageStream:
         line = self._stream.readline(most + 1)
         self._header = 0 if not line.strip() else self._header + len(line)
         if self._header > most:
-            self.refused = f"the header of a message is too large: {beyond('header_bytes')}"
+            self.refused = f"the header of a message is too large: {limit_message('header_bytes')}"
             return b""
         length = CONTENT_LENGTH.fullmatch(line)
         most = limit("message_mb") * MEGABYTE
         # Of a length with more digits than the largest has, the number is of no interest.
         if length and (len(length[1].lstrip(b"0")) > len(str(most)) or int(length[1]) > most):
-            self.refused = f"a message is too large: {beyond('message_mb')}"
+            self.refused = f"a message is too large: {limit_message('message_mb')}"
             return b""
         return line
 

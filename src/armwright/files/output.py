@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from armwright.errors import OutputError
-from armwright.files.exchange import exchange, overwrite
+from armwright.files.exchange import exchange_files, overwrite
 from armwright.files.inputs import is_source
-from armwright.files.result_folder import KEPT, PREFIX, signals_held, staging
+from armwright.files.result_folder import BACKUP, PREFIX, deferred_signals, staging_folder
 
 Content: TypeAlias = str | bytes | Iterable[str]
 
@@ -31,7 +31,7 @@ WRITTEN: dict[Path, None] = {}
 RECORD = "run.json"
 FORMAT = "armwright results 1"
 # What results are called: a record is data, and only what has such a name is ever removed because a record names it.
-_NAMES = re.compile(
+_RESULT_NAMES = re.compile(
     r"(motion|samples|path|dh_\w+)\.csv|events\.jsonl|(frames|move|errors|measures|tables|summary)\.json|report\.html|"
     r"arm\.(toml|urdf)|move\.(gif|mp4)|(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|"
     r"verification|bearings|error|spectrum|forces|energy)\.svg"
@@ -58,15 +58,15 @@ def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str
     Raises:
         OutputError: the folder or a file cannot be written; the text says which and why.
     """
-    named, folder = folder, _resolved(folder)
+    named, folder = folder, _resolve(folder)
     left: dict[str, str] = {}
     with (
-        _parents(folder, lambda error: f"cannot write to '{folder}': {reason(error, folder)}"),
-        staging(_staged_in(folder), folder, lambda dead: left.update(recorded(dead))) as new,
+        _make_parents(folder, lambda error: f"cannot write to '{folder}': {folder_error_text(error, folder)}"),
+        staging_folder(_staging_parent(folder), folder, lambda dead: left.update(recorded_hashes(dead))) as new,
     ):
         hashes = {name: _write(new / name, content) for name, content in files.items()}
         _write(new / RECORD, record_text(hashes, record or {}))
-        with signals_held():
+        with deferred_signals():
             _replace(folder, new, [*files, RECORD], left)
             WRITTEN[named] = None
 
@@ -87,21 +87,21 @@ def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> 
         OutputError: it cannot be written, or it was read; the text says why.
     """
     if (number := descriptor(path)) is not None:
-        _write_to(number, path, text)
+        _write_to_descriptor(number, path, text)
         return
-    named, path = path, _resolved(path)
+    named, path = path, _resolve(path)
     if not back and is_source(path):
         raise OutputError(
             f"cannot write '{named}': it is an input of this command and would be overwritten; name another file"
         )
-    with _parents(path, lambda error: f"cannot write '{path}': {error.strerror or error}"):
+    with _make_parents(path, lambda error: f"cannot write '{path}': {error.strerror or error}"):
         there = path.stat() if path.exists() else None
         if there is not None and not stat.S_ISREG(there.st_mode) and not stat.S_ISDIR(there.st_mode):
             with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as stream:
                 stream.writelines([text] if isinstance(text, str) else text)
-        elif there is not None and _stays_in_place(path, there):
-            data = b"".join(_encoded(text))
-            with signals_held():
+        elif there is not None and _must_overwrite(path, there):
+            data = b"".join(_encode(text))
+            with deferred_signals():
                 overwrite(path, data)
                 WRITTEN[named] = None
         else:
@@ -120,19 +120,19 @@ def descriptor(path: Path) -> int | None:
     return None
 
 
-def _write_to(number: int, path: Path, text: str | Iterable[str]) -> None:
+def _write_to_descriptor(number: int, path: Path, text: str | Iterable[str]) -> None:
     """Write into an open descriptor, behind what was printed so far."""
     try:
         sys.stdout.flush()
         with os.fdopen(os.dup(number), "wb") as stream:
-            stream.writelines(_encoded(text))
+            stream.writelines(_encode(text))
     except BrokenPipeError:
         raise
     except OSError as error:
         raise OutputError(f"cannot write '{path}': {error.strerror or error}") from error
 
 
-def _stays_in_place(path: Path, there: os.stat_result) -> bool:
+def _must_overwrite(path: Path, there: os.stat_result) -> bool:
     """Whether a file is written where it stands: beside it nothing can be made, or it has several names."""
     if not os.access(path, os.W_OK):
         raise PermissionError(errno.EACCES, "it is write-protected")
@@ -148,13 +148,13 @@ def _write_beside(path: Path, named: Path, text: str | Iterable[str], there: os.
         text: what is in it.
         there: the state of the file that is there; None where there is none.
     """
-    with staging(path.parent, path) as new:
+    with staging_folder(path.parent, path) as new:
         made = new / path.name
         _write(made, text)
-        with signals_held():
+        with deferred_signals():
             try:
                 if there is not None:
-                    _give(made, there)
+                    _copy_owner_and_mode(made, there)
                 made.replace(path)
             except OSError as error:
                 if error.errno not in (errno.EBUSY, errno.EPERM) or there is None:
@@ -163,7 +163,7 @@ def _write_beside(path: Path, named: Path, text: str | Iterable[str], there: os.
             WRITTEN[named] = None
 
 
-def _give(path: Path, there: os.stat_result) -> None:
+def _copy_owner_and_mode(path: Path, there: os.stat_result) -> None:
     """Give a file the owner and the mode of another; an ``EPERM`` where that is not allowed."""
     made = path.stat()
     if (made.st_uid, made.st_gid) != (there.st_uid, there.st_gid):
@@ -181,7 +181,7 @@ def record_text(hashes: Mapping[str, str], said: Mapping[str, Any]) -> str:
     return json.dumps({"format": FORMAT, **said, "files": dict(hashes)}, indent=2, ensure_ascii=False) + "\n"
 
 
-def strays(folder: Path) -> tuple[str, ...]:
+def stray_files(folder: Path) -> tuple[str, ...]:
     """Return the files that do not belong to the results of a folder: changed, missing, or of another run.
 
     Args:
@@ -190,7 +190,7 @@ def strays(folder: Path) -> tuple[str, ...]:
     Returns:
         Their names, sorted; empty where all is as it was written, or where the folder holds no results of armwright.
     """
-    return tuple(sorted(name for name, digest in recorded(folder).items() if sha256(folder / name) != digest))
+    return tuple(sorted(name for name, digest in recorded_hashes(folder).items() if sha256(folder / name) != digest))
 
 
 def is_stray(path: Path) -> bool:
@@ -199,9 +199,9 @@ def is_stray(path: Path) -> bool:
     One that the run has not written at all is somebody's own, unless files of the run are missing or changed: then it
     may be of another run, which was killed before it wrote its record.
     """
-    digest = recorded(path.parent).get(path.name)
+    digest = recorded_hashes(path.parent).get(path.name)
     if digest is None:
-        return path.name != RECORD and path.exists() and bool(strays(path.parent))
+        return path.name != RECORD and path.exists() and bool(stray_files(path.parent))
     return sha256(path) != digest
 
 
@@ -219,7 +219,7 @@ def sha256(path: Path) -> str | None:
     return digest.hexdigest()
 
 
-def reason(error: OSError, folder: Path) -> str:
+def folder_error_text(error: OSError, folder: Path) -> str:
     """Say why a folder cannot be made or written to; of a file that is in its place, that it is one."""
     for place in (folder, *folder.parents):
         if place.is_file():
@@ -227,7 +227,7 @@ def reason(error: OSError, folder: Path) -> str:
     return error.strerror or str(error)
 
 
-def _staged_in(folder: Path) -> Path:
+def _staging_parent(folder: Path) -> Path:
     """Return where results are staged: beside their folder, or in it where they could not be moved from there."""
     parent = folder.parent
     if not folder.is_dir():
@@ -236,7 +236,7 @@ def _staged_in(folder: Path) -> Path:
     return parent if movable and os.access(parent, os.W_OK | os.X_OK) else folder
 
 
-def _resolved(path: Path) -> Path:
+def _resolve(path: Path) -> Path:
     """Return where a path leads: links stay, and what they lead to is replaced."""
     try:
         return path.resolve()
@@ -256,25 +256,25 @@ def _replace(folder: Path, new: Path, names: list[str], left: Mapping[str, str])
     if not folder.exists():
         new.replace(folder)
         return
-    with _alone(folder):
-        named = recorded(folder)
+    with _lock_folder(folder):
+        named = recorded_hashes(folder)
         _refuse_what_cannot_be_replaced(folder, names)
         _refuse_what_others_made(folder, names, {*named, *left})
         # What somebody has changed since is theirs.
         gone = {
             name
             for name, digest in (*named.items(), *left.items())
-            if name not in names and _NAMES.fullmatch(name) and sha256(folder / name) == digest
+            if name not in names and _RESULT_NAMES.fullmatch(name) and sha256(folder / name) == digest
         }
         _refuse_sources(folder, {*names, *gone})
-        kept = new.with_name(KEPT)
+        kept = new.with_name(BACKUP)
         kept.mkdir()
-        exchange(folder, new, kept, names, gone)
-        _sync(folder)
+        exchange_files(folder, new, kept, names, gone)
+        _sync_folder(folder)
 
 
 @contextlib.contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def _lock_folder(folder: Path) -> Iterator[None]:
     """Let no other process move results into a folder meanwhile."""
     lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
@@ -285,7 +285,7 @@ def _alone(folder: Path) -> Iterator[None]:
         os.close(lock)
 
 
-def _sync(folder: Path) -> None:
+def _sync_folder(folder: Path) -> None:
     """Let the moves outlive a power cut."""
     with contextlib.suppress(OSError):
         place = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -295,7 +295,7 @@ def _sync(folder: Path) -> None:
             os.close(place)
 
 
-def _said(folder: Path) -> dict[str, Any] | None:
+def _read_record(folder: Path) -> dict[str, Any] | None:
     """Return what the record of a folder says; None where there is none of ours."""
     path = folder / RECORD
     try:
@@ -309,14 +309,14 @@ def _said(folder: Path) -> dict[str, Any] | None:
     return said if ours else None
 
 
-def recorded(folder: Path) -> dict[str, str]:
+def recorded_hashes(folder: Path) -> dict[str, str]:
     """Return the hashes of the files that the record of a folder names; none where it is no record of ours."""
-    files = (_said(folder) or {}).get("files", {})
+    files = (_read_record(folder) or {}).get("files", {})
     # A record is data: it names files of its own folder, and nothing else.
-    return {name: digest for name, digest in files.items() if isinstance(digest, str) and _names_a_file(name)}
+    return {name: digest for name, digest in files.items() if isinstance(digest, str) and _is_file_name(name)}
 
 
-def _names_a_file(name: str) -> bool:
+def _is_file_name(name: str) -> bool:
     """Whether a text is the name of a file in a folder, and not of one in which results are made."""
     try:
         os.fsencode(name)
@@ -329,7 +329,7 @@ def _write(path: Path, content: Content) -> str:
     """Write a file to the disk and return its SHA-256 hash."""
     digest = hashlib.sha256()
     with path.open("wb") as file:
-        for data in _encoded(content):
+        for data in _encode(content):
             digest.update(data)
             file.write(data)
         file.flush()
@@ -337,13 +337,13 @@ def _write(path: Path, content: Content) -> str:
     return digest.hexdigest()
 
 
-def _encoded(content: Content) -> Iterator[bytes]:
+def _encode(content: Content) -> Iterator[bytes]:
     for piece in [content] if isinstance(content, str | bytes) else content:
         yield piece if isinstance(piece, bytes) else piece.encode("utf-8", errors="backslashreplace")
 
 
 @contextlib.contextmanager
-def _parents(path: Path, message: Callable[[OSError], str]) -> Iterator[None]:
+def _make_parents(path: Path, message: Callable[[OSError], str]) -> Iterator[None]:
     """Make the missing folders above a path, and remove them again where writing it fails."""
     with contextlib.ExitStack() as made:
         for folder in [parent for parent in path.parents if not parent.exists()][::-1]:
@@ -352,7 +352,7 @@ def _parents(path: Path, message: Callable[[OSError], str]) -> Iterator[None]:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(
-                f"cannot make '{path.parent}': {reason(error, path.parent)}; nothing was written"
+                f"cannot make '{path.parent}': {folder_error_text(error, path.parent)}; nothing was written"
             ) from error
         try:
             yield
@@ -379,7 +379,7 @@ def _refuse_what_cannot_be_replaced(folder: Path, files: Iterable[str]) -> None:
 
 def _refuse_what_others_made(folder: Path, files: Iterable[str], known: Collection[str]) -> None:
     """Fail where a file of the user's, which no run has written, has the name of one of the results."""
-    ours = {*known, RECORD} if _said(folder) is not None else known
+    ours = {*known, RECORD} if _read_record(folder) is not None else known
     for name in files:
         if name not in ours and os.path.lexists(folder / name):
             raise FileExistsError(

@@ -1,7 +1,7 @@
-"""Folders in which results are made whole before they are moved to their place.
+"""Staging folders, in which results are complete before they are moved to their folder.
 
-A process holds a lock on its own until it ends, however it ends; so a folder whose lock is free is a dead process's,
-and goes with the next results that are written beside it.
+A process holds a lock on its staging folder until it ends, however it ends. A folder whose lock is free was left by a
+dead process, and is removed when the next results are written beside it.
 """
 
 import contextlib
@@ -20,21 +20,21 @@ from typing import Any
 PREFIX = ".armwright-"
 _DIGITS = 16
 _NAME = re.compile(rf"{re.escape(PREFIX)}[0-9a-f]{{{_DIGITS}}}")
-_LOCK, NEW, KEPT = "lock", "new", "kept"
-# What is in a staging folder; a folder of that name with anything else in it is somebody else's.
-_OWN = {_LOCK, NEW, KEPT}
+_LOCK, NEW, BACKUP = "lock", "new", "kept"
+# The content of a staging folder; a folder of that name with other content belongs to somebody else.
+_CONTENT = {_LOCK, NEW, BACKUP}
 _MAX_PATH_LENGTH = 65536
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextlib.contextmanager
-def staging(parent: Path, target: Path, found: Callable[[Path], None] | None = None) -> Iterator[Path]:
-    """Make a folder beside results, and remove it again, with those that dead processes have left there.
+def staging_folder(parent: Path, target: Path, inspect: Callable[[Path], None] | None = None) -> Iterator[Path]:
+    """Make a staging folder, and remove it again, together with those of dead processes.
 
     Args:
-        parent: where it is made; on the file system of the results, so that they can be moved.
-        target: where the results will stand.
-        found: is shown what a dead process has left of results for the same place, before it is removed.
+        parent: its parent, on the file system of the results, so that they can be moved.
+        target: path of the results.
+        inspect: called with the results that a dead process has left for the same path, before they are removed.
 
     Yields:
         An empty folder.
@@ -43,74 +43,77 @@ def staging(parent: Path, target: Path, found: Callable[[Path], None] | None = N
         OSError: it cannot be made.
     """
     for place in {parent, target} if target.is_dir() else {parent}:
-        remove_abandoned(place, target, found)
-    with _made(parent, target) as folder:
+        remove_abandoned_folders(place, target, inspect)
+    with _make_staging_folder(parent, target) as folder:
         new = folder / NEW
         new.mkdir()
         yield new
 
 
 @contextlib.contextmanager
-def _made(parent: Path, target: Path) -> Iterator[Path]:
+def _make_staging_folder(parent: Path, target: Path) -> Iterator[Path]:
     while True:
         folder = parent / f"{PREFIX}{secrets.token_hex(_DIGITS // 2)}"
         folder.mkdir()
-        # Somebody who cleans up may take the folder for abandoned before it is locked; then there is another.
+        # Another process may remove the folder as abandoned before it is locked; then another one is made.
         with contextlib.suppress(FileNotFoundError):
             lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o600)
-            if _locked(lock) is not False and (folder / _LOCK).exists():
+            if _try_lock(lock) is not False and (folder / _LOCK).exists():
                 break
             os.close(lock)
     try:
         os.write(lock, os.fsencode(target))
         yield folder
     finally:
-        with signals_held():
+        with deferred_signals():
             _remove(folder)
             os.close(lock)
 
 
-def remove_abandoned(parent: Path, target: Path | None = None, found: Callable[[Path], None] | None = None) -> None:
-    """Remove the staging folders that processes have left which ended before they could; those of live ones stay.
+def remove_abandoned_folders(
+    parent: Path, target: Path | None = None, inspect: Callable[[Path], None] | None = None
+) -> None:
+    """Remove the staging folders of dead processes; those of live ones stay.
 
     Args:
         parent: where they are.
         target: of whose results ``found`` is told.
-        found: is shown what was made there of results for ``target``.
+        inspect: is shown what was made there of results for ``target``.
     """
     with contextlib.suppress(OSError):
         for folder in parent.glob(f"{PREFIX}*"):
             with contextlib.suppress(OSError):
-                _remove_if_abandoned(folder, target, found)
+                _remove_if_abandoned(folder, target, inspect)
 
 
-def _remove_if_abandoned(folder: Path, target: Path | None, found: Callable[[Path], None] | None) -> None:
+def _remove_if_abandoned(folder: Path, target: Path | None, inspect: Callable[[Path], None] | None) -> None:
     state = folder.lstat()
     if not stat.S_ISDIR(state.st_mode) or state.st_uid != os.geteuid() or not _NAME.fullmatch(folder.name):
         return
     inside = {path.name for path in folder.iterdir()}
     if not inside:
         folder.rmdir()
-    elif _LOCK in inside and inside <= _OWN:
+    elif _LOCK in inside and inside <= _CONTENT:
         lock = os.open(folder / _LOCK, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
         try:
-            if stat.S_ISREG(os.fstat(lock).st_mode) and _locked(lock):
-                if found is not None and target is not None and os.read(lock, _MAX_PATH_LENGTH) == os.fsencode(target):
-                    found(folder / NEW)
+            if stat.S_ISREG(os.fstat(lock).st_mode) and _try_lock(lock):
+                has_same_target = target is not None and os.read(lock, _MAX_PATH_LENGTH) == os.fsencode(target)
+                if inspect is not None and has_same_target:
+                    inspect(folder / NEW)
                 _remove(folder)
         finally:
             os.close(lock)
 
 
 def _remove(folder: Path) -> None:
-    """Remove a staging folder, its lock last: whoever is killed meanwhile leaves one that is known for abandoned."""
-    for name in _OWN - {_LOCK}:
+    """Remove a staging folder, its lock last, so that it counts as abandoned if this process is killed meanwhile."""
+    for name in _CONTENT - {_LOCK}:
         shutil.rmtree(folder / name, ignore_errors=True)
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def _locked(file: int) -> bool | None:
-    """Lock a file; return whether it could be, and None where the file system knows no locks."""
+def _try_lock(file: int) -> bool | None:
+    """Lock a file; return whether it was possible, and None where the file system has no locks."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -121,23 +124,23 @@ def _locked(file: int) -> bool | None:
 
 
 @contextlib.contextmanager
-def signals_held() -> Iterator[None]:
-    """Hold signals that end a process until the block is done; then they have their effect."""
+def deferred_signals() -> Iterator[None]:
+    """Defer signals that end a process to the end of the block."""
     if threading.current_thread() is not threading.main_thread():
         # Python hands signals to the main thread alone.
         yield
         return
-    held: list[int] = []
+    deferred: list[int] = []
     handlers: dict[int, Any] = {}
     try:
         for number in _SIGNALS:
             handler = signal.getsignal(number)
             if handler is not None and handler is not signal.SIG_IGN:
                 handlers[number] = handler
-                signal.signal(number, lambda number, _frame: held.append(number))
+                signal.signal(number, lambda number, _frame: deferred.append(number))
         yield
     finally:
-        for known, handler in handlers.items():
-            signal.signal(known, handler)
-        if held:
-            signal.raise_signal(held[0])
+        for changed, handler in handlers.items():
+            signal.signal(changed, handler)
+        if deferred:
+            signal.raise_signal(deferred[0])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from armwright.arrays import LARGEST
 from armwright.errors import FileFormatError, shown
 from armwright.files.inputs import read_lines
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 
 # The first is the default for a line with none of them.
 _SEPARATORS = (",", ";", "\t")
@@ -78,7 +78,9 @@ def read_rows(path: Path | str) -> CsvTable:
     if head is None:
         raise _empty_file_error(path)
     if len(head.cells) > limit("table_columns"):
-        raise FileFormatError(path, head.line, "", f"too many columns: {beyond('table_columns', len(head.cells))}")
+        raise FileFormatError(
+            path, head.line, "", f"too many columns: {limit_message('table_columns', len(head.cells))}"
+        )
     first = next(cells, None)
     if first is None:
         raise FileFormatError(path, None, "", "no rows after the column names")
@@ -106,7 +108,9 @@ def _nonempty_rows(path: Path, lines: Iterable[str], separator: str, skipped: in
             cells = tuple(cell.strip() for cell in row)
             if any(cells):
                 if count > most:
-                    raise FileFormatError(path, skipped + reader.line_num, "", f"too many rows: {beyond('table_rows')}")
+                    raise FileFormatError(
+                        path, skipped + reader.line_num, "", f"too many rows: {limit_message('table_rows')}"
+                    )
                 count += 1
                 yield CsvRow(skipped + reader.line_num, cells)
     except csv.Error as error:

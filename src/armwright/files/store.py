@@ -1,9 +1,9 @@
-"""Bytes by key, kept for the next process: what takes long to make, and can be made again at any time.
+"""A store of bytes by key, for later processes: of data that takes long to make, and can be made again at any time.
 
-What lies in the store may be code that will run. So it is read only from a folder that nobody but the user (and the
-administrator) can write to, and every entry carries the SHA-256 of its key and its bytes: what comes out is, byte for
-byte, what went in under that key, or nothing. An entry that was cut off, overwritten, exchanged or made by others
-counts as absent and is made anew. A store that cannot be used, or a disk that is full, costs time and nothing else.
+The store may contain code that will run. So it is read only from a folder that nobody but the user (and the
+administrator) can write to, and every entry carries the SHA-256 of its key and its bytes: what is read is, byte for
+byte, what was stored under that key, or nothing. An entry that was cut off, overwritten, exchanged or made by others
+counts as absent and is made again. A store that cannot be used, or a disk that is full, costs time and nothing else.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ import stat
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -23,19 +23,19 @@ import attrs
 
 from armwright.errors import CacheWarning
 
-# What an entry begins with; behind it stand the SHA-256 and the bytes.
-_MARK = b"armwright store 1\n"
+# An entry begins with this; the SHA-256 and the bytes follow.
+_SIGNATURE = b"armwright store 1\n"
 _DIGEST = hashlib.sha256().digest_size
-# No entry of ours comes near it; what is longer is not read [bytes].
+# Entries of armwright are much shorter; longer ones are not read [bytes].
 _MAX_LENGTH = 1 << 28
-_HALF = ".tmp"
-# A half-written file is left by a process that was killed; after so long no process still writes it [s].
-_FORGOTTEN = 3600.0
-# So long a process waits for another that makes the same entry, which may have been stopped; then it makes its own [s].
-_PATIENCE = 120.0
-_GLANCE = 0.02
+_PARTIAL_SUFFIX = ".tmp"
+# A killed process leaves a partial file; after this time no process still writes it [s].
+_ABANDONED_AFTER = 3600.0
+# A process waits this long for another that makes the same entry, which may have been stopped [s].
+_LOCK_TIMEOUT = 120.0
+_LOCK_POLL = 0.02
 _PRIVATE_FOLDER, _PRIVATE_FILE = 0o700, 0o600
-_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 @attrs.frozen
@@ -43,13 +43,13 @@ class Store:
     """Bytes by key in one folder.
 
     Attributes:
-        folder: where they lie; None where nothing can be kept.
+        folder: of the entries; None where nothing can be stored.
     """
 
     folder: Path | None
 
     def get(self, key: str) -> bytes | None:
-        """Return what was put under a key, checked; None where there is nothing or it is damaged.
+        """Return the bytes of a key, verified; None where there are none or they are damaged.
 
         Args:
             key: letters and digits.
@@ -60,77 +60,54 @@ class Store:
             entry = _read(self.folder / key)
         except OSError:
             return None
-        start = len(_MARK) + _DIGEST
+        start = len(_SIGNATURE) + _DIGEST
         data = entry[start:]
-        return data if entry[:start] == _MARK + _digest(key, data) else None
+        return data if entry[:start] == _SIGNATURE + _checksum(key, data) else None
 
     def put(self, key: str, data: bytes) -> bool:
-        """Keep bytes under a key, in place of what may be there, and return whether they are kept.
+        """Store bytes under a key, in place of others there, and return whether they are stored.
 
-        They are written aside, forced onto the disk and renamed, so that a reader finds all of them or none.
+        They are written to a temporary file, flushed to the disk and renamed: a reader finds all of them or none.
 
         Args:
             key: letters and digits.
-            data: what to keep.
+            data: the bytes.
         """
         if self.folder is None:
             return False
         try:
             make_private(self.folder)
-            _clear(self.folder)
-            _replace(self.folder / key, _MARK + _digest(key, data) + data)
+            _remove_abandoned_files(self.folder)
+            _replace(self.folder / key, _SIGNATURE + _checksum(key, data) + data)
         except OSError:  # full, read-only, over a quota: the bytes will be made again
             return False
         return True
 
-    def made(self, key: str, make: Callable[[], bytes]) -> bytes:
-        """Return what was put under a key; where there is nothing sound, make it and keep it.
-
-        Of processes that want the same at once, one makes it and the others wait for it.
-
-        Args:
-            key: letters and digits.
-            make: makes it.
-        """
-        data = self.get(key)
-        if data is None:
-            with self.alone(key):
-                data = self.get(key)
-                if data is None:
-                    data = make()
-                    self.put(key, data)
-        return data
-
     @contextlib.contextmanager
-    def alone(self, key: str) -> Iterator[None]:
+    def locked(self, key: str) -> Iterator[None]:
         """Keep other processes from making the same entry meanwhile, as far as that can be done.
 
-        Nothing depends on it but time: where the lock cannot be had, two processes make the same.
+        Nothing depends on it but time: without the lock, two processes make the same entry.
         """
         with contextlib.ExitStack() as stack:
             with contextlib.suppress(OSError):
-                stack.enter_context(self._lock(key))
+                self._lock(key, stack)
             yield
 
-    @contextlib.contextmanager
-    def _lock(self, key: str) -> Iterator[None]:
+    def _lock(self, key: str, stack: contextlib.ExitStack) -> None:
         if self.folder is None:
-            raise FileNotFoundError
+            return
         make_private(self.folder)
         # One file for many keys: locks are never removed, since another process may be about to take one.
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
         handle = os.open(self.folder / f"{key[:2]}.lock", flags, _PRIVATE_FILE)
-        try:
-            give_up = time.monotonic() + _PATIENCE
-            while time.monotonic() < give_up:
-                try:
-                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    break
-                except BlockingIOError:
-                    time.sleep(_GLANCE)
-            yield
-        finally:
-            os.close(handle)
+        stack.callback(os.close, handle)
+        deadline = time.monotonic() + _LOCK_TIMEOUT
+        while time.monotonic() < deadline:
+            with contextlib.suppress(BlockingIOError):
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return
+            time.sleep(_LOCK_POLL)
 
 
 def user_store(name: str) -> Store:
@@ -144,12 +121,12 @@ def user_store(name: str) -> Store:
     folder = cache_folder()
     if folder is None:
         return Store(None)
-    return _store(folder, name)
+    return _trusted_store(folder, name)
 
 
 @cache
-def _store(folder: Path, name: str) -> Store:
-    reason = distrust(folder / name)
+def _trusted_store(folder: Path, name: str) -> Store:
+    reason = reason_for_distrust(folder / name)
     if not reason:
         return Store(folder / name)
     warnings.warn(
@@ -189,8 +166,8 @@ def make_private(folder: Path) -> None:
             missing.mkdir(mode=_PRIVATE_FOLDER)
 
 
-def distrust(folder: Path) -> str:
-    """Say why somebody else could change what lies in a folder, or would lie in it; empty where nobody can.
+def reason_for_distrust(folder: Path) -> str:
+    """Return why somebody else could change the content of a folder, now or later; empty where nobody can.
 
     The folder itself, and the one above it, must belong to the user and be closed to the writing of others. So must
     all folders on the way to them, or be of the kind of /tmp, where nobody touches what belongs to others. The
@@ -201,12 +178,12 @@ def distrust(folder: Path) -> str:
     """
     try:
         for part in (folder, *folder.parents):
-            if part.is_symlink() and not _trusted(part.lstat().st_uid):
+            if part.is_symlink() and not _is_trusted(part.lstat().st_uid):
                 return f"'{part}' is a link that belongs to another user"
         real = folder.resolve()
         for part in (real, *real.parents):
             if part.exists():
-                reason = _weakness(part, strict=part in (real, folder.parent.resolve()))
+                reason = _reason_for_distrust_of(part, strict=part in (real, folder.parent.resolve()))
                 if reason:
                     return reason
     except (OSError, RuntimeError):  # no leave to look, or a ring of links: then nothing can be read there either
@@ -214,24 +191,24 @@ def distrust(folder: Path) -> str:
     return ""
 
 
-def _weakness(folder: Path, *, strict: bool) -> str:
-    """Say why somebody else could change what a folder holds."""
+def _reason_for_distrust_of(folder: Path, *, strict: bool) -> str:
+    """Return why somebody else could change the content of a folder that exists."""
     about = folder.stat()
-    if not _trusted(about.st_uid):
+    if not _is_trusted(about.st_uid):
         return f"'{folder}' belongs to another user"
-    writers = about.st_mode & _OTHERS_WRITE
+    writers = about.st_mode & _WRITABLE_BY_OTHERS
     if not writers or not stat.S_ISDIR(about.st_mode):
         return ""
-    if not strict and (about.st_mode & stat.S_ISVTX or (writers == stat.S_IWGRP and _only_member(about.st_gid))):
+    if not strict and (about.st_mode & stat.S_ISVTX or (writers == stat.S_IWGRP and _is_private_group(about.st_gid))):
         return ""
     return f"other users may write to '{folder}' (mode {stat.S_IMODE(about.st_mode):o})"
 
 
-def _trusted(owner: int) -> bool:
+def _is_trusted(owner: int) -> bool:
     return owner in (0, os.geteuid())
 
 
-def _only_member(group: int) -> bool:
+def _is_private_group(group: int) -> bool:
     """Whether a group is the user's own: many systems give each user one, and let it write."""
     import grp  # noqa: PLC0415 - rarely asked
     import pwd  # noqa: PLC0415
@@ -243,7 +220,7 @@ def _only_member(group: int) -> bool:
     return user.pw_gid == group and user.pw_name == entry.gr_name and set(entry.gr_mem) <= {user.pw_name}
 
 
-def _digest(key: str, data: bytes) -> bytes:
+def _checksum(key: str, data: bytes) -> bytes:
     return hashlib.sha256(b"%s\n%s" % (key.encode(), data)).digest()
 
 
@@ -252,14 +229,14 @@ def _read(path: Path) -> bytes:
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     with os.fdopen(handle, "rb") as file:
         about = os.fstat(handle)
-        sound = stat.S_ISREG(about.st_mode) and _trusted(about.st_uid) and not about.st_mode & _OTHERS_WRITE
+        sound = stat.S_ISREG(about.st_mode) and _is_trusted(about.st_uid) and not about.st_mode & _WRITABLE_BY_OTHERS
         return file.read(about.st_size) if sound and about.st_size < _MAX_LENGTH else b""
 
 
 def _replace(path: Path, data: bytes) -> None:
     """Write a file whole, onto the disk and for the user alone, in place of what may have its name."""
-    handle, name = tempfile.mkstemp(prefix=f"{path.name}.", suffix=_HALF, dir=path.parent)
-    half = Path(name)
+    handle, name = tempfile.mkstemp(prefix=f"{path.name}.", suffix=_PARTIAL_SUFFIX, dir=path.parent)
+    partial = Path(name)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
@@ -267,17 +244,17 @@ def _replace(path: Path, data: bytes) -> None:
             os.fsync(handle)
         if path.is_dir() and not path.is_symlink():  # the name is ours
             shutil.rmtree(path)
-        half.replace(path)
+        partial.replace(path)
     except BaseException:
         with contextlib.suppress(OSError):
-            half.unlink(missing_ok=True)
+            partial.unlink(missing_ok=True)
         raise
 
 
-def _clear(folder: Path) -> None:
-    """Remove what killed processes left half-written."""
-    long_ago = time.time() - _FORGOTTEN
-    for half in folder.glob(f"*{_HALF}"):
+def _remove_abandoned_files(folder: Path) -> None:
+    """Remove the partial files of killed processes."""
+    long_ago = time.time() - _ABANDONED_AFTER
+    for partial in folder.glob(f"*{_PARTIAL_SUFFIX}"):
         with contextlib.suppress(OSError):
-            if half.lstat().st_mtime < long_ago:
-                half.unlink()
+            if partial.lstat().st_mtime < long_ago:
+                partial.unlink()

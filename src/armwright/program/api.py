@@ -13,8 +13,8 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, counted
-from armwright.files.inputs import read_program, regular
-from armwright.files.limits import beyond, limit
+from armwright.files.inputs import read_program, regular_file
+from armwright.files.limits import limit, limit_message
 from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis import analysis
@@ -172,7 +172,7 @@ def import_reader(folder: Path) -> ReadImport:
     """Return what reads the files that a program of this folder IMPORTs."""
 
     def read(name: str) -> Imported:
-        cell = read_cell(regular(folder / name), arms_needed=False)
+        cell = read_cell(regular_file(folder / name), arms_needed=False)
         return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     return read
@@ -210,13 +210,13 @@ def _bounded(read_import: ReadImport) -> ReadImport:
 
     def read(name: str) -> Imported:
         if name not in frames and len(frames) >= limit("imports"):
-            raise InvalidValueError(f"too many files: {beyond('imports')}")
+            raise InvalidValueError(f"too many files: {limit_message('imports')}")
         frames.setdefault(name, 0)
         brought = read_import(name)
         frames[name] = len(brought.frames)
         together = sum(frames.values())
         if together > limit("frames"):
-            raise InvalidValueError(f"too many frames in all files together: {beyond('frames', together)}")
+            raise InvalidValueError(f"too many frames in all files together: {limit_message('frames', together)}")
         return brought
 
     return read

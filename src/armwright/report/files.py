@@ -13,7 +13,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.errors import ExitStatus
-from armwright.files.inputs import hash_read
+from armwright.files.inputs import hash_of_read_file
 from armwright.files.output import sha256
 from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
@@ -271,7 +271,7 @@ def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: 
 
 
 def _file(path: Path, text: str | None = None) -> dict[str, str | None]:
-    digest = hash_read(path) or sha256(path) if text is None else hashlib.sha256(text.encode()).hexdigest()
+    digest = hash_of_read_file(path) or sha256(path) if text is None else hashlib.sha256(text.encode()).hexdigest()
     return {"path": str(path), "sha256": digest}
 
 

@@ -31,8 +31,8 @@ import scipy
 
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, KindError, OutputError, shown
-from armwright.files.inputs import read_text, regular
-from armwright.files.output import reason
+from armwright.files.inputs import read_text, regular_file
+from armwright.files.output import folder_error_text
 from armwright.sweep.designs import Design
 from armwright.sweep.errors import SweepError
 from armwright.sweep.task import Rows, Task
@@ -176,7 +176,7 @@ def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterato
         handle = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
         lock = os.fdopen(handle, "r+", encoding="utf-8", errors="replace")
     except OSError as error:
-        raise OutputError(f"cannot write to '{path}': {reason(error, path)}") from error
+        raise OutputError(f"cannot write to '{path}': {folder_error_text(error, path)}") from error
     with lock:
         holder = lock.read(1000).strip()
         if holder and not holder.startswith(_HOLDER):
@@ -248,7 +248,7 @@ def _write_manifest(path: Path, sweep: dict[str, Any], block: int) -> dict[str, 
 
 def _read_manifest(path: Path, sweep: dict[str, Any]) -> dict[str, Any]:
     """Return what the manifest of a folder says, if it is the folder of a sweep."""
-    text = read_text(regular(path))
+    text = read_text(regular_file(path))
     try:
         fields: dict[str, Any] = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armwright.errors import FileFormatError
-from armwright.files.inputs import regular
-from armwright.files.output import RECORD, record_text, recorded, sha256
+from armwright.files.inputs import regular_file
+from armwright.files.output import RECORD, record_text, recorded_hashes, sha256
 from armwright.sweep.errors import SweepError
 from armwright.sweep.extras import extra
 from armwright.sweep.folder import MANIFEST, RESULTS, Folder, write_whole
@@ -44,7 +44,7 @@ def load(folder: Path | str) -> "xarray.Dataset":
     if not path.exists():
         state = "is not finished; run it again to resume" if path.with_name(MANIFEST).exists() else "does not exist"
         raise SweepError(f"'{folder}': the sweep {state}")
-    damage, expected, actual = "", recorded(path.parent).get(RESULTS), sha256(regular(path))
+    damage, expected, actual = "", recorded_hashes(path.parent).get(RESULTS), sha256(regular_file(path))
     if expected is None:
         damage = f"it cannot be verified: its folder has no {RECORD} with its checksum"
     elif expected != actual:

@@ -46,7 +46,7 @@ def compiled(source: str, entry: str, title: str) -> Callable[..., Any]:
 def _load(key: str, source: str, entry: str, title: str) -> Callable[..., Any]:
     store = user_store("compiled")
     stored = store.get(key)
-    with contextlib.nullcontext() if stored else store.alone(key):
+    with contextlib.nullcontext() if stored else store.locked(key):
         stored = stored or store.get(key)  # another process may have made it meanwhile
         if stored:
             # Sound bytes may still come from a Numba that writes them in another way.

@@ -12,7 +12,7 @@ from armwright.arm.model import Link
 from armwright.arm.urdf.robot import Robot, UrdfJoint, axis_of, body_of
 from armwright.arrays import Array
 from armwright.errors import one_of
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 
 # Of links and joints, a message lists this many.
 _MAX_LISTED = 50
@@ -81,7 +81,7 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
     if not stops:
         raise robot.error(f"no joint moves between the links '{base}' and '{tip}'")
     if len(stops) > limit("joints"):
-        raise robot.error(f"too many joints between '{base}' and '{tip}': {beyond('joints', len(stops))}")
+        raise robot.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(stops))}")
     X, moving = np.eye(4), []
     beside: list[UrdfJoint] = []
     for joint in route:

@@ -20,7 +20,7 @@ from armwright.arrays import LARGEST, Array
 from armwright.errors import FileFormatError, closest, shown
 from armwright.extras import import_extra
 from armwright.files.inputs import read_bytes
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 
 _MISSING: Any = object()
 # What is matched is not given back: a word of a million digits and a letter is passed once.
@@ -187,7 +187,7 @@ def _refuse_deep(path: Path, raw: Any) -> None:
         row = [below for one in row for below in one]
         if not row:
             return
-    raise FileFormatError(path, row[0].sourceline, "", f"nested too deeply: {beyond('nesting')}")
+    raise FileFormatError(path, row[0].sourceline, "", f"nested too deeply: {limit_message('nesting')}")
 
 
 def _split(raw: Any) -> tuple[str, str]:
@@ -203,7 +203,7 @@ def _element(path: Path, raw: Any, space: str, around: str) -> Element:
     # lxml looks for each from the first one, so many take the square of the time.
     if len(raw.attrib) > limit("attributes"):
         raise FileFormatError(
-            path, raw.sourceline, f"<{tag}>", f"too many attributes: {beyond('attributes', len(raw.attrib))}"
+            path, raw.sourceline, f"<{tag}>", f"too many attributes: {limit_message('attributes', len(raw.attrib))}"
         )
     attributes = dict(raw.attrib)
     if tag in {"link", "joint"} and not around:

@@ -15,7 +15,7 @@ from armwright.arm.tensors import impossible_moments
 from armwright.arm.urdf.elements import Element, read_elements
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
@@ -279,8 +279,8 @@ def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
         if joint.kind == "revolute" and most < abs(value) < math.inf:
             raise element.error(
                 key,
-                f"too far from zero: {beyond('revolutions', f'{value:g} rad')}; a joint without limits has the type "
-                "continuous",
+                f"too far from zero: {limit_message('revolutions', f'{value:g} rad')}; "
+                "a joint without limits has the type continuous",
             )
     return Limits(lower=lower, upper=upper, **largest), notes
 

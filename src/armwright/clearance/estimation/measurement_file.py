@@ -21,7 +21,7 @@ from armwright.clearance.features import Features, features_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.files.column_names import LENGTH, TIME, Column, Schema
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 from armwright.files.unit_table import UnitTable, read_header
 
 _AT_REST = ("pose", "commanded_x", "commanded_y", "x", "y")
@@ -172,7 +172,7 @@ def _rows_by_name(table: UnitTable, column: str) -> dict[str, list[int]]:
     for row, name in enumerate(table.words(column)):
         groups.setdefault(name, []).append(row)
         if len(groups) > most:
-            raise table.error(row, column, f"too many: {beyond('entries')}")
+            raise table.error(row, column, f"too many: {limit_message('entries')}")
     return groups
 
 

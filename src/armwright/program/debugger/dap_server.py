@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from armwright.errors import ArmwrightError
-from armwright.files.inputs import regular
+from armwright.files.inputs import regular_file
 from armwright.program.debugger import dap_breakpoints, dap_inspection
 from armwright.program.debugger.dap_messages import Arguments, Noise, RequestError, framed, messages
 from armwright.program.debugger.dap_session import EditorSession, Launch, Load, Save
@@ -227,8 +227,8 @@ def _launched(arguments: Arguments) -> Launch:
     if standard not in set(Standard):
         raise RequestError(f"std: expected 2 or 83, got {standard!r}")
     return Launch(
-        program=regular(Path(arguments.get(str, "program"))),
-        cell=regular(Path(arguments.get(str, "cell"))) if arguments.get(str, "cell", "") else None,
+        program=regular_file(Path(arguments.get(str, "program"))),
+        cell=regular_file(Path(arguments.get(str, "cell"))) if arguments.get(str, "cell", "") else None,
         std=Standard(standard),
         output=Path(arguments.get(str, "output")) if arguments.get(str, "output", "") else None,
         stop_on_entry=arguments.get(bool, "stopOnEntry", default=False),

@@ -10,7 +10,7 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.document import Document
-from armwright.files.inputs import regular
+from armwright.files.inputs import regular_file
 from armwright.program.semantics.cell_symbols import Imported
 
 _IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)
@@ -120,7 +120,7 @@ def _stamp(path: Path) -> tuple[int, int]:
 def _read(path: Path) -> CellFile | FileFormatError:
     try:
         # A program or a setting names it, and neither may name what never ends.
-        cell = read_cell(regular(path), arms_needed=False)
+        cell = read_cell(regular_file(path), arms_needed=False)
         return CellFile(path=path, cell=cell, lines=_lines(path))
     except FileFormatError as error:
         return error

@@ -8,7 +8,7 @@ from collections import Counter
 import attrs
 
 from armwright.cell.names import arm_name
-from armwright.files.limits import beyond, limit
+from armwright.files.limits import limit, limit_message
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import UNITS
@@ -203,7 +203,7 @@ class _Scanner:
         """Say that the text has too many words; what follows is passed over."""
         # Nothing is said of the end that is not read.
         self._unclosed = True
-        self._report("E119", f"the program is too long: {beyond('words')}", Span(start, end), "read up to here")
+        self._report("E119", f"the program is too long: {limit_message('words')}", Span(start, end), "read up to here")
         return last
 
     def _closer_look(self, what: int, word: str, start: int, end: int) -> int:
