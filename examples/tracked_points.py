@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from armwright.arm.load import load_arm
-from armwright.calibration.chain import chain_of
+from armwright.calibration.chain import kinematic_chain
 from armwright.calibration.experiment_design import plan_poses
 from armwright.calibration.joint_errors import compliances
 from armwright.spatial.poses import homogeneous
@@ -30,7 +30,7 @@ def rows() -> Iterator[str]:
     """Give the rows: poses to fit, some of them several times, and poses by chance to check with."""
     rng = np.random.default_rng(1984)
     arm = load_arm("puma560-seed")
-    chain = chain_of(arm, base=HALL, joint_errors=compliances(arm))
+    chain = kinematic_chain(arm, base=HALL, joint_errors=compliances(arm))
     errors = rng.standard_normal(len(chain.names)) * np.where(chain.is_length, LENGTH, ANGLE)
     for i, name in enumerate(chain.names):
         errors[i] = SAG.get(name, 0.0 if name.endswith(".sag") else errors[i])

@@ -13,7 +13,7 @@ from armwright.arm.urdf.reader import load_urdf, read_urdf
 from armwright.arm.urdf.writer import urdf_text
 from armwright.arm.write import toml_text
 from armwright.arrays import Array
-from armwright.calibration.chain import chain_of
+from armwright.calibration.chain import kinematic_chain
 from armwright.compiled.quantities import emit_quantity
 from armwright.dynamics.accelerations import forward_dynamics
 from armwright.dynamics.energy import kinetic_energy
@@ -187,13 +187,13 @@ def test_quantities_of_fixed_transforms(rng: np.random.Generator, tmp_path: Path
     power = (kinetic_energy(arm, q + h * qd, qd) - kinetic_energy(arm, q - h * qd, qd)) / (2 * h)
     C = coriolis_efforts(arm, q, qd)
     np.testing.assert_allclose(qd @ C, power, rtol=1e-5)
-    np.testing.assert_allclose(chain_of(arm).forward(q).position[0], forward(arm, q)[:3, 3], atol=1e-12)
-    errors = np.zeros(len(chain_of(arm).names))
-    reached = chain_of(arm).forward(q).position_jacobian[0]
+    np.testing.assert_allclose(kinematic_chain(arm).forward(q).position[0], forward(arm, q)[:3, 3], atol=1e-12)
+    errors = np.zeros(len(kinematic_chain(arm).names))
+    reached = kinematic_chain(arm).forward(q).position_jacobian[0]
     for k in range(len(errors)):
         off = errors.copy()
         off[k] = 1e-6
-        moved = chain_of(arm).forward(q, off).position[0] - chain_of(arm).forward(q, -off).position[0]
+        moved = kinematic_chain(arm).forward(q, off).position[0] - kinematic_chain(arm).forward(q, -off).position[0]
         np.testing.assert_allclose(reached[:, k], moved / 2e-6, atol=1e-6)
 
 

@@ -7,7 +7,7 @@ import pytest
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
-from armwright.calibration.chain import Chain, chain_of
+from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from calibration.simulated import configurations, random_arm, random_errors, random_pose
@@ -61,7 +61,7 @@ def test_no_errors(name: str, rng: np.random.Generator) -> None:
     arm = load_arm(name)
     q = configurations(rng, arm, 20)
 
-    reached = chain_of(arm).forward(q)
+    reached = kinematic_chain(arm).forward(q)
 
     np.testing.assert_allclose(reached.position, forward(arm, q)[:, :3, 3], atol=ROUNDING)
     np.testing.assert_allclose(reached.rotation, forward(arm, q)[:, :3, :3], atol=ROUNDING)
@@ -73,7 +73,7 @@ def test_no_errors_anywhere(n: int, rng: np.random.Generator) -> None:
     arm = random_arm(rng, n, slides=True)
     q = configurations(rng, arm, 20)
 
-    np.testing.assert_allclose(chain_of(arm).forward(q).position, forward(arm, q)[:, :3, 3], atol=ROUNDING)
+    np.testing.assert_allclose(kinematic_chain(arm).forward(q).position, forward(arm, q)[:, :3, 3], atol=ROUNDING)
 
 
 @pytest.mark.parametrize("R", [((0, 0, 1), (0, 1, 0), (-1, 0, 0)), ((0, 0, -1), (0, 1, 0), (1, 0, 0))])
@@ -84,14 +84,14 @@ def test_quarter_turn_of_the_tool(R: tuple[tuple[int, ...], ...], rng: np.random
     arm = Arm(name="one", joints=[Joint(kind="revolute", a=0.3)], tool=tool)
     q = configurations(rng, arm, 5)
 
-    np.testing.assert_allclose(chain_of(arm).forward(q).rotation, forward(arm, q)[:, :3, :3], atol=ROUNDING)
+    np.testing.assert_allclose(kinematic_chain(arm).forward(q).rotation, forward(arm, q)[:, :3, :3], atol=ROUNDING)
 
 
 @pytest.mark.parametrize("n", range(3, 8))
 def test_derivatives(n: int, rng: np.random.Generator) -> None:
     """Position, rotation and both derivatives are those of a product of matrices in complex numbers."""
     arm = random_arm(rng, n, slides=True)
-    chain = chain_of(arm, base=random_pose(rng, 0.5))
+    chain = kinematic_chain(arm, base=random_pose(rng, 0.5))
     q = configurations(rng, arm, 3)
     errors = random_errors(rng, chain, scale=30.0)
 
@@ -114,7 +114,7 @@ def test_derivatives(n: int, rng: np.random.Generator) -> None:
 
 def test_differences(rng: np.random.Generator) -> None:
     """Moving an error a little moves the tool as the derivative says."""
-    chain = chain_of(load_arm("stanford"))
+    chain = kinematic_chain(load_arm("stanford"))
     q = configurations(rng, chain.arm, 10)
     errors = random_errors(rng, chain)
 
@@ -127,14 +127,14 @@ def test_differences(rng: np.random.Generator) -> None:
 
 def test_parallel_axes_get_a_fifth_error() -> None:
     """Links between parallel axes have a turn about y, in the UR5 after joints 2 and 3; the last link has none."""
-    beta = [name for name in chain_of(load_arm("ur5")).names if name.endswith("beta")]
+    beta = [name for name in kinematic_chain(load_arm("ur5")).names if name.endswith("beta")]
 
     assert beta == ["joint2.beta", "joint3.beta"]
 
 
 def test_names_and_kinds() -> None:
     """Errors stand in the order of the chain, and what begins with r or is an angle of a joint is no length."""
-    chain = chain_of(Arm(name="one", joints=[Joint(kind="revolute", a=0.3)]))
+    chain = kinematic_chain(Arm(name="one", joints=[Joint(kind="revolute", a=0.3)]))
 
     lengths = [name for name, is_length in zip(chain.names, chain.is_length, strict=True) if is_length]
 
@@ -144,7 +144,7 @@ def test_names_and_kinds() -> None:
 
 def test_wrong_number_of_errors() -> None:
     """Errors of another arm are refused."""
-    chain = chain_of(load_arm("ur5"))
+    chain = kinematic_chain(load_arm("ur5"))
 
     with pytest.raises(ShapeError, match=r"errors: expected 38 of them, got shape \(3,\)"):
         chain.forward(np.zeros(6), np.zeros(3))
@@ -153,4 +153,4 @@ def test_wrong_number_of_errors() -> None:
 def test_wrong_number_of_joints() -> None:
     """Joint positions of another arm are refused."""
     with pytest.raises(ShapeError, match="q: expected 6 numbers on the last axis"):
-        chain_of(load_arm("ur5")).forward(np.zeros(7))
+        kinematic_chain(load_arm("ur5")).forward(np.zeros(7))

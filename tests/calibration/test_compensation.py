@@ -5,7 +5,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
-from armwright.calibration.chain import Chain, chain_of
+from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.calibration.compensation import inverse_calibrated
 from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.joint_errors import compliances
@@ -23,7 +23,7 @@ MET = 1e-9
 def bent(rng: np.random.Generator) -> tuple[Chain, Array]:
     """Return a PUMA whose dimensions are off and whose joints give."""
     arm = load_arm("puma560")
-    chain = chain_of(arm, joint_errors=compliances(arm))
+    chain = kinematic_chain(arm, joint_errors=compliances(arm))
     errors = random_errors(rng, chain)
     errors[-len(chain.joint_errors) :] = 1e-3
     return chain, errors
@@ -35,7 +35,7 @@ def test_places(rng: np.random.Generator) -> None:
     q = configurations(rng, chain.arm, 120)
     found = calibrate_nongeometric(chain.arm, readings(q, seen(chain, q, errors, NOISE, rng)), folds=3)
     near = configurations(rng, chain.arm, 10)
-    goals = chain_of(chain.arm).forward(near).position
+    goals = kinematic_chain(chain.arm).forward(near).position
 
     there = inverse_calibrated(found, goals, near)
 
@@ -50,7 +50,7 @@ def test_places(rng: np.random.Generator) -> None:
 def test_poses(rng: np.random.Generator) -> None:
     """Poses are met in place and turn, with turns about y that no table holds."""
     arm = load_arm("ur5")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     errors, q = random_errors(rng, chain), configurations(rng, arm, 40)
     X = np.tile(np.eye(4), (40, 1, 1))
     reached = chain.forward(q, errors)
@@ -69,7 +69,7 @@ def test_poses(rng: np.random.Generator) -> None:
 def test_a_hand_the_other_way_round(rng: np.random.Generator) -> None:
     """A pose is not met by a hand at its place that is turned over: it turns, or says by how much it misses."""
     arm = load_arm("puma560")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q = configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
     near = np.array([0.3, -0.7, 0.4, 0.2, 0.9, 0.1])
@@ -87,7 +87,7 @@ def test_a_hand_the_other_way_round(rng: np.random.Generator) -> None:
 def test_out_of_reach(rng: np.random.Generator) -> None:
     """A goal that is out of reach is missed, and that is said."""
     arm = load_arm("puma560")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q = configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
 
@@ -99,7 +99,7 @@ def test_out_of_reach(rng: np.random.Generator) -> None:
 def test_no_step_that_leads_away(rng: np.random.Generator) -> None:
     """Goals beyond the edge of what can be reached are missed by no more than from the nearest configuration passed."""
     arm = load_arm("puma560")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q = configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
     near = configurations(rng, arm, 60)
@@ -115,7 +115,7 @@ def test_no_step_that_leads_away(rng: np.random.Generator) -> None:
 def test_limits(rng: np.random.Generator) -> None:
     """Positions beyond the limits are told."""
     arm = load_arm("puma560")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q = 0.3 * configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
     beyond = arm.limits.upper + 0.05
@@ -129,7 +129,9 @@ def test_as_many(rng: np.random.Generator) -> None:
     """As many joint positions as goals, or one for all."""
     arm = load_arm("puma560")
     q = configurations(rng, arm, 40)
-    found = calibrate_points(arm, q, seen(chain_of(arm), q, np.zeros(len(chain_of(arm).names)), NOISE, rng))
+    found = calibrate_points(
+        arm, q, seen(kinematic_chain(arm), q, np.zeros(len(kinematic_chain(arm).names)), NOISE, rng)
+    )
 
     assert inverse_calibrated(found, found.predict(q[:3]), q[0]).q.shape == (3, 6)
     with pytest.raises(ShapeError, match="near: expected 3 joint positions for as many goals, or one, got 2"):

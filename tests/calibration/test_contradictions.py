@@ -3,7 +3,7 @@
 import numpy as np
 
 from armwright.arm.load import load_arm
-from armwright.calibration.contradictions import contradictions
+from armwright.calibration.contradictions import find_contradictions
 from armwright.calibration.cross_validation import cross_validate, workspace_regions
 from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.readings import readings
@@ -25,7 +25,7 @@ def test_coupled_joint(rng: np.random.Generator) -> None:
     true[:, 2] += 0.5 * (q[:, 1] + 1.0)
     points = forward(arm, true)[:, :3, 3] + rng.normal(0.0, 5e-5, (90, 3))
 
-    said = list(contradictions(calibrate_points(arm, q, points), readings(q, points)))
+    said = list(find_contradictions(calibrate_points(arm, q, points), readings(q, points)))
 
     assert len(said) >= 1
     assert "joint 2 is elsewhere than in the" in said[0]
@@ -39,7 +39,7 @@ def test_nothing_to_doubt(rng: np.random.Generator) -> None:
     points = forward(arm, q + 2e-3)[:, :3, 3] + rng.normal(0.0, 5e-5, (60, 3))
     points[[3, 17, 40]] += 5e-3
 
-    assert list(contradictions(calibrate_points(arm, q, points), readings(q, points))) == []
+    assert list(find_contradictions(calibrate_points(arm, q, points), readings(q, points))) == []
 
 
 def test_errors_beyond_belief(rng: np.random.Generator) -> None:
@@ -48,7 +48,7 @@ def test_errors_beyond_belief(rng: np.random.Generator) -> None:
     q = configurations(rng, 60)
     points = forward(arm, q + np.array((0.0, 0.0, 0.59, 0.0, 0.0, 0.0)))[:, :3, 3] + rng.normal(0.0, 5e-5, (60, 3))
 
-    said = " ".join(contradictions(calibrate_points(arm, q, points), readings(q, points)))
+    said = " ".join(find_contradictions(calibrate_points(arm, q, points), readings(q, points)))
 
     assert "joint3.theta" in said
     assert "no link is made so badly" in said

@@ -13,7 +13,7 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY
 from armwright.arm.write import toml_text
 from armwright.arrays import Array
-from armwright.calibration.chain import chain_of
+from armwright.calibration.chain import kinematic_chain
 from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf, position_covariance
 from armwright.calibration.cross_validation import cross_validate
 from armwright.calibration.fitting import Calibration, calibrate_points
@@ -35,7 +35,7 @@ EXACT = 1e-12
 def test_corrected_arm(n: int, rng: np.random.Generator) -> None:
     """The forward kinematics of the corrected arm are those of the calibration, in the frame of the measurements."""
     arm = random_arm(rng, n, slides=True)
-    chain = chain_of(arm, base=random_pose(rng, 0.5))
+    chain = kinematic_chain(arm, base=random_pose(rng, 0.5))
     q = configurations(rng, arm, 60)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 5e-5, rng), without=("beta",))
 
@@ -48,7 +48,7 @@ def test_corrected_arm(n: int, rng: np.random.Generator) -> None:
 def test_gravity_stays_where_it_was(rng: np.random.Generator) -> None:
     """A tracker that lies on its side turns the frame of the corrected arm, not the torques that hold the arm."""
     arm = load_arm("puma560")
-    chain = chain_of(arm, base=homogeneous(rotation_from_vector([np.pi / 2, 0.0, 0.0]), (1.0, 2.0, 3.0)))
+    chain = kinematic_chain(arm, base=homogeneous(rotation_from_vector([np.pi / 2, 0.0, 0.0]), (1.0, 2.0, 3.0)))
     q, none = configurations(rng, arm, 60), np.zeros(len(chain.names))
 
     better = corrected_arm(calibrate_points(arm, q, seen(chain, q, none, 1e-7, rng), without=("beta",)))
@@ -61,7 +61,7 @@ def test_gravity_stays_where_it_was(rng: np.random.Generator) -> None:
 def test_turns_about_y_do_not_fit_a_table(rng: np.random.Generator) -> None:
     """A turn about y between parallel axes has no place in a table, and the text says what to do."""
     arm = load_arm("ur5")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q = configurations(rng, arm, 60)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 5e-5, rng))
 
@@ -72,7 +72,7 @@ def test_turns_about_y_do_not_fit_a_table(rng: np.random.Generator) -> None:
 def test_held_out_points_tell_the_noise(rng: np.random.Generator) -> None:
     """Held-out points are as far off as the noise of three coordinates makes them, and a little more."""
     arm = load_arm("puma560")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q, noise = configurations(rng, arm, 120), 1e-4
     off = cross_validate(arm, readings(q, seen(chain, q, random_errors(rng, chain), noise, rng)))
 
@@ -131,7 +131,7 @@ def six(row: dict[str, str]) -> Array:
 def tilted(rng: np.random.Generator) -> Calibration:
     """Return a calibration of a UR5 with all errors, turns about y among them."""
     arm = load_arm("ur5")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q = configurations(rng, arm, 80)
     return calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 2e-5, rng))
 
@@ -139,7 +139,7 @@ def tilted(rng: np.random.Generator) -> Calibration:
 def test_tables_by_their_formulas(rng: np.random.Generator) -> None:
     """A table, multiplied out by the formula of its convention, has the tool where the corrected arm has it."""
     arm = random_arm(rng, 6, slides=True)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q = configurations(rng, arm, 80)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 2e-5, rng), without=("beta",))
 
@@ -184,7 +184,7 @@ def _configuration(model: Any, q: Array) -> Array:
 def test_how_well_it_is_known(rng: np.random.Generator) -> None:
     """The corrected arm tells how well its tool is known as the calibration does, from its file too."""
     arm = random_arm(rng, 5)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q, elsewhere = configurations(rng, arm, 60), configurations(rng, arm, 20)
     points = seen(chain, q, random_errors(rng, chain), 5e-5, rng) @ rotation_from_vector([0.3, -0.5, 1.0]).T + 2.0
     found = calibrate_points(arm, q, points, without=("beta",))
@@ -200,7 +200,7 @@ def test_how_well_it_is_known(rng: np.random.Generator) -> None:
 def test_known_in_the_file(rng: np.random.Generator, tmp_path: Path) -> None:
     """What an arm file says of its own errors is read back to the last bit."""
     arm = load_arm("puma560")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q = configurations(rng, arm, 60)
     better = corrected_arm(
         calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 5e-5, rng), without=("beta",))

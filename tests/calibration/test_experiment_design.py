@@ -8,7 +8,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, JointKind, Limits
-from armwright.calibration.chain import chain_of
+from armwright.calibration.chain import kinematic_chain
 from armwright.calibration.cross_validation import cross_validate
 from armwright.calibration.experiment_design import INDICES, observability, plan_poses
 from armwright.calibration.fitting import calibrate_points
@@ -34,7 +34,7 @@ def test_indices_of_the_plan() -> None:
     """What the plan says of its poses is what its equations say."""
     arm = load_arm("ur5")
     plan = plan_poses(arm, 20)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
 
     kept = [chain.names.index(name) for name in plan.names]
     np.testing.assert_allclose(plan.observability, observability(chain, plan.q, kept), rtol=1e-9)
@@ -45,7 +45,7 @@ def test_indices_of_the_plan() -> None:
 def test_planned_poses_leave_smaller_deviations() -> None:
     """With the poses proposed, the errors of an arm come out surer than with poses taken by chance, on average."""
     arm, rng = load_arm("puma560"), np.random.default_rng(4)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     errors = random_errors(rng, chain)
     plan = plan_poses(arm, 25)
     lower, upper = (np.array([getattr(j.limits, side) for j in arm.joints]) for side in ("lower", "upper"))
@@ -115,7 +115,7 @@ def test_as_many_as_asked_for() -> None:
 def test_enough_to_calibrate(name: str, fewest: int, sample: Sample) -> None:
     """The fewest poses that are proposed are always enough for a calibration, and to judge it; one less is refused."""
     arm = load_arm(name)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     with pytest.raises(InvalidValueError, match=f"expected {fewest} poses or more, got {fewest - 1}"):
         plan_poses(arm, fewest - 1)
     plan = plan_poses(arm, fewest)
@@ -157,7 +157,7 @@ def test_next_poses_see_what_the_first_did_not() -> None:
 
     assert np.ptp(plan.q[:, 1]) > 0.5
     assert plan.observability.O3 > plan.random.O3
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     kept = [chain.names.index(name) for name in plan.names]
     together = observability(chain, np.vstack([plan.q, before]), kept)
     np.testing.assert_allclose(together, plan.observability)

@@ -12,9 +12,9 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.calibration import fitting
-from armwright.calibration.chain import Chain, chain_of
+from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.calibration.fitting import Calibration, calibrate_points
-from armwright.calibration.initial_guess import register
+from armwright.calibration.initial_guess import register_base
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, UnknownNameError
 from armwright.spatial.rotations import angle_between
 from calibration.simulated import configurations, random_arm, random_errors, random_pose, seen
@@ -40,7 +40,7 @@ def trial(seed: int) -> Trial:
     """Calibrate an arm of 3 to 7 joints, some of them parallel, that has those errors which its points can tell."""
     rng = np.random.default_rng(seed)
     arm = random_arm(rng, 3 + seed % 5, slides=seed % 3 == 0)
-    chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
+    chain, noise = kinematic_chain(arm), NOISES[seed % len(NOISES)]
     q = configurations(rng, arm, POINTS)
     none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
     expected = calibrate_points(arm, q, seen(chain, q, none, noise, rng), base=np.eye(4)).identifiability.fitted
@@ -73,7 +73,7 @@ def ur5() -> Arm:
 
 def measured(arm: Arm, rng: np.random.Generator, noise: float, m: int = 60) -> tuple[Array, Array, Array]:
     """Return configurations, what is seen of an arm with errors, and where its tool really is."""
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q, errors = configurations(rng, arm, m), random_errors(rng, chain)
     return q, seen(chain, q, errors, noise, rng), seen(chain, q, errors, 0.0, rng)
 
@@ -129,7 +129,7 @@ def test_corrected_arms_are_right_elsewhere() -> None:
     for seed in range(15):
         rng = np.random.default_rng(1000 + seed)
         arm = random_arm(rng, 3 + seed % 5, slides=seed % 3 == 0)
-        chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
+        chain, noise = kinematic_chain(arm), NOISES[seed % len(NOISES)]
         errors, q, elsewhere = random_errors(rng, chain), configurations(rng, arm, POINTS), configurations(rng, arm, 50)
         found = calibrate_points(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
 
@@ -154,7 +154,7 @@ def test_nearly_dependent_errors(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm = random_arm(rng, 3 + seed % 3)
     arm = attrs.evolve(arm, joints=[attrs.evolve(joint, alpha=0.0) for joint in arm.joints])
-    chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
+    chain, noise = kinematic_chain(arm), NOISES[seed % len(NOISES)]
     errors, q, elsewhere = random_errors(rng, chain), configurations(rng, arm, POINTS), configurations(rng, arm, 50)
 
     found = calibrate_points(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
@@ -199,7 +199,7 @@ def test_many_outliers(seed: int) -> None:
     """One point in five may be off by centimetres: all are named, and the arm is right to twice the noise."""
     rng = np.random.default_rng(seed)
     arm = random_arm(rng, 3 + seed % 5)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     errors, q, elsewhere = random_errors(rng, chain), configurations(rng, arm, 100), configurations(rng, arm, 50)
     points = seen(chain, q, errors, 5e-5, rng)
     points[:20] += rng.uniform(0.005, 0.02, (20, 3)) * rng.choice([-1, 1], (20, 3))
@@ -219,7 +219,7 @@ def test_outliers_do_not_count() -> None:
     for seed in range(10):
         rng = np.random.default_rng(seed)
         arm = random_arm(rng, 3 + seed % 5)
-        chain, q = chain_of(arm), configurations(rng, arm, POINTS)
+        chain, q = kinematic_chain(arm), configurations(rng, arm, POINTS)
         none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
         told = list(calibrate_points(arm, q, seen(chain, q, none, 5e-5, rng), base=np.eye(4)).identifiability.fitted)
         true[told] = random_errors(rng, chain)[told]
@@ -265,15 +265,15 @@ def test_any_measuring_frame(robust: bool, ur5: Arm, rng: np.random.Generator) -
 
 def test_registered(ur5: Arm, rng: np.random.Generator) -> None:
     """Points of a perfect arm tell its base to rounding; what a mirror shows is brought near by a turn all the same."""
-    chain, X = chain_of(ur5), random_pose(rng, 5.0)
+    chain, X = kinematic_chain(ur5), random_pose(rng, 5.0)
     q = configurations(rng, ur5, 10)
     points = chain.forward(q).position @ X[:3, :3].T + X[:3, 3]
 
-    base = register(chain, q, points)
+    base = register_base(chain, q, points)
 
     np.testing.assert_allclose(base[:3, 3], X[:3, 3], atol=EXACT)
     assert angle_between(base[:3, :3], X[:3, :3]) < EXACT
-    assert np.linalg.det(register(chain, q, points * (1, 1, -1))[:3, :3]) == pytest.approx(1.0)
+    assert np.linalg.det(register_base(chain, q, points * (1, 1, -1))[:3, :3]) == pytest.approx(1.0)
 
 
 def test_only(ur5: Arm, rng: np.random.Generator) -> None:
@@ -304,7 +304,7 @@ def test_without_what_there_is_not(rng: np.random.Generator) -> None:
     arm = load_arm("puma560")
     none = attrs.evolve(arm, joints=[attrs.evolve(joint, alpha=1.0) for joint in arm.joints])
     q = configurations(rng, none, 40)
-    points = seen(chain_of(none), q, np.zeros(36), 3e-5, rng)
+    points = seen(kinematic_chain(none), q, np.zeros(36), 3e-5, rng)
 
     assert calibrate_points(none, q, points, without=["beta"]).names
     with pytest.raises(UnknownNameError, match=r"no error 'thata'\. Did you mean 'theta'\?"):
@@ -331,7 +331,7 @@ def test_progress(ur5: Arm, rng: np.random.Generator) -> None:
 
 def test_joint_that_never_moved(ur5: Arm, rng: np.random.Generator) -> None:
     """An arm of which one joint never moved is right in the configurations in which it stands like that."""
-    chain = chain_of(ur5)
+    chain = kinematic_chain(ur5)
     q, errors = configurations(rng, ur5, 80), random_errors(rng, chain)
     q[:, 3] = 0.7
 
@@ -416,7 +416,7 @@ def test_not_numbers(ur5: Arm) -> None:
 def test_round_that_leaves_less_is_kept(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
     """Where what is left hides errors, and what is not fitted is left, rounds lead away: the best of them counts."""
     arm = random_arm(rng, 5)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     q, errors = configurations(rng, arm, 60), random_errors(rng, chain)
     points = seen(chain, q, errors, 3e-5, rng)
     fitted, rounds = fitting._fit, count()

@@ -6,7 +6,7 @@ import pytest
 
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
-from armwright.calibration.chain import Chain, chain_of
+from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.calibration.identifiability import Identifiability, select_identifiable
 from armwright.spatial.poses import homogeneous
 from calibration.simulated import configurations, random_arm
@@ -83,7 +83,7 @@ def null_space(chain: Chain) -> Array:
 @pytest.mark.parametrize("n", range(3, 8))
 def test_skew_arm(n: int, rng: np.random.Generator) -> None:
     """Of n turning joints, a measured point tells 4 n + 3 mixtures of errors, and hides just what geometry says."""
-    chain = chain_of(skew(rng, n))
+    chain = kinematic_chain(skew(rng, n))
     q = configurations(rng, chain.arm, 60)
     J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
     hidden = null_space(chain)
@@ -101,7 +101,7 @@ def test_parallel_axes(n: int, parallel: tuple[int, ...], rng: np.random.Generat
     """Parallel axes change nothing of the number: the turn about y comes for the shift, which is one with the next."""
     arm = skew(rng, n)
     joints = [attrs.evolve(joint, alpha=0.0) if i in parallel else joint for i, joint in enumerate(arm.joints, 1)]
-    chain = chain_of(attrs.evolve(arm, joints=joints))
+    chain = kinematic_chain(attrs.evolve(arm, joints=joints))
     q = configurations(rng, chain.arm, 60)
     J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
     hidden = null_space(chain)
@@ -120,7 +120,7 @@ def test_antiparallel_axes(rng: np.random.Generator) -> None:
     """Axes that point against each other are parallel too; then it is the difference of the shifts that is seen."""
     arm = skew(rng, 4)
     joints = [attrs.evolve(joint, alpha=np.pi) if i == 2 else joint for i, joint in enumerate(arm.joints, 1)]
-    chain = chain_of(attrs.evolve(arm, joints=joints))
+    chain = kinematic_chain(attrs.evolve(arm, joints=joints))
 
     fixed = {one.name: one for one in told(chain, configurations(rng, chain.arm, 60)).fixed}
 
@@ -130,7 +130,7 @@ def test_antiparallel_axes(rng: np.random.Generator) -> None:
 
 def test_planar_arm(rng: np.random.Generator) -> None:
     """A planar 3R arm, too, tells 15 mixtures: 8 by what moves in the plane, 7 by what leaves it."""
-    chain = chain_of(planar())
+    chain = kinematic_chain(planar())
 
     found = told(chain, configurations(rng, chain.arm, 40))
 
@@ -147,7 +147,7 @@ def test_slides(seed: int) -> None:
     joints = [
         attrs.evolve(joint, kind="prismatic") if i == 1 + seed % 3 else joint for i, joint in enumerate(arm.joints)
     ]
-    chain = chain_of(attrs.evolve(arm, joints=joints))
+    chain = kinematic_chain(attrs.evolve(arm, joints=joints))
 
     found = told(chain, configurations(rng, chain.arm, 60))
 
@@ -157,7 +157,7 @@ def test_slides(seed: int) -> None:
 def test_what_does_the_same(rng: np.random.Generator) -> None:
     """What is fixed is named with what does the same, and with how much of it."""
     arm = skew(rng, 6)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     _, y, z = arm.tool[:3, 3]
 
     fixed = {one.name: one for one in told(chain, configurations(rng, arm, 60)).fixed}
@@ -180,7 +180,7 @@ def test_tool_on_the_last_axis(rng: np.random.Generator) -> None:
     arm = skew(rng, 4)
     last = attrs.evolve(arm.joints[-1], a=0.0, alpha=0.0)
     arm = attrs.evolve(arm, joints=[*arm.joints[:-1], last], tool=homogeneous(np.eye(3), (0.0, 0.0, 0.1)))
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
 
     found = told(chain, configurations(rng, arm, 60))
 
@@ -193,7 +193,7 @@ def test_tool_on_the_last_axis(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("still", [1, 3, 5])
 def test_joint_that_never_moved(still: int, rng: np.random.Generator) -> None:
     """An arm of which one joint never moves tells as much as one with a joint less: both its links are one."""
-    chain = chain_of(skew(rng, 5))
+    chain = kinematic_chain(skew(rng, 5))
     q = configurations(rng, chain.arm, 60)
     q[:, still - 1] = 0.4
 
@@ -202,7 +202,7 @@ def test_joint_that_never_moved(still: int, rng: np.random.Generator) -> None:
 
 def test_few_poses(rng: np.random.Generator) -> None:
     """Five points have 15 coordinates, and tell no more errors than that."""
-    chain = chain_of(skew(rng, 6))
+    chain = kinematic_chain(skew(rng, 6))
 
     found = told(chain, configurations(rng, chain.arm, 5))
 
@@ -212,7 +212,7 @@ def test_few_poses(rng: np.random.Generator) -> None:
 
 def test_noise_hides(rng: np.random.Generator) -> None:
     """The more noise, the fewer errors are told; those that noise hides are named as such."""
-    chain = chain_of(skew(rng, 6))
+    chain = kinematic_chain(skew(rng, 6))
     q = 0.1 * configurations(rng, chain.arm, 40)
 
     counts = [len(told(chain, q, noise).fitted) for noise in (NONE, 1e-5, 1e-4, 1e-3)]
@@ -226,7 +226,7 @@ def test_noise_hides(rng: np.random.Generator) -> None:
 
 def test_allowed(rng: np.random.Generator) -> None:
     """What may not be fitted is neither fitted nor fixed for a reason of geometry."""
-    chain = chain_of(skew(rng, 4))
+    chain = kinematic_chain(skew(rng, 4))
     q = configurations(rng, chain.arm, 40)
     J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
 

@@ -7,7 +7,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.calibration.chain import JointErrorModel, chain_of
+from armwright.calibration.chain import JointErrorModel, kinematic_chain
 from armwright.calibration.correction import corrected_arm
 from armwright.calibration.cross_validation import random_folds
 from armwright.calibration.fitting import calibrate
@@ -32,7 +32,7 @@ def measured(
     arm: Arm, rng: np.random.Generator, bends: tuple[JointErrorModel, ...], by: float, m: int = 200
 ) -> tuple[Readings, Array]:
     """Return points seen of an arm whose joints bend, and by how much each does."""
-    chain = chain_of(arm, joint_errors=bends)
+    chain = kinematic_chain(arm, joint_errors=bends)
     errors = random_errors(rng, chain)
     bent = by * rng.uniform(0.5, 1.0, len(bends))
     errors[len(errors) - len(bends) :] = bent

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
-from armwright.calibration.chain import chain_of
+from armwright.calibration.chain import kinematic_chain
 from armwright.calibration.fitting import calibrate_points
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import homogeneous
@@ -72,7 +72,7 @@ def test_the_same_fit(pybotics: Any, rng: np.random.Generator) -> None:
     the first joint, and what the last joint does as the tool does.
     """
     arm = skew_arm()
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     errors = random_errors(rng, chain)
     errors[[i for i, name in enumerate(chain.names) if name.startswith("base")]] = 0.0
     q, elsewhere = configurations(rng, arm, 60), configurations(rng, arm, 40)

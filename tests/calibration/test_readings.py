@@ -8,12 +8,12 @@ from scipy.stats import t as student
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.calibration.chain import Chain, JointErrorModel, chain_of
+from armwright.calibration.chain import Chain, JointErrorModel, kinematic_chain
 from armwright.calibration.cross_validation import cross_validate
 from armwright.calibration.fitting import Calibration, calibrate, calibrate_points
-from armwright.calibration.measurement_model import MeasurementModel, Plane
 from armwright.calibration.nongeometric import calibrate_nongeometric
-from armwright.calibration.readings import Readings, concatenate, readings, refuse_not_fitted
+from armwright.calibration.readings import Readings, concatenate, readings, refuse_unlocated
+from armwright.calibration.residuals import MeasurementModel, Plane
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError
 from armwright.spatial.rotations import rotation_from_quaternion, rotation_from_vector
 from calibration.simulated import configurations, random_arm, random_errors, random_pose, seen
@@ -31,7 +31,7 @@ class Truth:
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.arm: Arm = load_arm("ur5")
-        self.chain: Chain = chain_of(self.arm)
+        self.chain: Chain = kinematic_chain(self.arm)
         self.errors = random_errors(rng, self.chain)
         self.rng = rng
 
@@ -79,7 +79,7 @@ def test_derivatives(rng: np.random.Generator) -> None:
         JointErrorModel("joint1.sin", 0, lambda q: np.sin(q[:, 0])),
         JointErrorModel("joint3.sag", 2, lambda q: np.cos(q[:, 1] + q[:, 2])),
     )
-    chain = chain_of(
+    chain = kinematic_chain(
         arm, base=random_pose(rng, 1.0), target_rotation=rotation_from_vector([0.1, 0.2, 0.3]), joint_errors=bends
     )
     model = MeasurementModel(
@@ -196,7 +196,7 @@ def test_poses_that_are_turned_over(truth: Truth) -> None:
 def test_derivatives_of_large_turns(angle: float, rng: np.random.Generator) -> None:
     """Turns that are far off have the derivatives that differences have, too."""
     arm = random_arm(rng, 4)
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     model = MeasurementModel(chain=chain, frames={"a": np.eye(4), "b": random_pose(rng, 1.0)})
     q = configurations(rng, arm, 4)
     X, axes = np.tile(np.eye(4), (4, 1, 1)), rng.standard_normal((4, 3))
@@ -417,8 +417,8 @@ def test_nothing_to_hold_against(truth: Truth) -> None:
     given = concatenate(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
 
     with pytest.raises(InvalidValueError, match=r"plane table: no reading that is fitted .* so that the 4 others"):
-        refuse_not_fitted(given.take(np.arange(40)), given.take(np.arange(40, 44)))
-    refuse_not_fitted(given, given.take(np.arange(40, 44)))
+        refuse_unlocated(given.take(np.arange(40)), given.take(np.arange(40, 44)))
+    refuse_unlocated(given, given.take(np.arange(40, 44)))
 
 
 def test_too_few_to_hold_out(truth: Truth) -> None:

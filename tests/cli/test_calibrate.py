@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
-from armwright.calibration.chain import chain_of
+from armwright.calibration.chain import kinematic_chain
 from armwright.kinematics.forward_kinematics import forward
 from cli_calls import armwright
 
@@ -28,7 +28,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def measured(planned: Path) -> Path:
     """The poses with the points that an arm with errors has there."""
     rng = np.random.default_rng(3)
-    chain = chain_of(load_arm(ARM))
+    chain = kinematic_chain(load_arm(ARM))
     head, *rows = planned.read_text(encoding="utf-8").splitlines()
     q = np.radians([[float(x) for x in row.split(",")] for row in rows])
     errors = np.where(chain.is_length, 5e-4, 2e-3) * rng.standard_normal(len(chain.names))
@@ -75,7 +75,7 @@ def test_json(measured: Path) -> None:
     """The same as data: every error with its standard error, the covariance, why the others are fixed."""
     told = json.loads(armwright("calibrate", ARM, measured, "--json", "--folds", "3").stdout)
 
-    assert set(told["errors"]) | set(told["fixed"]) == set(chain_of(load_arm(ARM)).names)
+    assert set(told["errors"]) | set(told["fixed"]) == set(kinematic_chain(load_arm(ARM)).names)
     deviations = [one["standard_error"] for one in told["errors"].values()]
     np.testing.assert_allclose(np.sqrt(np.diag(told["covariance"])), deviations, rtol=1e-9)
     assert told["distances"]["calibrated, held out"]["mean"] < 3e-4

@@ -15,16 +15,16 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, positive
-from armwright.calibration.chain import chain_of
-from armwright.calibration.contradictions import contradictions
-from armwright.calibration.cross_validation import HeldOut, cross_validate
+from armwright.calibration.chain import kinematic_chain
+from armwright.calibration.contradictions import find_contradictions
+from armwright.calibration.cross_validation import HeldOutErrors, cross_validate
 from armwright.calibration.fitting import Calibration, calibrate
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
 from armwright.calibration.joint_errors import largest_gravity_efforts
-from armwright.calibration.measurement_model import PoseError
 from armwright.calibration.measurements import Measurements
 from armwright.calibration.nongeometric import NongeometricCalibration, calibrate_nongeometric
-from armwright.calibration.readings import Readings, refuse_not_fitted
+from armwright.calibration.readings import Readings, refuse_unlocated
+from armwright.calibration.residuals import PoseError
 from armwright.errors import ContradictionError, InvalidValueError
 from armwright.files.result_table import ResultTable
 from armwright.spatial.euler import to_rpy
@@ -32,9 +32,9 @@ from armwright.spatial.euler import to_rpy
 # Rotations about y, which a Denavit-Hartenberg table has no number for.
 _TILTS = ("beta",)
 # A nominal arm whose points are farther from the readings was not measured in its own frame [m].
-_ANOTHER_FRAME = 0.2
+_MAX_NOMINAL_DISTANCE = 0.2
 # How many readings a note names.
-_NAMED = 8
+_MAX_NAMED = 8
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -63,9 +63,9 @@ class CalibrationAssessment:
     full: Calibration
     tabular: Calibration
     nominal: Array
-    held_out: HeldOut
-    held_out_region: HeldOut | None
-    held_out_tabular: HeldOut
+    held_out: HeldOutErrors
+    held_out_region: HeldOutErrors | None
+    held_out_tabular: HeldOutErrors
     check: PoseError
     accuracy: dict[str, Accuracy]
     repeatability: Repeatability | None
@@ -114,7 +114,7 @@ class CalibrationAssessment:
             *(f"DOUBTFUL: {reason}" for reason in self.contradictions),
             *_notes_on_fit(self.full, self.measurements),
             _note_on_held_out(self.held_out, self.held_out_region),
-            *_notes_on_choice(self.nongeometric),
+            *_notes_on_nongeometric(self.nongeometric),
         )
 
     def as_data(self) -> dict[str, Any]:
@@ -219,7 +219,7 @@ def assess_calibration(
         positive(noise, "noise", "m")
     measured = measurements.readings.take(~measurements.check)
     check = measurements.readings.take(measurements.check)
-    refuse_not_fitted(measured, check)
+    refuse_unlocated(measured, check)
     full = calibrate(arm, measured, progress=progress)
     tabular = full if not any(map(_is_tilt, full.names)) else calibrate(arm, measured, without=_TILTS)
     beyond = (
@@ -240,13 +240,13 @@ def assess_calibration(
         report("cross-validating: for the arm file")
         held_out_tabular = cross_validate(arm, measured, folds=folds, seed=seed, without=_TILTS)
     positions = {
-        "nominal": chain_of(arm).forward(measured.q).position,
+        "nominal": kinematic_chain(arm).forward(measured.q).position,
         "nominal, base best-fitted": full.chain.forward(measured.q).position,
         "calibrated, held out": held_out.positions,
     }
     points = measured.with_point & (measured.frame == 0)
     nominal = np.linalg.norm(positions["nominal"][points] - measured.points[points], axis=1)
-    if not len(nominal) or np.median(nominal) > _ANOTHER_FRAME:
+    if not len(nominal) or np.median(nominal) > _MAX_NOMINAL_DISTANCE:
         nominal = nominal[:0]
         del positions["nominal"]
     if beyond and beyond.nested:
@@ -265,7 +265,7 @@ def assess_calibration(
         accuracy={name: values for name, values in figures.items() if values is not None},
         repeatability=repeatability(measured),
         nongeometric=beyond,
-        contradictions=tuple(contradictions(full, measured, noise)),
+        contradictions=tuple(find_contradictions(full, measured, noise)),
     )
 
 
@@ -292,12 +292,12 @@ def _notes_on_fit(full: Calibration, measurements: Measurements) -> Iterator[str
         )
     yield from measurements.warnings
     if full.outliers:
-        names = ", ".join(measurements.names[fitted[i]] for i in full.outliers[:_NAMED])
-        more = f" and {len(full.outliers) - _NAMED} more" if len(full.outliers) > _NAMED else ""
+        names = ", ".join(measurements.names[fitted[i]] for i in full.outliers[:_MAX_NAMED])
+        more = f" and {len(full.outliers) - _MAX_NAMED} more" if len(full.outliers) > _MAX_NAMED else ""
         yield f"outliers, which do not count: {names}{more}"
 
 
-def _note_on_held_out(held_out: HeldOut, region: HeldOut | None) -> str:
+def _note_on_held_out(held_out: HeldOutErrors, region: HeldOutErrors | None) -> str:
     """Return what the figures of held-out readings are good for."""
     if region is None:
         return "held out by configuration only: no region of the workspace can be left out of these readings"
@@ -308,7 +308,7 @@ def _note_on_held_out(held_out: HeldOut, region: HeldOut | None) -> str:
     )
 
 
-def _notes_on_choice(beyond: NongeometricCalibration | None) -> Iterator[str]:
+def _notes_on_nongeometric(beyond: NongeometricCalibration | None) -> Iterator[str]:
     """Say of which points the figures of a non-geometric calibration are."""
     if beyond is None:
         return

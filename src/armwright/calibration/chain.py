@@ -131,7 +131,7 @@ class Chain:
         directions, origins, rotates = np.zeros((count, m, 3)), np.zeros((count, m, 3)), np.zeros(count, dtype=bool)
         deviations = [error.law(configurations) for error in self.joint_errors]
         first = count - len(self.joint_errors)
-        own: dict[int, int] = {}  # by joint the number of the error of its own position
+        position_error: dict[int, int] = {}  # by joint the number of the error of its own position
         number = 0
         for element in self.elements:
             value = np.full(m, element.value)
@@ -140,7 +140,7 @@ class Chain:
                 for i, (error, deviation) in enumerate(zip(self.joint_errors, deviations, strict=True), first):
                     if error.joint == element.joint:
                         value += x[i] * deviation
-                own[element.joint] = number
+                position_error[element.joint] = number
             axis = R[:, :, element.axis].copy()
             if element.name:
                 value += x[number]
@@ -149,16 +149,16 @@ class Chain:
             if element.kind == "translation":
                 p = p + axis * value[:, None]
             else:
-                _rotate(R, element.axis, value)
+                _rotate_about_own_axis(R, element.axis, value)
         levers = np.where(rotates[:, None, None], np.cross(directions, p - origins), directions)
         rotations = np.where(rotates[:, None, None], directions, 0.0)
         for i, (error, deviation) in enumerate(zip(self.joint_errors, deviations, strict=True), first):
-            levers[i] = levers[own[error.joint]] * deviation[:, None]
-            rotations[i] = rotations[own[error.joint]] * deviation[:, None]
+            levers[i] = levers[position_error[error.joint]] * deviation[:, None]
+            rotations[i] = rotations[position_error[error.joint]] * deviation[:, None]
         return ToolPoses(p, R, np.moveaxis(levers, 0, -1), np.moveaxis(rotations, 0, -1))
 
 
-def chain_of(
+def kinematic_chain(
     arm: Arm,
     *,
     base: Array | None = None,
@@ -185,24 +185,24 @@ def chain_of(
 
 
 def _elements(arm: Arm, target_rotation: Array) -> Iterator[Element]:
-    yield from _errors("base")
-    yield from _fixed(arm.base)
+    yield from _error_elements("base")
+    yield from _fixed_elements(arm.base)
     for i, joint in enumerate(arm.joints):
         name = f"joint{i + 1}"
         yield Element("rotation", 2, joint.theta, f"{name}.theta", i if joint.revolute else None)
         yield Element("translation", 2, joint.d, f"{name}.d", None if joint.revolute else i)
         if joint.fixed is not None:
-            yield from _fixed(joint.fixed)
+            yield from _fixed_elements(joint.fixed)
         yield Element("translation", 0, joint.a, f"{name}.a")
         yield Element("rotation", 0, joint.alpha, f"{name}.alpha")
         if i + 1 < arm.n and np.linalg.norm(joint.behind[:2, 2]) < PARALLEL:
             yield Element("rotation", 1, 0.0, f"{name}.beta")
-    yield from _fixed(arm.tool)
-    yield from _fixed(homogeneous(target_rotation, np.zeros(3)))
-    yield from _errors("tool")
+    yield from _fixed_elements(arm.tool)
+    yield from _fixed_elements(homogeneous(target_rotation, np.zeros(3)))
+    yield from _error_elements("tool")
 
 
-def _errors(name: str) -> Iterator[Element]:
+def _error_elements(name: str) -> Iterator[Element]:
     """Give three translations and three rotations that are 0 but for their errors."""
     for axis in range(3):
         yield Element("translation", axis, 0.0, f"{name}.{_AXES[axis]}")
@@ -210,7 +210,7 @@ def _errors(name: str) -> Iterator[Element]:
         yield Element("rotation", axis, 0.0, f"{name}.r{_AXES[axis]}")
 
 
-def _fixed(X: Array) -> Iterator[Element]:
+def _fixed_elements(X: Array) -> Iterator[Element]:
     """Give a pose as translations along and rotations about x, y and z, one after the other."""
     for axis in range(3):
         if X[axis, 3]:
@@ -227,7 +227,7 @@ def _fixed(X: Array) -> Iterator[Element]:
             yield Element("rotation", axis, float(angle))
 
 
-def _rotate(R: Array, axis: int, angles: Array) -> None:
+def _rotate_about_own_axis(R: Array, axis: int, angles: Array) -> None:
     """Rotate frames (m, 3, 3) about one of their own axes."""
     c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
     u, v = (axis + 1) % 3, (axis + 2) % 3

@@ -18,7 +18,7 @@ RPY = ("roll", "pitch", "yaw")
 QUATERNION = ("qw", "qx", "qy", "qz")
 DISTANCE = "distance"
 _WORDS = (*NAMES, "set", "frame", "plane", "anchor", "to")
-_OFF = "nominal coordinates and deviations"
+_NOMINAL_GROUP = "nominal coordinates and deviations"
 
 
 def joint_columns(arm: Arm) -> list[str]:
@@ -38,8 +38,13 @@ def measured_columns(arm: Arm) -> Schema:
         for i, (name, joint) in enumerate(zip(joint_columns(arm), arm.joints, strict=True), 1)
     ]
     points = [Column(name=name, quantity=LENGTH, group="coordinates") for name in POINTS]
-    off = [
-        Column(name=f"{axis}_{what}", quantity=LENGTH, group=_OFF, synonyms=(f"{axis}_{short}", f"{short}_{axis}"))
+    deviations = [
+        Column(
+            name=f"{axis}_{what}",
+            quantity=LENGTH,
+            group=_NOMINAL_GROUP,
+            synonyms=(f"{axis}_{short}", f"{short}_{axis}"),
+        )
         for what, short in (("nominal", "t"), ("deviation", "dif"))
         for axis in POINTS
     ]
@@ -53,7 +58,7 @@ def measured_columns(arm: Arm) -> Schema:
         joint = re.match(r"joint_\d", name)
         return f"{arm.name} has {arm.n} joints; is this a measurement of another arm?" if joint else ""
 
-    return Schema(columns=(*joints, *points, *angles, *others, distance, *off, *words), explain=explain)
+    return Schema(columns=(*joints, *points, *angles, *others, distance, *deviations, *words), explain=explain)
 
 
 def read_columns(

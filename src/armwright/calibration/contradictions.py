@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import chi2, mannwhitneyu
 
 from armwright.arrays import Array, Flags, positive
-from armwright.calibration.fitting import CHECK, PRIOR_SIGMA_ANGLE, PRIOR_SIGMA_LENGTH, Calibration
+from armwright.calibration.fitting import CHECKS, PRIOR_SIGMA_ANGLE, PRIOR_SIGMA_LENGTH, Calibration
 from armwright.calibration.readings import Readings
 
 # A hypothesis is rejected at this level of significance; so few outliers are not tested, and so large a part of all is
@@ -22,7 +22,7 @@ _SIGNIFICANCE, _MIN_COUNT, _MANY = 1e-4, 5, 0.2
 _MAX_SIGMAS = 3.0
 
 
-def contradictions(calibration: Calibration, measured: Readings, noise: float | None = None) -> Iterator[str]:
+def find_contradictions(calibration: Calibration, measured: Readings, noise: float | None = None) -> Iterator[str]:
     """Give the reasons, in words, for which readings contradict the arm that was fitted to them.
 
     Args:
@@ -40,12 +40,12 @@ def contradictions(calibration: Calibration, measured: Readings, noise: float | 
     if shared is not None:
         yield (
             f"the {count} readings that do not count are those in which joint {shared + 1} is elsewhere "
-            f"than in the {len(measured) - count} that do; the residuals of the rest say nothing of it: {CHECK}"
+            f"than in the {len(measured) - count} that do; the residuals of the rest say nothing of it: {CHECKS}"
         )
     elif outlying.mean() > _MANY:
         yield (
             f"{count} of {len(measured)} readings do not count, and a fit that leaves out so many "
-            f"praises the rest: {CHECK}"
+            f"praises the rest: {CHECKS}"
         )
     lengths = dict(zip(calibration.model.names, calibration.model.is_length, strict=True))
     impossible = [
@@ -55,7 +55,7 @@ def contradictions(calibration: Calibration, measured: Readings, noise: float | 
         and abs(value) > _MAX_SIGMAS * (PRIOR_SIGMA_LENGTH if lengths[name] else PRIOR_SIGMA_ANGLE)
     ]
     if impossible:
-        yield f"{', '.join(impossible)}: no link is made so badly; {CHECK}"
+        yield f"{', '.join(impossible)}: no link is made so badly; {CHECKS}"
     if noise is not None:
         yield from _excess_residuals(calibration, measured, noise)
 

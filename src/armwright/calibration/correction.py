@@ -16,7 +16,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.writer import urdf_text
 from armwright.arrays import Array, ArrayLike
-from armwright.calibration.chain import Chain, Element, chain_of
+from armwright.calibration.chain import Chain, Element, kinematic_chain
 from armwright.calibration.fitting import Calibration
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.spatial.euler import to_rpy
@@ -24,7 +24,7 @@ from armwright.spatial.poses import homogeneous, inverse
 from armwright.spatial.rotations import rotation_from_vector
 
 # The numbers of a link in the Denavit-Hartenberg convention.
-_NUMBERS = ("theta", "d", "a", "alpha")
+_DH_PARAMETERS = ("theta", "d", "a", "alpha")
 
 
 def corrected_arm(calibration: Calibration) -> Arm:
@@ -43,8 +43,8 @@ def corrected_arm(calibration: Calibration) -> Arm:
             f"{arm.name}: {', '.join(tilted)} is a rotation about y, which a Denavit-Hartenberg table has no number "
             f'for; calibrate without=("beta",)'
         )
-    corrected = _corrected(calibration)
-    return attrs.evolve(corrected, uncertainty=_uncertainty(calibration, corrected))
+    corrected = _corrected_without_tilts(calibration)
+    return attrs.evolve(corrected, uncertainty=_corrected_uncertainty(calibration, corrected))
 
 
 def corrected_urdf(calibration: Calibration) -> str:
@@ -53,7 +53,7 @@ def corrected_urdf(calibration: Calibration) -> str:
     Raises:
         InvalidValueError: an error model of a joint was fitted, or the arm's name has characters that XML cannot hold.
     """
-    return urdf_text(_corrected(calibration), _tilts(calibration))
+    return urdf_text(_corrected_without_tilts(calibration), _tilts(calibration))
 
 
 def corrected_tables(calibration: Calibration) -> dict[str, str]:
@@ -65,13 +65,13 @@ def corrected_tables(calibration: Calibration) -> dict[str, str]:
     Raises:
         InvalidValueError: an error model of a joint was fitted.
     """
-    arm, tilts = _corrected(calibration), _tilts(calibration)
-    tables = {"hayati": _table(arm.base, arm.joints, arm.tool, tilts)}
+    arm, tilts = _corrected_without_tilts(calibration), _tilts(calibration)
+    tables = {"hayati": _csv_table(arm.base, arm.joints, arm.tool, tilts)}
     if not any(tilts):
         rows, last = to_modified(arm.joints)
         tables = {
-            "standard": _table(arm.base, arm.joints, arm.tool),
-            "modified": _table(arm.base, rows, last @ arm.tool),
+            "standard": _csv_table(arm.base, arm.joints, arm.tool),
+            "modified": _csv_table(arm.base, rows, last @ arm.tool),
         }
     return tables
 
@@ -90,7 +90,7 @@ def position_covariance(arm: Arm, q: ArrayLike) -> Array:
     """
     if arm.uncertainty is None:
         raise InvalidValueError(f"{arm.name}: its dimensions have no covariance; calibrate it")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     for name in arm.uncertainty.errors:
         if name not in chain.names:
             raise UnknownNameError("error", name, chain.names)
@@ -101,7 +101,7 @@ def position_covariance(arm: Arm, q: ArrayLike) -> Array:
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _corrected(calibration: Calibration) -> Arm:
+def _corrected_without_tilts(calibration: Calibration) -> Arm:
     """Return the arm with all estimated errors but for rotations about y."""
     chain, arm = calibration.chain, calibration.chain.arm
     if chain.joint_errors:
@@ -111,16 +111,16 @@ def _corrected(calibration: Calibration) -> Arm:
         )
     by_name = dict(zip(chain.names, calibration.arm_errors.tolist(), strict=True))
     joints = [
-        attrs.evolve(joint, **{key: getattr(joint, key) + by_name[f"joint{i}.{key}"] for key in _NUMBERS})
+        attrs.evolve(joint, **{key: getattr(joint, key) + by_name[f"joint{i}.{key}"] for key in _DH_PARAMETERS})
         for i, joint in enumerate(arm.joints, 1)
     ]
-    base = chain.base @ _pose_of(chain, by_name, "base")
+    base = chain.base @ _error_pose(chain, by_name, "base")
     return attrs.evolve(
         arm,
         joints=tuple(joints),
         base=base @ arm.base,
         gravity=felt_gravity(inverse(base), arm.gravity),
-        tool=arm.tool @ homogeneous(chain.target_rotation, np.zeros(3)) @ _pose_of(chain, by_name, "tool"),
+        tool=arm.tool @ homogeneous(chain.target_rotation, np.zeros(3)) @ _error_pose(chain, by_name, "tool"),
         title=f"{arm.title or arm.name}, calibrated",
     )
 
@@ -130,7 +130,7 @@ def _tilts(calibration: Calibration) -> list[float]:
     return [by_name.get(f"joint{i + 1}.beta", 0.0) for i in range(calibration.chain.arm.n)]
 
 
-def _pose_of(chain: Chain, by_name: dict[str, float], part: str) -> Array:
+def _error_pose(chain: Chain, by_name: dict[str, float], part: str) -> Array:
     """Return the pose that the six errors of a part make."""
     X = np.eye(4)
     for element in chain.elements:
@@ -148,9 +148,9 @@ def _transform(element: Element, value: float) -> Array:
     )
 
 
-def _uncertainty(calibration: Calibration, corrected: Arm) -> Uncertainty:
+def _corrected_uncertainty(calibration: Calibration, corrected: Arm) -> Uncertainty:
     """Return the covariance of the corrected arm: errors of base and tool count from where these are now."""
-    chain, now = calibration.chain, chain_of(corrected)
+    chain, now = calibration.chain, kinematic_chain(corrected)
     q = np.zeros((1, corrected.n))
     then_tool, now_tool = chain.forward(q, calibration.arm_errors), now.forward(q)
     M = np.eye(len(now.names))
@@ -171,23 +171,23 @@ def _uncertainty(calibration: Calibration, corrected: Arm) -> Uncertainty:
     )
 
 
-def _table(base: Array, joints: Sequence[Joint], tool: Array, tilts: Iterable[float] | None = None) -> str:
+def _csv_table(base: Array, joints: Sequence[Joint], tool: Array, tilts: Iterable[float] | None = None) -> str:
     """Return rows of a table as CSV."""
     text = io.StringIO()
     angles = ["theta_deg", "d_mm", "a_mm", "alpha_deg", *(["beta_deg"] if tilts is not None else [])]
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["part", "kind", *angles, "x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"])
     none = [""] * len(angles)
-    writer.writerow(["base", "", *none, *_six(base)])
+    writer.writerow(["base", "", *none, *_position_and_rpy(base)])
     for i, (joint, tilt) in enumerate(zip(joints, tilts or [0.0] * len(joints), strict=True), 1):
         numbers = [math.degrees(joint.theta), joint.d * 1e3, joint.a * 1e3, math.degrees(joint.alpha)]
         more = [math.degrees(tilt)] if tilts is not None else []
-        fixed = [""] * 6 if joint.fixed is None else _six(joint.fixed)
+        fixed = [""] * 6 if joint.fixed is None else _position_and_rpy(joint.fixed)
         writer.writerow([f"joint_{i}", joint.kind, *numbers, *more, *fixed])
-    writer.writerow(["tool", "", *none, *_six(tool)])
+    writer.writerow(["tool", "", *none, *_position_and_rpy(tool)])
     return text.getvalue()
 
 
-def _six(X: Array) -> list[float]:
+def _position_and_rpy(X: Array) -> list[float]:
     """Return position [mm] and roll, pitch, yaw [deg] of a pose."""
     return [*(X[:3, 3] * 1e3).tolist(), *np.degrees(to_rpy(X[:3, :3])).tolist()]

@@ -12,18 +12,18 @@ from scipy.spatial import cKDTree
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
-from armwright.calibration.chain import JointErrorModel, chain_of
+from armwright.calibration.chain import JointErrorModel, kinematic_chain
 from armwright.calibration.fitting import Calibration, calibrate
-from armwright.calibration.readings import Numbers, Readings, refuse_not_fitted
+from armwright.calibration.readings import Numbers, Readings, refuse_unlocated
 from armwright.errors import ContradictionError, InvalidValueError, TooFewError
 
 # Configurations whose joints differ by less are the same [rad], [m].
-_SAME = 1e-4
+_CONFIGURATION_TOLERANCE = 1e-4
 # Usual number of folds.
 FOLDS = 5
 
 
-class HeldOut(NamedTuple):
+class HeldOutErrors(NamedTuple):
     """By how much readings miss arms that were calibrated without them.
 
     Attributes:
@@ -37,20 +37,20 @@ class HeldOut(NamedTuple):
     positions: Array
 
     @classmethod
-    def unknown(cls, m: int) -> HeldOut:
+    def unknown(cls, m: int) -> HeldOutErrors:
         """Return those of m readings of which none is known yet."""
         return cls(np.full(m, np.nan), np.full(m, np.nan), np.full((m, 3), np.nan))
 
-    def put(self, rows: Flags, known: HeldOut) -> None:
+    def put(self, rows: Flags, known: HeldOutErrors) -> None:
         """Store those of some rows (m,)."""
         for own, more in zip(self, known, strict=True):
             own[rows] = more
 
 
-def held_out_errors(calibration: Calibration, measured: Readings) -> HeldOut:
+def held_out_errors(calibration: Calibration, measured: Readings) -> HeldOutErrors:
     """Return by how much a calibrated arm misses readings."""
     errors = calibration.model.pose_errors(measured, calibration.errors)
-    return HeldOut(errors.distance, errors.angle, calibration.predict(measured.q))
+    return HeldOutErrors(errors.distance, errors.angle, calibration.predict(measured.q))
 
 
 def calibrate_without(
@@ -79,7 +79,7 @@ def calibrate_without(
         InvalidValueError: they are too few, or all readings of a frame, a plane or an anchor are held out.
     """
     try:
-        refuse_not_fitted(measured.take(~held_out), measured.take(held_out))
+        refuse_unlocated(measured.take(~held_out), measured.take(held_out))
         return calibrate(arm, measured.take(~held_out), base=base, joint_errors=joint_errors, without=without)
     except (ContradictionError, InvalidValueError) as error:
         raise type(error)(f"with {called} held out: {error}") from error
@@ -95,7 +95,7 @@ def cross_validate(
     joint_errors: tuple[JointErrorModel, ...] = (),
     without: Sequence[str] = (),
     regions: bool = False,
-) -> HeldOut:
+) -> HeldOutErrors:
     """Return by how much each reading misses an arm that was calibrated without it.
 
     Configurations are assigned to folds at random; each fold is compared with a calibration by all others.
@@ -115,7 +115,7 @@ def cross_validate(
         InvalidValueError: there are not as many configurations as folds, or too few for the errors of the arm; all
             readings of a frame, a plane or an anchor are in one fold.
     """
-    held = HeldOut.unknown(len(measured))
+    held = HeldOutErrors.unknown(len(measured))
     parts = workspace_regions(arm, measured.q, folds) if regions else random_folds(measured.q, folds, seed)
     for fold, rows in enumerate(parts, 1):
         called = f"part {fold} of {folds}"
@@ -132,7 +132,7 @@ def random_folds(q: Array, folds: int, seed: int) -> list[Flags]:
     Raises:
         InvalidValueError: there are not as many configurations as folds, or fewer than two folds.
     """
-    configuration, count = _folded(q, folds)
+    configuration, count = _configurations_for_folds(q, folds)
     number = (np.random.default_rng(seed).permutation(count) % folds)[configuration]
     return [number == fold for fold in range(folds)]
 
@@ -146,23 +146,23 @@ def workspace_regions(arm: Arm, q: Array, folds: int) -> list[Flags]:
     Raises:
         InvalidValueError: there are not as many configurations as parts, or fewer than two parts.
     """
-    configuration, count = _folded(q, folds)
+    configuration, count = _configurations_for_folds(q, folds)
     _, first = np.unique(configuration, return_index=True)
-    positions = chain_of(arm).forward(q[first]).position
+    positions = kinematic_chain(arm).forward(q[first]).position
 
-    def cut(members: Numbers, parts: int) -> list[Numbers]:
+    def split(members: Numbers, parts: int) -> list[Numbers]:
         if parts == 1:
             return [members]
         along = positions[members, np.argmax(np.ptp(positions[members], axis=0))]
         order = members[np.argsort(along, kind="stable")]
         half = parts // 2
         middle = len(order) * half // parts
-        return [*cut(order[:middle], half), *cut(order[middle:], parts - half)]
+        return [*split(order[:middle], half), *split(order[middle:], parts - half)]
 
-    return [np.isin(configuration, members) for members in cut(np.arange(count), folds)]
+    return [np.isin(configuration, members) for members in split(np.arange(count), folds)]
 
 
-def _folded(q: Array, folds: int) -> tuple[Numbers, int]:
+def _configurations_for_folds(q: Array, folds: int) -> tuple[Numbers, int]:
     """Return ``distinct_configurations``, and how many there are, if they are enough for so many folds."""
     configuration = distinct_configurations(q)
     count = int(configuration.max()) + 1
@@ -182,7 +182,7 @@ def distinct_configurations(q: Array) -> Numbers:
     millimetre are one configuration.
     """
     rows = len(q)
-    near = np.array([*cKDTree(q).query_pairs(_SAME)], dtype=np.intp).reshape(-1, 2)
+    near = np.array([*cKDTree(q).query_pairs(_CONFIGURATION_TOLERANCE)], dtype=np.intp).reshape(-1, 2)
     _, same = connected_components(coo_array((np.ones(len(near)), near.T), shape=(rows, rows)), directed=False)
     _, first = np.unique(same, return_index=True)
     return np.asarray(np.argsort(np.argsort(first))[same], dtype=np.intp)

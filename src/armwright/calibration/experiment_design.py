@@ -16,7 +16,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import ranges
 from armwright.arrays import Array, ArrayLike, joint_array
-from armwright.calibration.chain import Chain, chain_of
+from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.calibration.cross_validation import FOLDS
 from armwright.calibration.identifiability import is_overdetermined, preferred_parameters, select_identifiable
 from armwright.errors import InvalidValueError, one_of
@@ -129,7 +129,7 @@ def plan_poses(
     if not 1 <= count <= _MAX_POSES:
         expected = "1 pose or more" if count < 1 else f"{_MAX_POSES:,} poses or fewer"
         raise InvalidValueError(f"count: expected {expected}, got {count}")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     rng = np.random.default_rng(seed)
     if candidates is None:
         candidates = max(_CANDIDATES, _PER_POSE * count)
@@ -145,7 +145,7 @@ def plan_poses(
     )
     fitted = list(selected.fitted)
     numbers, poses = every.shape[1], count + len(before)
-    fewest = _fewest(numbers, len(fitted))
+    fewest = _minimum_poses(numbers, len(fitted))
     if poses < fewest:
         raise InvalidValueError(
             f"count: {arm.name} has {len(fitted)} errors that {'poses' if rotations else 'points'} identify, and one "
@@ -153,21 +153,21 @@ def plan_poses(
             f"more, got {count}"
         )
     jacobians, fixed = every[:, :, fitted], list(range(candidates, len(every)))
-    taken = _greedy(jacobians, count, fixed, progress)
-    taken = _exchanged(jacobians, taken, fixed, INDICES.index(index))
+    selection = _select_greedily(jacobians, count, fixed, progress)
+    selection = _exchange_poses(jacobians, selection, fixed, INDICES.index(index))
     draws = [
-        _indices(_stacked(jacobians, [*rng.choice(candidates, count, replace=False).tolist(), *fixed]), poses)
+        _indices(_stack(jacobians, [*rng.choice(candidates, count, replace=False).tolist(), *fixed]), poses)
         for _ in range(15)
     ]
     return MeasurementPlan(
-        q=q[taken],
-        observability=_indices(_stacked(jacobians, [*taken, *fixed]), poses),
+        q=q[selection],
+        observability=_indices(_stack(jacobians, [*selection, *fixed]), poses),
         random=Observability(*(float(np.median([draw[i] for draw in draws])) for i in range(len(INDICES)))),
         names=tuple(chain.names[i] for i in fitted),
     )
 
 
-def _fewest(numbers: int, errors: int) -> int:
+def _minimum_poses(numbers: int, errors: int) -> int:
     """Return how many poses are enough for so many errors, each measured by so many numbers.
 
     A calibration is judged by poses that it has not seen: those that are left have to be enough.
@@ -185,8 +185,8 @@ def _jacobians(chain: Chain, q: Array, *, rotations: bool) -> Array:
     return np.concatenate([tool.position_jacobian, tool.rotation_jacobian * (_NOISE_LENGTH / _NOISE_ANGLE)], axis=1)
 
 
-def _stacked(jacobians: Array, taken: Sequence[int]) -> Array:
-    return np.asarray(jacobians[list(taken)].reshape(-1, jacobians.shape[-1]), dtype=np.float64)
+def _stack(jacobians: Array, selection: Sequence[int]) -> Array:
+    return np.asarray(jacobians[list(selection)].reshape(-1, jacobians.shape[-1]), dtype=np.float64)
 
 
 def _indices(A: Array, poses: int) -> Observability:
@@ -202,34 +202,36 @@ def _indices(A: Array, poses: int) -> Observability:
     )
 
 
-def _greedy(jacobians: Array, count: int, fixed: Sequence[int], progress: Callable[[int], None] | None) -> list[int]:
+def _select_greedily(
+    jacobians: Array, count: int, fixed: Sequence[int], progress: Callable[[int], None] | None
+) -> list[int]:
     """Return the poses that add most to the determinant, one after the other."""
-    before = _stacked(jacobians, fixed)
+    before = _stack(jacobians, fixed)
     information = 1e-6 * np.eye(jacobians.shape[-1]) + before.T @ before
-    taken: list[int] = []
+    selection: list[int] = []
     for _ in range(count):
         inverse = np.linalg.inv(information)
         # det(I + A C Aᵀ) of the rows of each candidate.
         gains = np.linalg.det(np.eye(jacobians.shape[1]) + jacobians @ inverse @ np.swapaxes(jacobians, 1, 2))
-        gains[[*taken, *fixed]] = -np.inf
+        gains[[*selection, *fixed]] = -np.inf
         best = int(np.argmax(gains))
-        taken.append(best)
+        selection.append(best)
         information = information + jacobians[best].T @ jacobians[best]
         if progress is not None:
-            progress(len(taken))
-    return taken
+            progress(len(selection))
+    return selection
 
 
-def _exchanged(jacobians: Array, taken: list[int], fixed: list[int], index: int) -> list[int]:
+def _exchange_poses(jacobians: Array, selection: list[int], fixed: list[int], index: int) -> list[int]:
     """Exchange single poses for others as long as the index gets better."""
     rng = np.random.default_rng(0)
-    best = _indices(_stacked(jacobians, [*taken, *fixed]), len(taken) + len(fixed))[index]
-    others = [i for i in range(len(jacobians) - len(fixed)) if i not in taken]
-    for _ in range(min(_MAX_EXCHANGES, len(others) * len(taken))):
-        position, other = int(rng.integers(len(taken))), int(rng.integers(len(others)))
-        tried = taken.copy()
+    best = _indices(_stack(jacobians, [*selection, *fixed]), len(selection) + len(fixed))[index]
+    others = [i for i in range(len(jacobians) - len(fixed)) if i not in selection]
+    for _ in range(min(_MAX_EXCHANGES, len(others) * len(selection))):
+        position, other = int(rng.integers(len(selection))), int(rng.integers(len(others)))
+        tried = selection.copy()
         tried[position] = others[other]
-        value = _indices(_stacked(jacobians, [*tried, *fixed]), len(tried) + len(fixed))[index]
+        value = _indices(_stack(jacobians, [*tried, *fixed]), len(tried) + len(fixed))[index]
         if value > best:
-            others[other], taken, best = taken[position], tried, value
-    return taken
+            others[other], selection, best = selection[position], tried, value
+    return selection

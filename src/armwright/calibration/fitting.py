@@ -31,9 +31,8 @@ from armwright.calibration.identifiability import (
     select_identifiable,
 )
 from armwright.calibration.initial_guess import initial_guess
-from armwright.calibration.measurement_model import MeasurementModel, PoseError, Residuals
 from armwright.calibration.noise import (
-    TYPICAL,
+    TYPICAL_NOISE,
     Noise,
     length_scales,
     median_noise,
@@ -42,15 +41,16 @@ from armwright.calibration.noise import (
     standard_deviations,
 )
 from armwright.calibration.readings import Readings, readings
+from armwright.calibration.residuals import MeasurementModel, PoseError, Residuals
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError, UnknownNameError
 from armwright.notebook import html_table
 
 # Rounds of selecting errors and fitting them, and of reweighting within one fit.
 _ROUNDS, _REWEIGHTINGS = 8, 30
 # Rounds end when the noise is no longer below this part of that of the round before: outliers then have their weight.
-_NOISE_SETTLED = 0.9
+_NOISE_DECREASE = 0.9
 # Reweighting ends when no weight changes by more.
-_WEIGHTS_SETTLED = 1e-3
+_WEIGHT_TOLERANCE = 1e-3
 # A fit ends when its cost decreases by less than this part; its error is then far below the standard errors.
 _COST_TOLERANCE = 1e-11
 # A fit takes some ten evaluations; readings that make no sense could take minutes.
@@ -59,9 +59,9 @@ _MAX_EVALUATIONS = 100
 # can otherwise run away together. One whose standard error is a tenth of it is moved by a hundredth of that at most.
 PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE = 0.02, 0.05
 # Errors of joints have a twentieth of that: gears run true to an arc minute or a few.
-_JOINT_ERRORS = 0.05
+_JOINT_ERROR_FACTOR = 0.05
 # What may be wrong where an arm and its readings do not belong together.
-CHECK = (
+CHECKS = (
     "check the units, the sign and the zero of the joint, the order of the columns, and whether a joint is coupled to "
     "another (q3 = a2 q2 + q3, as on palletisers), which arm files cannot say"
 )
@@ -219,7 +219,7 @@ def calibrate(
         raise ShapeError(f"expected readings of {arm.n} joints, as {arm.name} has, got {measured.q.shape[1]}")
     model = initial_guess(arm, measured, base=base, joint_errors=joint_errors)
     selected, errors, noise = _select_and_fit(
-        model, measured, *_candidates(model, only, without), robust=robust, progress=progress
+        model, measured, *_candidate_errors(model, only, without), robust=robust, progress=progress
     )
     if robust and selected.fitted:
         # Each outlier, though its weight is small, still pulls as hard as a usual reading, and many pull together.
@@ -230,24 +230,24 @@ def calibrate(
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _candidates(
+def _candidate_errors(
     model: MeasurementModel, only: Sequence[str] | None, without: Sequence[str]
 ) -> tuple[list[int], set[int]]:
     """Return the errors that are selected before all others, in order, and all that may be fitted."""
     names = model.names
 
-    def matching(word: str) -> set[int]:
+    def matching_errors(word: str) -> set[int]:
         matches = {i for i, name in enumerate(names) if name == word or word in name.split(".")}
         if not matches:
             parts = dict.fromkeys(part for name in names for part in name.split("."))
             raise UnknownNameError("error", word, [*names, *parts])
         return matches
 
-    setup = set(model.setup)
-    allowed = set(range(len(names))) if only is None else setup.union(*map(matching, only))
+    setup = set(model.setup_indices)
+    allowed = set(range(len(names))) if only is None else setup.union(*map(matching_errors, only))
     # An arm without parallel axes has no beta to leave out.
     parts = {part for name in names for part in (name, *name.split("."))}
-    allowed -= set[int]().union(*(matching(word) for word in without if word in parts or word != "beta"))
+    allowed -= set[int]().union(*(matching_errors(word) for word in without if word in parts or word != "beta"))
     return [*sorted(setup), *preferred_parameters(names)], allowed
 
 
@@ -261,12 +261,12 @@ def _select_and_fit(
     progress: Callable[[str], None] | None,
 ) -> tuple[Identifiability, Array, Noise]:
     """Return which errors are identifiable, the errors, and the noise, which depend on one another."""
-    max_standard_error = _geometric(model, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE)
+    max_standard_error = _by_error_type(model, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE)
     errors, fitted = np.zeros(len(model.names)), tuple[int, ...]()
     rounds: list[tuple[Identifiability, Array, Noise]] = []
     # Before anything is fitted, the residuals say nothing of the noise.
     start = median_noise(model.residuals(measured), 0)
-    noise = before = Noise(*map(min, start, TYPICAL))
+    noise = before = Noise(*map(min, start, TYPICAL_NOISE))
     for _ in range(_ROUNDS):
         residuals = model.residuals(measured, errors)
         J = residuals.jacobian * length_scales(residuals, noise)[:, None]
@@ -284,15 +284,15 @@ def _select_and_fit(
         selected = select(allowed=allowed)
         if fitted and not is_overdetermined(count, len(selected.fitted)):
             # The residuals of so few readings are next to nothing, and more errors seem identifiable than are.
-            selected = _without_new(selected, select(allowed=set(fitted)))
-        settled = all(now > _NOISE_SETTLED * then for now, then in zip(noise, before, strict=True))
+            selected = _restrict_to_fitted(selected, select(allowed=set(fitted)))
+        settled = all(now > _NOISE_DECREASE * then for now, then in zip(noise, before, strict=True))
         if selected.fitted == fitted and settled:
             rounds[-1:] = [(selected, errors, noise)]
             break
         if not selected.fitted:
             raise ContradictionError(
                 f"what {model.chain.arm.name} misses its readings by, {noise.length * 1e3:.3g} mm, hides every error "
-                f"that it may have: are these its readings? If so, {CHECK}"
+                f"that it may have: are these its readings? If so, {CHECKS}"
             )
         fitted, before = selected.fitted, noise
         if not is_overdetermined(count, len(fitted)):
@@ -305,10 +305,10 @@ def _select_and_fit(
     # Noise hides errors, and errors that are not fitted look like noise: rounds may lead away, and the last is not
     # always the best.
     best = min(rounds, key=lambda result: result[2].length)
-    return best if best[2].length < _NOISE_SETTLED * noise.length else rounds[-1]
+    return best if best[2].length < _NOISE_DECREASE * noise.length else rounds[-1]
 
 
-def _without_new(selected: Identifiability, before: Identifiability) -> Identifiability:
+def _restrict_to_fitted(selected: Identifiability, before: Identifiability) -> Identifiability:
     """Return what was fitted before; whatever else seems identifiable is fixed."""
     reason = "so few readings have no degree of freedom left to distinguish it from noise"
     new = (FixedParameter(selected.names[i], reason, ()) for i in selected.fitted if i not in before.fitted)
@@ -364,7 +364,7 @@ def _fit(
         if not robust:
             break
         reweighted = scales * robust_weights(residuals_at(solution.x.tobytes()), noise, strict=strict)
-        if np.all(np.abs(reweighted - weights) <= _WEIGHTS_SETTLED * scales):
+        if np.all(np.abs(reweighted - weights) <= _WEIGHT_TOLERANCE * scales):
             break
     return errors
 
@@ -398,11 +398,11 @@ def _with_covariance(
 
 def _prior_sigma(model: MeasurementModel) -> Array:
     """Return (k,) the standard deviations of the prior of all errors [m], [rad]."""
-    return _geometric(model, PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE)
+    return _by_error_type(model, PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE)
 
 
-def _geometric(model: MeasurementModel, length: float, angle: float) -> Array:
+def _by_error_type(model: MeasurementModel, length: float, angle: float) -> Array:
     """Return (k,) one value for lengths and one for angles; of errors of joints a twentieth."""
     joint_errors = {error.name for error in model.chain.joint_errors}
-    parts = np.array([_JOINT_ERRORS if name in joint_errors else 1.0 for name in model.names])
+    parts = np.array([_JOINT_ERROR_FACTOR if name in joint_errors else 1.0 for name in model.names])
     return np.asarray(np.where(model.is_length, length, angle) * parts, dtype=np.float64)

@@ -21,7 +21,7 @@ MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE = 2e-3, 5e-3
 # A column of which a smaller part is independent of the others is collinear with them but for rounding.
 _ROUNDING = 1e-9
 # How many collinear errors are named, and from what share on.
-_NAMED, _SMALLEST_SHARE = 3, 0.05
+_MAX_NAMED, _SMALLEST_SHARE = 3, 0.05
 
 
 class FixedParameter(NamedTuple):
@@ -100,7 +100,7 @@ def select_identifiable(
     return Identifiability(
         names=tuple(names),
         fitted=tuple(sorted(fitted)),
-        fixed=tuple(_fixed(names, A, max_standard_error, fitted, i) for i in dependent),
+        fixed=tuple(_fixed_parameter(names, A, max_standard_error, fitted, i) for i in dependent),
         singular_values=np.asarray(np.linalg.svd(A, compute_uv=False), dtype=np.float64),
     )
 
@@ -118,7 +118,9 @@ def preferred_parameters(names: Sequence[str]) -> list[int]:
     return [i for part in ("base.", "tool.", ".theta") for i, name in enumerate(names) if part in name]
 
 
-def _fixed(names: Sequence[str], A: Array, scales: Array, fitted: Sequence[int], number: int) -> FixedParameter:
+def _fixed_parameter(
+    names: Sequence[str], A: Array, scales: Array, fitted: Sequence[int], number: int
+) -> FixedParameter:
     """Return why an error is not fitted."""
     size = float(np.linalg.norm(A[:, number]))
     if size <= _ROUNDING * float(np.linalg.norm(A, axis=0).max(initial=1e-300)):
@@ -126,7 +128,7 @@ def _fixed(names: Sequence[str], A: Array, scales: Array, fitted: Sequence[int],
     mixture, *_ = np.linalg.lstsq(A[:, fitted], A[:, number], rcond=None)
     independent = float(np.linalg.norm(A[:, number] - A[:, fitted] @ mixture)) / size
     share = np.abs(mixture) * np.linalg.norm(A[:, fitted], axis=0) / size
-    largest = [j for j in np.argsort(-share)[:_NAMED] if share[j] > _SMALLEST_SHARE]
+    largest = [j for j in np.argsort(-share)[:_MAX_NAMED] if share[j] > _SMALLEST_SHARE]
     collinear = tuple((names[fitted[j]], float(mixture[j] * scales[fitted[j]] / scales[number])) for j in largest)
     others = " and ".join(name for name, _ in collinear)
     if independent >= 1e-6:

@@ -13,9 +13,9 @@ from scipy.optimize import least_squares
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.calibration.chain import Chain, JointErrorModel, chain_of
-from armwright.calibration.measurement_model import MeasurementModel, Plane
+from armwright.calibration.chain import Chain, JointErrorModel, kinematic_chain
 from armwright.calibration.readings import Readings
+from armwright.calibration.residuals import MeasurementModel, Plane
 from armwright.errors import ContradictionError, TooFewError
 from armwright.spatial.poses import homogeneous, one_pose
 from armwright.spatial.rotations import nearest_rotation, rotation_vector
@@ -25,10 +25,14 @@ _MAX_DISTANCE = 0.2
 # Rotations that differ by more than this from the arm's, in half of all, follow another convention [rad].
 _MAX_ANGLE = 0.5
 # From this rotation on the measured target is another frame, not the tool with an error [rad].
-_ANOTHER = 0.05
+_MIN_TARGET_ANGLE = 0.05
 # Points whose second width is a smaller part of the first lie on a line, and leave a rotation about it free.
-_LINE = 1e-3
-_UNITS = ((1e3, "millimetres read as metres"), (1e-3, "metres read as millimetres"), (39.37, "inches read as metres"))
+_COLLINEARITY = 1e-3
+_UNIT_MISTAKES = (
+    (1e3, "millimetres read as metres"),
+    (1e-3, "metres read as millimetres"),
+    (39.37, "inches read as metres"),
+)
 
 
 def initial_guess(
@@ -50,20 +54,20 @@ def initial_guess(
     """
     is_base_known = base is not None
     base = None if base is None else one_pose(base, "base")
-    chain = chain_of(arm)
+    chain = kinematic_chain(arm)
     first = readings.with_point & (readings.frame == 0)
     _refuse_other_units(chain, readings, first)
     if base is None:
-        base = register(chain, readings.q[first], readings.points[first]) if first.any() else np.eye(4)
-    chain = chain_of(arm, base=base, joint_errors=joint_errors)
-    frames = (np.eye(4), *(_frame(chain, readings, i) for i in range(1, len(readings.frames))))
+        base = register_base(chain, readings.q[first], readings.points[first]) if first.any() else np.eye(4)
+    chain = kinematic_chain(arm, base=base, joint_errors=joint_errors)
+    frames = (np.eye(4), *(_initial_frame(chain, readings, i) for i in range(1, len(readings.frames))))
     model = MeasurementModel(
-        chain=chain_of(
+        chain=kinematic_chain(
             arm, base=base, target_rotation=_target_rotation(chain, readings, frames), joint_errors=joint_errors
         ),
         frames=dict(zip(readings.frames or ("",), frames, strict=True)),
-        planes={name: _plane(chain, readings, i) for i, name in enumerate(readings.planes)},
-        anchors={name: _anchor(chain, readings, i) for i, name in enumerate(readings.anchors)},
+        planes={name: _initial_plane(chain, readings, i) for i, name in enumerate(readings.planes)},
+        anchors={name: _initial_anchor(chain, readings, i) for i, name in enumerate(readings.anchors)},
     )
     errors = model.pose_errors(readings)
     distance = float(np.median(errors.distance))
@@ -74,7 +78,7 @@ def initial_guess(
         )
     angles = errors.angle[readings.with_rotation]
     # Points on a line leave a rotation of the base about it free, which the fit estimates.
-    if len(angles) and np.median(angles) > _MAX_ANGLE and (is_base_known or not _on_a_line(readings.points[first])):
+    if len(angles) and np.median(angles) > _MAX_ANGLE and (is_base_known or not _are_collinear(readings.points[first])):
         raise ContradictionError(
             f"half of the poses are rotated {np.degrees(np.median(angles)):.0f} degrees or more from where {arm.name} "
             f"would have its tool, however the target is fixed to it: are these its rotations, in this order and "
@@ -83,7 +87,7 @@ def initial_guess(
     return model
 
 
-def register(chain: Chain, q: Array, points: Array) -> Array:
+def register_base(chain: Chain, q: Array, points: Array) -> Array:
     """Return (4, 4) the base frame that brings the nominal arm nearest to the points."""
     return _rigid_motion(chain.forward(q).position, points)
 
@@ -104,11 +108,11 @@ def _refuse_other_units(chain: Chain, readings: Readings, first: Array) -> None:
     pairs = np.flatnonzero(np.isfinite(readings.other[:, 0]))
     tool, other = chain.forward(readings.q).position, chain.forward(readings.other[pairs]).position
     for what, nominal, measured in (
-        ("points spread", _spread(tool[first]), _spread(readings.points[first])),
+        ("points spread", _mean_distance_from_centre(tool[first]), _mean_distance_from_centre(readings.points[first])),
         ("distances are", np.linalg.norm(tool[pairs] - other, axis=1).sum(), readings.distances[pairs].sum()),
     ):
         ratio = float(measured) / max(float(nominal), 1e-12)
-        for factor, mistake in _UNITS:
+        for factor, mistake in _UNIT_MISTAKES:
             if 0.8 < ratio / factor < 1.25:
                 raise ContradictionError(
                     f"the {what} {ratio:.4g} times as far as {chain.arm.name} reaches in these configurations: "
@@ -116,7 +120,7 @@ def _refuse_other_units(chain: Chain, readings: Readings, first: Array) -> None:
                 )
 
 
-def _spread(points: Array) -> float:
+def _mean_distance_from_centre(points: Array) -> float:
     return float(np.linalg.norm(points - points.mean(axis=0), axis=1).mean()) if len(points) else 0.0
 
 
@@ -127,16 +131,16 @@ def _target_rotation(chain: Chain, readings: Readings, frames: Sequence[Array]) 
         return np.eye(3)
     measured = np.stack([X[:3, :3] for X in frames])[readings.frame[which]] @ readings.rotations[which]
     R = nearest_rotation((chain.forward(readings.q[which]).rotation.swapaxes(1, 2) @ measured).sum(axis=0))
-    return R if np.linalg.norm(rotation_vector(R)) > _ANOTHER else np.eye(3)
+    return R if np.linalg.norm(rotation_vector(R)) > _MIN_TARGET_ANGLE else np.eye(3)
 
 
-def _frame(chain: Chain, readings: Readings, number: int) -> Array:
+def _initial_frame(chain: Chain, readings: Readings, number: int) -> Array:
     """Return (4, 4) the pose of a further frame in the measuring frame."""
     which = readings.with_point & (readings.frame == number)
     measured, name = readings.points[which], readings.frames[number]
     if not which.any():
         return np.eye(4)  # nothing is read in it here
-    if _on_a_line(measured):
+    if _are_collinear(measured):
         raise TooFewError(
             f"frame {name}: {len(measured)} points"
             f"{' on a line' if len(measured) > 2 else ''} do not tell where it stands; measure 3 or more that are not "
@@ -145,15 +149,15 @@ def _frame(chain: Chain, readings: Readings, number: int) -> Array:
     return _rigid_motion(measured, chain.forward(readings.q[which]).position)
 
 
-def _on_a_line(points: Array) -> bool:
+def _are_collinear(points: Array) -> bool:
     """Whether points (m, 3) are collinear or all the same, as fewer than three always are."""
     if len(points) < 3:
         return True
     widths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(widths[1] <= _LINE * widths[0])
+    return bool(widths[1] <= _COLLINEARITY * widths[0])
 
 
-def _plane(chain: Chain, readings: Readings, number: int) -> Plane:
+def _initial_plane(chain: Chain, readings: Readings, number: int) -> Plane:
     """Return the plane nearest to the points at which the nominal arm would have touched it."""
     which = readings.plane == number
     if not which.any():
@@ -164,7 +168,7 @@ def _plane(chain: Chain, readings: Readings, number: int) -> Plane:
     return Plane(points.mean(axis=0), axes.T)
 
 
-def _anchor(chain: Chain, readings: Readings, number: int) -> Array:
+def _initial_anchor(chain: Chain, readings: Readings, number: int) -> Array:
     """Return (3,) the position whose distances from the nominal arm's tool are as measured (trilateration)."""
     which = readings.anchor == number
     if not which.any():

@@ -62,7 +62,7 @@ def accuracy(measured: Readings, positions: Array) -> Accuracy | None:
         measured: m readings.
         positions: (m, 3) of the model's tool in them [m].
     """
-    groups = _groups(measured)
+    groups = _rows_by_configuration(measured)
     if len(groups) < 2:
         return None
     goals = [positions[rows].mean(axis=0) for rows in groups]
@@ -80,7 +80,7 @@ def accuracy(measured: Readings, positions: Array) -> Accuracy | None:
 
 def repeatability(measured: Readings) -> Repeatability | None:
     """Return RP of configurations that were measured more than once; None where none was."""
-    clouds = [measured.points[rows] for rows in _groups(measured) if len(rows) > 1]
+    clouds = [measured.points[rows] for rows in _rows_by_configuration(measured) if len(rows) > 1]
     if not clouds:
         return None
     radii = np.array([pose_repeatability(cloud, few=True).radius for cloud in clouds])
@@ -95,7 +95,7 @@ def repeatability(measured: Readings) -> Repeatability | None:
     )
 
 
-def _groups(measured: Readings) -> list[Array]:
+def _rows_by_configuration(measured: Readings) -> list[Array]:
     """Return by configuration the rows with a point in the measuring frame."""
     rows = np.flatnonzero(measured.with_point & (measured.frame == 0))
     configuration = distinct_configurations(measured.q[rows]) if len(rows) else np.zeros(0, dtype=np.intp)

@@ -27,7 +27,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array, Flags, read_only
 from armwright.calibration.columns import DEVIATIONS, DISTANCE, NAMES, NOMINAL, RPY, joint_columns, read_columns
-from armwright.calibration.readings import Readings, numbered
+from armwright.calibration.readings import Readings, number_labels
 from armwright.errors import FileFormatError, closest
 from armwright.files.column_names import Heading, default_units
 from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, lines_text
@@ -35,17 +35,17 @@ from armwright.spatial.rotations import rotation_from_quaternion
 
 _SETS = ("fit", "check")
 # A joint whose positions differ by less has not moved [rad], [m].
-_MOVED = 1e-6
+_MIN_MOTION = 1e-6
 # Limits of a slide that are gone beyond by so many times its way are in another unit.
-_BEYOND = 20.0
+_MAX_LIMIT_EXCESS = 20.0
 # Turning joints that all stay within so many degrees may be in radians [deg].
-_RADIANS = 2 * math.pi
+_MAX_RADIANS = 2 * math.pi
 # How many lines a warning names.
 _SHOWN = 5
 # Rows that are compared at once.
-_AT_ONCE = 10_000
+_BLOCK_ROWS = 10_000
 # A unit quaternion that is written with four digits.
-_WRITTEN = 1e-3
+_QUATERNION_TOLERANCE = 1e-3
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -116,7 +116,7 @@ def read_measurements(
         path=table.path,
         readings=readings,
         names=_names(table),
-        check=_checks(table),
+        check=_check_flags(table),
         warnings=_warnings(arm, readings, table.lines, headings),
     )
 
@@ -160,9 +160,9 @@ def _readings(table: UnitTable, q: Array, position: Sequence[str], orientation: 
     has_point = np.isfinite(points[:, 0])
     frames = [word if known else None for word, known in zip(table.words("frame"), has_point.tolist(), strict=True)]
     planes, anchors = ([word or None for word in table.words(name)] for name in ("plane", "anchor"))
-    labels = numbered(frame=frames, plane=planes, anchor=anchors)
+    labels = number_labels(frame=frames, plane=planes, anchor=anchors)
     distances = table.numbers([DISTANCE])[:, 0] if DISTANCE in table else np.full(len(q), np.nan)
-    other = _others(table, q, distances)
+    other = _other_configurations(table, q, distances)
     return Readings(q=q, points=points, rotations=rotations, distances=distances, other=other, **labels)
 
 
@@ -178,13 +178,13 @@ def _rotations(table: UnitTable, points: Array, orientation: Sequence[str]) -> A
             rotations[i] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
             continue
         length = float(np.linalg.norm(numbers[i]))
-        if abs(length - 1) > _WRITTEN:
+        if abs(length - 1) > _QUATERNION_TOLERANCE:
             raise table.error(int(i), "qw", f"expected a quaternion of length 1, got one of {length:.6g}")
         rotations[i] = rotation_from_quaternion(numbers[i])
     return rotations
 
 
-def _others(table: UnitTable, q: Array, distances: Array) -> Array:
+def _other_configurations(table: UnitTable, q: Array, distances: Array) -> Array:
     """Return (m, n) the joint configurations that distances are from; NaN where they are from an anchor or absent."""
     if DISTANCE not in table:
         return np.broadcast_to(np.nan, q.shape)
@@ -211,7 +211,7 @@ def _others(table: UnitTable, q: Array, distances: Array) -> Array:
     return other
 
 
-def _checks(table: UnitTable) -> Flags:
+def _check_flags(table: UnitTable) -> Flags:
     """Return which rows are held out to check with."""
     if "set" not in table:
         return np.zeros(len(table), dtype=np.bool_)
@@ -233,7 +233,9 @@ def _refuse_other_units(table: UnitTable, arm: Arm, q: Array, headings: Sequence
                 raise table.error(worst, heading.column.name, f"{mistake}; are the units right?")
             continue
         lower, upper = joint.limits.lower, joint.limits.upper
-        if math.isfinite(upper - lower) and max(q[worst, i] - upper, lower - q[worst, i]) > _BEYOND * (upper - lower):
+        if math.isfinite(upper - lower) and max(q[worst, i] - upper, lower - q[worst, i]) > _MAX_LIMIT_EXCESS * (
+            upper - lower
+        ):
             raise table.error(
                 worst,
                 heading.column.name,
@@ -247,42 +249,42 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequ
     texts, q = [], readings.q
     for i, (joint, heading) in enumerate(zip(arm.joints, headings, strict=True)):
         scale, unit = heading.scale, heading.unit
-        if len(q) > 1 and np.ptp(q[:, i]) < _MOVED:
+        if len(q) > 1 and np.ptp(q[:, i]) < _MIN_MOTION:
             texts.append(
                 f"{arm.called(i)} never moved: it stands at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. What it "
                 f"and its neighbours are off by cannot be told apart"
             )
-        beyond = (q[:, i] < joint.limits.lower - _MOVED) | (q[:, i] > joint.limits.upper + _MOVED)
+        beyond = (q[:, i] < joint.limits.lower - _MIN_MOTION) | (q[:, i] > joint.limits.upper + _MIN_MOTION)
         if beyond.any():
             texts.append(
                 f"{arm.called(i)} is beyond its limits of {joint.limits.lower / scale:.6g} to "
-                f"{joint.limits.upper / scale:.6g} {unit} in {_in_lines(np.flatnonzero(beyond).tolist(), lines)}"
+                f"{joint.limits.upper / scale:.6g} {unit} in {_lines_of_rows(np.flatnonzero(beyond).tolist(), lines)}"
             )
     turning = [i for i, joint in enumerate(arm.joints) if joint.revolute]
     if turning and all(headings[i].unit == "deg" for i in turning) and len(q) > 1:
         largest = float(np.degrees(np.abs(q[:, turning]).max()))
-        if largest < _RADIANS:
+        if largest < _MAX_RADIANS:
             texts.append(f"no joint is farther than {largest:.3g} degrees from 0; are these radians?")
-    texts.extend(_copies(readings, lines))
+    texts.extend(_duplicate_warnings(readings, lines))
     return tuple(texts)
 
 
-def _copies(readings: Readings, lines: Sequence[int]) -> list[str]:
+def _duplicate_warnings(readings: Readings, lines: Sequence[int]) -> list[str]:
     """Return a warning of rows that say the same to the last digit, which no second measurement does."""
     told = [readings.q, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
 
-    def said(rows: slice) -> list[bytes]:
+    def row_bytes(rows: slice) -> list[bytes]:
         return [row.tobytes() for row in np.hstack([part[rows] for part in told]) + 0.0]  # -0.0 + 0.0 is 0.0
 
     # Whole rows are compared where their hashes agree alone: those of a million rows take little room.
-    blocks = (slice(start, start + _AT_ONCE) for start in range(0, len(readings), _AT_ONCE))
-    hashes = np.fromiter((hash(row) for rows in blocks for row in said(rows)), dtype=np.int64, count=len(readings))
+    blocks = (slice(start, start + _BLOCK_ROWS) for start in range(0, len(readings), _BLOCK_ROWS))
+    hashes = np.fromiter((hash(row) for rows in blocks for row in row_bytes(rows)), dtype=np.int64, count=len(readings))
     _, place, count = np.unique(hashes, return_inverse=True, return_counts=True)
     first: dict[bytes, int] = {}
     copies: list[int] = []
     originals: list[int] = []
     for i in np.flatnonzero(count[place] > 1).tolist():
-        original = first.setdefault(said(slice(i, i + 1))[0], i)
+        original = first.setdefault(row_bytes(slice(i, i + 1))[0], i)
         if original != i:
             copies.append(i)
             originals.append(original)
@@ -290,12 +292,12 @@ def _copies(readings: Readings, lines: Sequence[int]) -> list[str]:
         return []
     return [
         (
-            f"{_in_lines(copies, lines)} {'says' if len(copies) == 1 else 'say'} to the last digit what "
-            f"{_in_lines(originals, lines)} said: a copy counts twice and tells nothing"
+            f"{_lines_of_rows(copies, lines)} {'says' if len(copies) == 1 else 'say'} to the last digit what "
+            f"{_lines_of_rows(originals, lines)} said: a copy counts twice and tells nothing"
         )
     ]
 
 
-def _in_lines(numbers: Sequence[int], lines: Sequence[int]) -> str:
+def _lines_of_rows(numbers: Sequence[int], lines: Sequence[int]) -> str:
     """Name the lines of rows, not too many of them."""
     return lines_text([lines[i] for i in numbers[:_SHOWN]], len(numbers))

@@ -14,13 +14,13 @@ import numpy as np
 from scipy.stats import chi2
 
 from armwright.arrays import Array, Flags
-from armwright.calibration.measurement_model import Residuals
 from armwright.calibration.readings import Numbers
+from armwright.calibration.residuals import Residuals
 
 # Readings whose squared residual is beyond this quantile of chi-square weigh less: three sigma of one number.
 _QUANTILE = 0.9973
 # Those beyond twice as many sigmas are outliers, which do not count in the last fit.
-_OUTLYING = 2.0
+_OUTLIER_FACTOR = 2.0
 
 
 class Noise(NamedTuple):
@@ -36,9 +36,9 @@ class Noise(NamedTuple):
 
 
 # Of a laser tracker, for want of better; and of rounding.
-TYPICAL, LEAST = Noise(1e-4, 5e-4), Noise(1e-9, 1e-9)
+TYPICAL_NOISE, LEAST_NOISE = Noise(1e-4, 5e-4), Noise(1e-9, 1e-9)
 # With fewer degrees of freedom lengths and rotations share one scale: the residuals of one kind can be next to nothing.
-_FEW = 30
+_MIN_DEGREES_OF_FREEDOM = 30
 
 
 def length_scales(residuals: Residuals, noise: Noise) -> Array:
@@ -56,7 +56,7 @@ def robust_weights(residuals: Residuals, noise: Noise, *, strict: bool) -> Array
 
     If strict, outliers have weight 0.
     """
-    square, size = _by_reading(residuals.reading, residuals.values / standard_deviations(residuals, noise))
+    square, size = _squares_by_reading(residuals.reading, residuals.values / standard_deviations(residuals, noise))
     root = (1 + square / _chi2_limit(size)) ** -0.25
     if strict:
         root[_is_outlier(square, size)] = 0.0
@@ -70,8 +70,8 @@ def median_noise(residuals: Residuals, fitted: int) -> Noise:
         residuals: of the readings.
         fitted: how many errors were fitted to them.
     """
-    every = np.ones(len(residuals.values), dtype=np.bool_)
-    return _noise(residuals, every, len(residuals.values) - fitted, _median_scale)
+    all_values = np.ones(len(residuals.values), dtype=np.bool_)
+    return _estimate_noise(residuals, all_values, len(residuals.values) - fitted, _median_scale)
 
 
 def noise_and_outliers(residuals: Residuals, readings: int, fitted: int, *, robust: bool) -> tuple[Noise, Flags, int]:
@@ -89,12 +89,12 @@ def noise_and_outliers(residuals: Residuals, readings: int, fitted: int, *, robu
     for _ in range(2):
         degrees_of_freedom = max(1, int(counted.sum()) - fitted)
         correction = float(np.sqrt(counted.sum() / degrees_of_freedom))
-        noise = _noise(
+        noise = _estimate_noise(
             residuals, counted, degrees_of_freedom, partial(_trimmed_scale, correction=correction, robust=robust)
         )
         if robust:
             scaled = residuals.values / standard_deviations(residuals, noise)
-            outlying = _is_outlier(*_by_reading(residuals.reading, scaled))
+            outlying = _is_outlier(*_squares_by_reading(residuals.reading, scaled))
             counted = ~outlying[residuals.reading]
     return noise, outlying, max(1, int(counted.sum()) - fitted)
 
@@ -102,24 +102,24 @@ def noise_and_outliers(residuals: Residuals, readings: int, fitted: int, *, robu
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _noise(
+def _estimate_noise(
     residuals: Residuals, counted: Flags, degrees_of_freedom: int, scale: Callable[[Numbers, Array], float]
 ) -> Noise:
     """Return the noise of lengths and of rotations by one rule; with few degrees of freedom, of both together."""
-    if degrees_of_freedom < _FEW:
-        scaled = residuals.values / standard_deviations(residuals, TYPICAL)
+    if degrees_of_freedom < _MIN_DEGREES_OF_FREEDOM:
+        scaled = residuals.values / standard_deviations(residuals, TYPICAL_NOISE)
         common = scale(residuals.reading[counted], scaled[counted])
-        return Noise(*(max(common * typical, least) for typical, least in zip(TYPICAL, LEAST, strict=True)))
+        return Noise(*(max(common * typical, least) for typical, least in zip(TYPICAL_NOISE, LEAST_NOISE, strict=True)))
     kinds = (~residuals.is_rotation & counted, residuals.is_rotation & counted)
     return Noise(
         *(
             max(scale(residuals.reading[kind], residuals.values[kind]), least)
-            for kind, least in zip(kinds, LEAST, strict=True)
+            for kind, least in zip(kinds, LEAST_NOISE, strict=True)
         )
     )
 
 
-def _by_reading(reading: Numbers, values: Array) -> tuple[Array, Array]:
+def _squares_by_reading(reading: Numbers, values: Array) -> tuple[Array, Array]:
     """Return by reading the sum of its squared residuals, and how many they are; 0 for readings without any."""
     square, size = np.bincount(reading, values**2), np.bincount(reading)
     return np.asarray(square, dtype=np.float64), np.asarray(size, dtype=np.float64)
@@ -132,7 +132,7 @@ def _chi2_limit(size: Array) -> Array:
 
 def _is_outlier(square: Array, size: Array) -> Flags:
     """Return which readings are outliers, by the sum of their squared residuals, in standard deviations."""
-    return np.asarray(square > _OUTLYING**2 * _chi2_limit(size), dtype=np.bool_)
+    return np.asarray(square > _OUTLIER_FACTOR**2 * _chi2_limit(size), dtype=np.bool_)
 
 
 def _trimmed_scale(reading: Numbers, values: Array, *, correction: float, robust: bool) -> float:
@@ -144,7 +144,7 @@ def _trimmed_scale(reading: Numbers, values: Array, *, correction: float, robust
         return 0.0
     if not robust:
         return float(np.sqrt(np.mean(values**2))) * correction
-    square, size = _present(reading, values)
+    square, size = _squares_and_sizes(reading, values)
     limit = _chi2_limit(size)
     near = square <= limit * (_median_scale(reading, values) * correction) ** 2
     # The tail that is cut off a normal distribution would have made the mean larger.
@@ -155,11 +155,11 @@ def _trimmed_scale(reading: Numbers, values: Array, *, correction: float, robust
 
 def _median_scale(reading: Numbers, values: Array) -> float:
     """Return the standard deviation about 0 of the median reading, which outliers do not move."""
-    square, size = _present(reading, values)
+    square, size = _squares_and_sizes(reading, values)
     return float(np.sqrt(np.median(square / chi2.ppf(0.5, size)))) if len(size) else 0.0
 
 
-def _present(reading: Numbers, values: Array) -> tuple[Array, Array]:
+def _squares_and_sizes(reading: Numbers, values: Array) -> tuple[Array, Array]:
     """Return squares and sizes of those readings that have residuals at all."""
-    square, size = _by_reading(reading, values)
+    square, size = _squares_by_reading(reading, values)
     return square[size > 0], size[size > 0]

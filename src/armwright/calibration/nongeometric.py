@@ -25,7 +25,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, Flags, joint_array, one_core
 from armwright.calibration.chain import JointErrorModel
 from armwright.calibration.cross_validation import (
-    HeldOut,
+    HeldOutErrors,
     calibrate_without,
     distinct_configurations,
     held_out_errors,
@@ -88,11 +88,11 @@ class NongeometricCalibration:
     calibration: Calibration
     residual_model: ResidualModel | None
     comparisons: tuple[ModelComparison, ...]
-    geometry: HeldOut
-    held_out: HeldOut
-    nested: HeldOut | None
+    geometry: HeldOutErrors
+    held_out: HeldOutErrors
+    nested: HeldOutErrors | None
 
-    def errors(self, measured: Readings) -> HeldOut:
+    def errors(self, measured: Readings) -> HeldOutErrors:
         """Return by how much the arm misses readings."""
         return _errors(self.calibration, self.residual_model, measured)
 
@@ -187,9 +187,9 @@ class _Folds:
 
     def held_out(
         self, out: frozenset[int], joints: tuple[JointErrorModel, ...], *, with_residual_model: bool = False
-    ) -> HeldOut:
+    ) -> HeldOutErrors:
         """Return by how much readings miss arms that were fitted without their fold, and without some others."""
-        held = HeldOut.unknown(len(self.measured))
+        held = HeldOutErrors.unknown(len(self.measured))
         for fold in set(range(len(self.folds))) - out:
             without = out | {fold}
             rows = self.folds[fold]
@@ -203,8 +203,8 @@ class _Selection(NamedTuple):
 
     joints: tuple[JointErrorModel, ...]
     with_residual_model: bool
-    geometry: HeldOut
-    held_out: HeldOut
+    geometry: HeldOutErrors
+    held_out: HeldOutErrors
     comparisons: tuple[ModelComparison, ...]
 
 
@@ -253,9 +253,9 @@ def _ignore(what: str) -> None:
     """Report nothing."""
 
 
-def _nested(data: _Folds, report: Callable[[str], None]) -> HeldOut | None:
+def _nested(data: _Folds, report: Callable[[str], None]) -> HeldOutErrors | None:
     """Return the errors of nested cross-validation; None where too few readings are left to choose by."""
-    held = HeldOut.unknown(len(data.measured))
+    held = HeldOutErrors.unknown(len(data.measured))
     for number, rows in enumerate(data.folds):
         out = frozenset({number})
         report(f"nested cross-validation, part {number + 1} of {len(data.folds)}")
@@ -281,7 +281,7 @@ def _select(data: _Folds, out: frozenset[int], report: Callable[[str], None]) ->
     points = data.points & data.without(out)
     configuration = data.configuration[points]
 
-    def compare(name: str, before: HeldOut, after: HeldOut) -> ModelComparison:
+    def compare(name: str, before: HeldOutErrors, after: HeldOutErrors) -> ModelComparison:
         return compare_held_out(name, before.distance[points], after.distance[points], configuration)
 
     report("cross-validating: geometry")
@@ -310,13 +310,13 @@ def _select(data: _Folds, out: frozenset[int], report: Callable[[str], None]) ->
 
 def _select_joint_errors(
     arm: Arm,
-    held: HeldOut,
+    held: HeldOutErrors,
     *,
-    compare: Callable[[str, HeldOut, HeldOut], ModelComparison],
-    validate: Callable[[tuple[JointErrorModel, ...]], HeldOut],
+    compare: Callable[[str, HeldOutErrors, HeldOutErrors], ModelComparison],
+    validate: Callable[[tuple[JointErrorModel, ...]], HeldOutErrors],
     comparisons: list[ModelComparison],
     report: Callable[[str], None],
-) -> tuple[tuple[JointErrorModel, ...], HeldOut]:
+) -> tuple[tuple[JointErrorModel, ...], HeldOutErrors]:
     """Return the error models of joints that held-out points confirm, and the held-out errors with them.
 
     Args:
@@ -363,7 +363,7 @@ def _select_joint_errors(
     return joints, held
 
 
-def _errors(calibration: Calibration, model: ResidualModel | None, measured: Readings) -> HeldOut:
+def _errors(calibration: Calibration, model: ResidualModel | None, measured: Readings) -> HeldOutErrors:
     """Return by how much a calibrated arm misses readings, with its residual model where they are points."""
     errors, points = held_out_errors(calibration, measured), measured.with_point & (measured.frame == 0)
     if model is not None and points.any():

@@ -23,14 +23,14 @@ _MEASURED, _LABELS = ("q", "points", "rotations", "distances", "other"), ("frame
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
 # Rotations that are written with four digits.
-_WRITTEN = 1e-3
+_ROTATION_TOLERANCE = 1e-3
 
 
-def _no_numbers(m: int, *shape: int) -> Array:
+def _nan_array(m: int, *shape: int) -> Array:
     return np.full((m, *shape), np.nan)
 
 
-def _known(array: Array) -> Array:
+def _nan_or_read_only(array: Array) -> Array:
     """Return a copy that cannot be written to; of what no reading tells there is one NaN, which takes no room."""
     return np.broadcast_to(np.nan, array.shape) if np.isnan(array).all() else read_only(array)
 
@@ -54,13 +54,13 @@ class Readings:
     """
 
     q: Array = attrs.field(converter=read_only)
-    points: Array = attrs.field(converter=_known)
-    rotations: Array = attrs.field(converter=_known)
+    points: Array = attrs.field(converter=_nan_or_read_only)
+    rotations: Array = attrs.field(converter=_nan_or_read_only)
     frame: Numbers = attrs.field(converter=read_only)
     plane: Numbers = attrs.field(converter=read_only)
-    distances: Array = attrs.field(converter=_known)
+    distances: Array = attrs.field(converter=_nan_or_read_only)
     anchor: Numbers = attrs.field(converter=read_only)
-    other: Array = attrs.field(converter=_known)
+    other: Array = attrs.field(converter=_nan_or_read_only)
     frames: tuple[str, ...] = ()
     planes: tuple[str, ...] = ()
     anchors: tuple[str, ...] = ()
@@ -111,31 +111,31 @@ def readings(
     """
     configurations = np.atleast_2d(floats(q, "q"))
     m, n = configurations.shape
-    positions, rotations = _no_numbers(m, 3), _no_numbers(m, 3, 3)
+    positions, rotations = _nan_array(m, 3), _nan_array(m, 3, 3)
     if points is not None:
         measured = floats(points, "points")
         measured = measured[None] if measured.shape in {(3,), (4, 4)} else measured
         if measured.shape == (m, 4, 4):
             positions, rotations = measured[:, :3, 3], measured[:, :3, :3]
-            _refuse_no_poses(measured)
+            _check_poses(measured)
         elif measured.shape == (m, 3):
             positions = measured
         else:
             raise ShapeError(
                 f"points: expected ({m}, 3) points or ({m}, 4, 4) poses for as many q, got {measured.shape}"
             )
-    lengths = _no_numbers(m) if distances is None else exact_shape(distances, (m,), "distances")
+    lengths = _nan_array(m) if distances is None else exact_shape(distances, (m,), "distances")
     if points is None and plane is None and distances is None:
         raise InvalidValueError("expected points, poses, planes or distances, got none of them")
     if (distances is not None) != ((anchor is not None) or (other is not None)) or None not in (anchor, other):
         raise InvalidValueError("distances: tell from which anchor they are, or from which other configuration")
-    others = _no_numbers(m, n) if other is None else exact_shape(np.atleast_2d(floats(other, "other")), (m, n), "other")
-    frames = [""] * m if frame is None and points is not None else _labels(frame, m, "frame")
-    labels = numbered(frame=frames, plane=_labels(plane, m, "plane"), anchor=_labels(anchor, m, "anchor"))
+    others = _nan_array(m, n) if other is None else exact_shape(np.atleast_2d(floats(other, "other")), (m, n), "other")
+    frames = [""] * m if frame is None and points is not None else _label_list(frame, m, "frame")
+    labels = number_labels(frame=frames, plane=_label_list(plane, m, "plane"), anchor=_label_list(anchor, m, "anchor"))
     return Readings(q=configurations, points=positions, rotations=rotations, distances=lengths, other=others, **labels)
 
 
-def numbered(**labels: Sequence[str | None]) -> dict[str, Any]:
+def number_labels(**labels: Sequence[str | None]) -> dict[str, Any]:
     """Return by key the numbers (m,) of labels, -1 for none, and by its plural the different labels in order."""
     columns: dict[str, Any] = {}
     for key, words in labels.items():
@@ -158,12 +158,12 @@ def concatenate(*parts: Readings) -> Readings:
     columns: dict[str, Any] = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _MEASURED}
     for key in _LABELS:
         names = tuple(dict.fromkeys(name for part in parts for name in getattr(part, f"{key}s")))
-        columns[key] = np.concatenate([_renumbered(getattr(x, key), getattr(x, f"{key}s"), names) for x in parts])
+        columns[key] = np.concatenate([_renumber(getattr(x, key), getattr(x, f"{key}s"), names) for x in parts])
         columns[f"{key}s"] = names
     return Readings(**columns)
 
 
-def refuse_not_fitted(fitted: Readings, others: Readings) -> None:
+def refuse_unlocated(fitted: Readings, others: Readings) -> None:
     """Refuse readings whose frame, plane or anchor no reading tells that is fitted: nothing says where it is.
 
     Raises:
@@ -179,18 +179,18 @@ def refuse_not_fitted(fitted: Readings, others: Readings) -> None:
             )
 
 
-def _refuse_no_poses(given: Array) -> None:
+def _check_poses(given: Array) -> None:
     """Refuse matrices (m, 4, 4) that are no poses: a rotation that is mirrored, scaled, or not one at all."""
     error = orthonormality_error(given[:, :3, :3]) + np.abs(given[:, 3] - (0, 0, 0, 1)).max(axis=1)
     worst = int(np.argmax(error)) if len(error) else 0
-    if len(error) and error[worst] > _WRITTEN:
+    if len(error) and error[worst] > _ROTATION_TOLERANCE:
         raise InvalidValueError(
             f"points: expected a rotation, a position and the row 0 0 0 1 in every pose, got {given[worst].tolist()} "
             f"as number {worst + 1}"
         )
 
 
-def _labels(names: ArrayLike | None, m: int, what: str) -> list[str | None]:
+def _label_list(names: ArrayLike | None, m: int, what: str) -> list[str | None]:
     """Return the label of each of m readings; None where the readings have none."""
     labels = [None] * m if names is None else [str(name) for name in np.atleast_1d(np.asarray(names))]
     if len(labels) != m:
@@ -198,7 +198,7 @@ def _labels(names: ArrayLike | None, m: int, what: str) -> list[str | None]:
     return [*labels]
 
 
-def _renumbered(numbers: Numbers, names: tuple[str, ...], order: tuple[str, ...]) -> Numbers:
+def _renumber(numbers: Numbers, names: tuple[str, ...], order: tuple[str, ...]) -> Numbers:
     """Return numbers of names as numbers in another order; -1 stays."""
     table = np.array([*(order.index(name) for name in names), -1], dtype=np.intp)
     return np.asarray(table[numbers], dtype=np.intp)

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares, minimize
 
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
-from armwright.calibration.chain import Chain, chain_of
+from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.calibration.fitting import Calibration, calibrate_points
 
 NOISE = 0.3e-3  # of the cameras, per coordinate [m]
@@ -103,7 +103,7 @@ class BoardMeasurement:
 @cache
 def chain() -> Chain:
     """Return the thesis' arm with all its error parameters."""
-    return chain_of(load_arm("ntu-3r"))
+    return kinematic_chain(load_arm("ntu-3r"))
 
 
 def truth() -> Array:

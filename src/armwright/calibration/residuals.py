@@ -96,7 +96,7 @@ class MeasurementModel:
         return np.array([*self.chain.is_length, *setup], dtype=np.bool_)
 
     @property
-    def setup(self) -> range:
+    def setup_indices(self) -> range:
         """Numbers of the errors that belong to the setup, not to the arm."""
         return range(len(self.chain.names), len(self.names))
 
@@ -115,10 +115,10 @@ class MeasurementModel:
             raise ShapeError(f"errors: expected {len(self.names)} of them, got shape {x.shape}")
         tool = self.chain.forward(readings.q, x[: len(self.chain.names)])
         parts = [
-            *self._of_poses(readings, tool, x),
-            *self._of_planes(readings, tool, x),
-            *self._of_anchors(readings, tool, x),
-            *self._of_displacements(readings, tool, x),
+            *self._pose_residuals(readings, tool, x),
+            *self._plane_residuals(readings, tool, x),
+            *self._anchor_residuals(readings, tool, x),
+            *self._displacement_residuals(readings, tool, x),
         ]
         return Residuals(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
@@ -136,12 +136,12 @@ class MeasurementModel:
 
     # ---- one kind of reading each --------------------------------------------------------------------------------
 
-    def _of_poses(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
+    def _pose_residuals(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the residuals of points and rotations, frame by frame."""
         for i, X in enumerate(self.frames.values()):
             first = len(self.chain.names) + 6 * (i - 1)
             rows = np.flatnonzero(readings.with_point & (readings.frame == i))
-            R, origin, axes = _displaced(X, x[first : first + 6] if i else np.zeros(6))
+            R, origin, axes = _displace_frame(X, x[first : first + 6] if i else np.zeros(6))
             measured = readings.points[rows] @ R.T + origin
             J = tool.position_jacobian[rows]
             levers = np.concatenate(
@@ -169,7 +169,7 @@ class MeasurementModel:
                 np.ones(3 * len(rows), dtype=np.bool_),
             )
 
-    def _of_planes(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
+    def _plane_residuals(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the heights of the tool over the planes that it touched."""
         first = len(self.chain.names) + 6 * (len(self.frames) - 1)
         for i, plane in enumerate(self.planes.values()):
@@ -183,28 +183,28 @@ class MeasurementModel:
             slopes = plane.axes.T @ (np.eye(3) - np.outer(normal, normal)) / length
             setup = np.stack([-np.ones(len(rows)), -(offset @ slopes[1]), offset @ slopes[0]], axis=1)
             J = np.einsum("i,mik->mk", normal, tool.position_jacobian[rows])
-            yield _of_lengths(offset @ normal - shift, self._jacobian(J, first, setup), rows)
+            yield _length_residuals(offset @ normal - shift, self._jacobian(J, first, setup), rows)
             first += 3
 
-    def _of_anchors(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
+    def _anchor_residuals(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the distances from anchors."""
         first = len(self.chain.names) + 6 * (len(self.frames) - 1) + 3 * len(self.planes)
         for i, anchor in enumerate(self.anchors.values()):
             rows = np.flatnonzero(readings.anchor == i)
-            distance, direction = _polar(tool.position[rows] - anchor - x[first : first + 3])
+            distance, direction = _length_and_direction(tool.position[rows] - anchor - x[first : first + 3])
             J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows])
-            yield _of_lengths(distance - readings.distances[rows], self._jacobian(J, first, -direction), rows)
+            yield _length_residuals(distance - readings.distances[rows], self._jacobian(J, first, -direction), rows)
             first += 3
 
-    def _of_displacements(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
+    def _displacement_residuals(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the distances between the positions of the tool in two configurations."""
         rows = np.flatnonzero(np.isfinite(readings.other[:, 0]))
         if not len(rows):
             return
         other = self.chain.forward(readings.other[rows], x[: len(self.chain.names)])
-        distance, direction = _polar(tool.position[rows] - other.position)
+        distance, direction = _length_and_direction(tool.position[rows] - other.position)
         J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows] - other.position_jacobian)
-        yield _of_lengths(distance - readings.distances[rows], self._jacobian(J), rows)
+        yield _length_residuals(distance - readings.distances[rows], self._jacobian(J), rows)
 
     def _jacobian(self, arm: Array, first: int = 0, setup: Array | None = None) -> Array:
         """Return the Jacobian (r, k) by all errors from those by the arm's and by some that begin at a number."""
@@ -215,12 +215,12 @@ class MeasurementModel:
         return J
 
 
-def _of_lengths(values: Array, jacobian: Array, rows: Numbers) -> Residuals:
+def _length_residuals(values: Array, jacobian: Array, rows: Numbers) -> Residuals:
     """Return residuals that are lengths, one for each reading."""
     return Residuals(values, jacobian, rows, np.zeros(len(rows), dtype=np.bool_))
 
 
-def _polar(vectors: Array) -> tuple[Array, Array]:
+def _length_and_direction(vectors: Array) -> tuple[Array, Array]:
     """Return lengths (m,) and directions (m, 3) of vectors (m, 3)."""
     length = np.linalg.norm(vectors, axis=1)
     return length, vectors / np.maximum(length, 1e-12)[:, None]
@@ -242,7 +242,7 @@ def _rotation_residual(R: Array, goals: Array) -> tuple[Array, Array]:
     return 2 * vector, slope
 
 
-def _displaced(X: Array, errors: Array) -> tuple[Array, Array, Array]:
+def _displace_frame(X: Array, errors: Array) -> tuple[Array, Array, Array]:
     """Return rotation and origin of a frame that is displaced by six errors, and the axes of its three rotations."""
     cosine, sine = np.cos(errors[3:]), np.sin(errors[3:])
     Rx = np.array([[1, 0, 0], [0, cosine[0], -sine[0]], [0, sine[0], cosine[0]]])
