@@ -1,11 +1,11 @@
 """Non-geometric calibration: joint compliance, transmission errors, and a model of the remaining residuals.
 
 Each candidate is added to those accepted before, and accepted only if it lowers the cross-validated errors
-significantly and by a part worth having. An accepted candidate is dropped again if a later one makes it superfluous
+significantly and by a relevant part. An accepted candidate is dropped again if a later one makes it superfluous
 (forward selection, then backward elimination).
 
-Held-out points that were used to choose are biased by the choice. So the whole, choice included, is judged by nested
-cross-validation: one part after the other is left out, and the others alone choose and fit.
+The errors of held-out points that have selected the model are biased. The model, its selection included, is therefore
+assessed by nested cross-validation: each part is left out in turn, and the others alone select and fit.
 
 Source:
     Thesis, outlook of chapter 5; spec of the calibration.
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from functools import partial
+from functools import cache
 from typing import Any, NamedTuple
 
 import attrs
@@ -37,9 +37,9 @@ from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import ContradictionError, InvalidValueError, MissingExtraError, TooFewError
 from armwright.extras import import_extra
 
-# A gain is significant from so many standard errors on, and worth having from such a part of the error on. Four
-# candidates share the level of significance that two standard errors are for one (Bonferroni).
-_SIGNIFICANT, _WORTH = 2.53, 0.01
+# A gain is significant beyond this number of standard errors, and relevant beyond this part of the error. Four
+# candidates share the significance level of two standard errors of a single one (Bonferroni).
+_MIN_STANDARD_ERRORS, _MIN_PART = 2.53, 0.01
 # From so many points the length scales of the Gaussian process are learnt; more cost time with their cube.
 _MAX_POINTS = 300
 # Bounds of length scales in sines and cosines of the joints, of the amplitude, and of the noise, as parts of the
@@ -68,7 +68,7 @@ class ModelComparison(NamedTuple):
 
     @classmethod
     def rejected(cls, name: str, reason: str) -> ModelComparison:
-        """Return that of a candidate that could not be tried."""
+        """Return the comparison of a candidate that could not be tried."""
         return cls(name, None, 0.0, 0.0, accepted=False, reason=reason)
 
 
@@ -81,8 +81,8 @@ class NongeometricCalibration:
         residual_model: what is added to its positions of the tool; None where that did not help.
         comparisons: of all candidates, in order; the first is geometry alone.
         geometry: held-out errors of geometry alone.
-        held_out: held-out errors of the accepted model, by which it was chosen.
-        nested: held out of the choice, too; None where this was not asked for, or too few readings are left.
+        held_out: held-out errors of the accepted model, by which it was selected.
+        nested: errors of nested cross-validation; None if it was not requested, or too few readings are left.
     """
 
     calibration: Calibration
@@ -93,7 +93,7 @@ class NongeometricCalibration:
     nested: HeldOutErrors | None
 
     def errors(self, measured: Readings) -> HeldOutErrors:
-        """Return by how much the arm misses readings."""
+        """Return the distances and angles between readings and the predictions of the model."""
         return _errors(self.calibration, self.residual_model, measured)
 
     def predict(self, q: ArrayLike) -> Array:
@@ -135,8 +135,8 @@ def compare_held_out(name: str, before: Array, after: Array, configuration: Numb
     cluster = np.bincount(np.unique(configuration, return_inverse=True)[1], before - after - gain)
     count = len(cluster)
     standard_error = float(np.sqrt(count / max(1, count - 1) * np.sum(cluster**2)) / len(before))
-    significant, worth = gain > _SIGNIFICANT * standard_error, gain > _WORTH * float(before.mean())
-    if significant and worth:
+    significant, relevant = gain > _MIN_STANDARD_ERRORS * standard_error, gain > _MIN_PART * float(before.mean())
+    if significant and relevant:
         reason = "the held-out error decreases"
     elif gain <= 0:
         reason = "the held-out error does not decrease"
@@ -145,61 +145,88 @@ def compare_held_out(name: str, before: Array, after: Array, configuration: Numb
     else:
         reason = "the gain is too small to be worth it"
     return ModelComparison(
-        name, float(after.mean()), gain, standard_error, accepted=significant and worth, reason=reason
+        name, float(after.mean()), gain, standard_error, accepted=significant and relevant, reason=reason
     )
 
 
-class _Folds:
-    """Readings in folds, and what was fitted without some of them: each is fitted once."""
+class _Candidate(NamedTuple):
+    """Error models of joints that are accepted or rejected together.
+
+    Attributes:
+        name: of the candidate.
+        models: one or two for each joint; none if the arm has no such joints.
+        reason_for_none: why there are none.
+    """
+
+    name: str
+    models: tuple[JointErrorModel, ...]
+    reason_for_none: str
+
+
+def _candidates(arm: Arm) -> list[_Candidate]:
+    no_gears = f"no joint of {arm.name} is revolute"
+    return [
+        _Candidate("joint compliance under gravity", compliances(arm), f"{arm.name} has no masses"),
+        _Candidate("transmission error, first harmonic", transmission_errors(arm, 1), no_gears),
+        _Candidate("transmission error, second harmonic", transmission_errors(arm, 2), no_gears),
+    ]
+
+
+class _FoldedReadings:
+    """Readings in folds, with the calibrations and residual models without some of them; each is fitted once.
+
+    Attributes:
+        calibration: returns the arm as calibrated without some folds, with some error models of joints.
+        residual_model: returns the model of the residuals of that calibration.
+    """
 
     def __init__(self, arm: Arm, measured: Readings, *, folds: int, seed: int, base: Array | None) -> None:
         self.arm, self.measured, self.seed, self.base = arm, measured, seed, base
         self.folds = random_folds(measured.q, folds, seed)
         self.points = measured.with_point & (measured.frame == 0)
         self.configuration = distinct_configurations(measured.q)
-        self._calibrations: dict[Any, Calibration] = {}
-        self._residual_models: dict[Any, ResidualModel] = {}
+        self.candidates = _candidates(arm)
+        self.calibration = cache(self._calibrate)
+        self.residual_model = cache(self._fit_residual_model)
 
-    def without(self, out: frozenset[int]) -> Flags:
-        """Return (m,) which readings are not in some folds."""
-        if not out:
+    def is_outside(self, left_out: frozenset[int]) -> Flags:
+        """Return (m,) which readings are in none of the folds that are left out."""
+        if not left_out:
             return np.ones(len(self.measured), dtype=np.bool_)
-        return np.asarray(~np.any([self.folds[fold] for fold in out], axis=0), dtype=np.bool_)
+        return np.asarray(~np.any([self.folds[fold] for fold in left_out], axis=0), dtype=np.bool_)
 
-    def calibration(self, out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> Calibration:
-        """Return the arm as calibrated without some folds."""
-        key = (out, tuple(error.name for error in joints))
-        if key not in self._calibrations:
-            called = f"part {' and '.join(str(fold + 1) for fold in sorted(out))} of {len(self.folds)}"
-            fit = calibrate if not out else partial(calibrate_without, held_out=~self.without(out), called=called)
-            self._calibrations[key] = fit(self.arm, self.measured, base=self.base, joint_errors=joints)
-        return self._calibrations[key]
+    def _calibrate(self, left_out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> Calibration:
+        if not left_out:
+            return calibrate(self.arm, self.measured, base=self.base, joint_errors=joints)
+        name = f"part {' and '.join(str(fold + 1) for fold in sorted(left_out))} of {len(self.folds)}"
+        held_out = ~self.is_outside(left_out)
+        return calibrate_without(self.arm, self.measured, held_out, name, base=self.base, joint_errors=joints)
 
-    def residual_model(self, out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> ResidualModel:
-        """Return the model of the residuals of the same readings."""
-        key = (out, tuple(error.name for error in joints))
-        if key not in self._residual_models:
-            calibration, train = self.calibration(out, joints), self.points & self.without(out)
-            q = self.measured.q[train]
-            residuals = self.measured.points[train] - calibration.predict(q)
-            self._residual_models[key] = _fit_residuals(self.arm, q, residuals, self.seed)
-        return self._residual_models[key]
+    def _fit_residual_model(self, left_out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> ResidualModel:
+        calibration, train = self.calibration(left_out, joints), self.points & self.is_outside(left_out)
+        q = self.measured.q[train]
+        return _fit_residuals(self.arm, q, self.measured.points[train] - calibration.predict(q), self.seed)
 
-    def held_out(
-        self, out: frozenset[int], joints: tuple[JointErrorModel, ...], *, with_residual_model: bool = False
+    def fold_errors(
+        self, fold: int, without: frozenset[int], joints: tuple[JointErrorModel, ...], *, with_residual_model: bool
     ) -> HeldOutErrors:
-        """Return by how much readings miss arms that were fitted without their fold, and without some others."""
+        """Return the errors of the readings of a fold, predicted without some folds."""
+        model = self.residual_model(without, joints) if with_residual_model else None
+        return _errors(self.calibration(without, joints), model, self.measured.take(self.folds[fold]))
+
+    def held_out_errors(
+        self, left_out: frozenset[int], joints: tuple[JointErrorModel, ...], *, with_residual_model: bool = False
+    ) -> HeldOutErrors:
+        """Return the errors of readings, each predicted without its fold and without the folds that are left out."""
         held = HeldOutErrors.unknown(len(self.measured))
-        for fold in set(range(len(self.folds))) - out:
-            without = out | {fold}
-            rows = self.folds[fold]
-            model = self.residual_model(without, joints) if with_residual_model else None
-            held.put(rows, _errors(self.calibration(without, joints), model, self.measured.take(rows)))
+        for fold in set(range(len(self.folds))) - left_out:
+            errors = self.fold_errors(fold, left_out | {fold}, joints, with_residual_model=with_residual_model)
+            held.put(self.folds[fold], errors)
         return held
 
 
 class _Selection(NamedTuple):
-    """The model that held-out points chose."""
+    """The model that held-out points have selected."""
 
     joints: tuple[JointErrorModel, ...]
     with_residual_model: bool
@@ -226,26 +253,26 @@ def calibrate_nongeometric(
         folds: of the cross-validation.
         seed: of the folds.
         base: see ``calibrate``.
-        nested: whether to hold points out of the choice, too, which takes about three times as long.
+        nested: whether to hold points out of the selection, too, which takes about three times as long.
         progress: called with what is being done.
 
     Raises:
         InvalidValueError: no point was measured, or see ``calibrate``.
     """
     report = progress or _ignore
-    data = _Folds(arm, measured, folds=folds, seed=seed, base=base)
+    data = _FoldedReadings(arm, measured, folds=folds, seed=seed, base=base)
     if not data.points.any():
         raise InvalidValueError("expected points in the measuring frame, whose residuals are modelled; got none")
-    every: frozenset[int] = frozenset()
-    selection = _select(data, every, report)
+    nothing: frozenset[int] = frozenset()
+    selection = _select(data, nothing, report)
     report("fitting the accepted model")
     return NongeometricCalibration(
-        calibration=data.calibration(every, selection.joints),
-        residual_model=data.residual_model(every, selection.joints) if selection.with_residual_model else None,
+        calibration=data.calibration(nothing, selection.joints),
+        residual_model=data.residual_model(nothing, selection.joints) if selection.with_residual_model else None,
         comparisons=selection.comparisons,
         geometry=selection.geometry,
         held_out=selection.held_out,
-        nested=_nested(data, report) if nested else None,
+        nested=_cross_validate_selection(data, report) if nested else None,
     )
 
 
@@ -253,118 +280,109 @@ def _ignore(what: str) -> None:
     """Report nothing."""
 
 
-def _nested(data: _Folds, report: Callable[[str], None]) -> HeldOutErrors | None:
-    """Return the errors of nested cross-validation; None where too few readings are left to choose by."""
+def _cross_validate_selection(data: _FoldedReadings, report: Callable[[str], None]) -> HeldOutErrors | None:
+    """Return the errors of nested cross-validation; None if too few readings are left for the selection."""
     held = HeldOutErrors.unknown(len(data.measured))
     for number, rows in enumerate(data.folds):
-        out = frozenset({number})
+        left_out = frozenset({number})
         report(f"nested cross-validation, part {number + 1} of {len(data.folds)}")
         try:
-            selection = _select(data, out, _ignore)
+            selection = _select(data, left_out, _ignore)
         except (ContradictionError, InvalidValueError):
             return None
-        model = data.residual_model(out, selection.joints) if selection.with_residual_model else None
-        held.put(rows, _errors(data.calibration(out, selection.joints), model, data.measured.take(rows)))
+        with_residual_model = selection.with_residual_model
+        held.put(rows, data.fold_errors(number, left_out, selection.joints, with_residual_model=with_residual_model))
     return held
 
 
-def _select(data: _Folds, out: frozenset[int], report: Callable[[str], None]) -> _Selection:
+def _select(data: _FoldedReadings, left_out: frozenset[int], report: Callable[[str], None]) -> _Selection:
     """Return the model that the points outside of some folds confirm.
 
     Args:
         data: the readings.
-        out: folds that are left out of everything.
+        left_out: folds that are left out of everything.
         report: called with what is being done.
     """
-    if len(data.folds) - len(out) < 2:
-        raise TooFewError("two parts of the readings at least must be left to choose by")
-    points = data.points & data.without(out)
+    if len(data.folds) - len(left_out) < 2:
+        raise TooFewError("at least two parts of the readings must remain for the selection of a model")
+    points = data.points & data.is_outside(left_out)
     configuration = data.configuration[points]
 
     def compare(name: str, before: HeldOutErrors, after: HeldOutErrors) -> ModelComparison:
         return compare_held_out(name, before.distance[points], after.distance[points], configuration)
 
     report("cross-validating: geometry")
-    held = geometry = data.held_out(out, ())
-    comparisons = [ModelComparison("geometry", float(held.distance[points].mean()), 0.0, 0.0, accepted=True, reason="")]
-    joints, held = _select_joint_errors(
-        data.arm,
-        held,
-        compare=compare,
-        validate=lambda joints: data.held_out(out, joints),
-        comparisons=comparisons,
-        report=report,
+    geometry = data.held_out_errors(left_out, ())
+    mean = float(geometry.distance[points].mean())
+    comparisons = [ModelComparison("geometry", mean, 0.0, 0.0, accepted=True, reason="")]
+    joints, held_out = _select_joint_errors(
+        data, left_out, geometry, compare=compare, comparisons=comparisons, report=report
     )
     report("modelling the residuals")
     name, accepted = "Gaussian process of the residuals", False
     try:
-        better = data.held_out(out, joints, with_residual_model=True)
+        better = data.held_out_errors(left_out, joints, with_residual_model=True)
     except MissingExtraError as error:
         comparisons.append(ModelComparison.rejected(name, str(error)))
     else:
-        comparisons.append(compare(name, held, better))
+        comparisons.append(compare(name, held_out, better))
         accepted = comparisons[-1].accepted
-        held = better if accepted else held
-    return _Selection(joints, accepted, geometry, held, tuple(comparisons))
+        held_out = better if accepted else held_out
+    return _Selection(joints, accepted, geometry, held_out, tuple(comparisons))
 
 
 def _select_joint_errors(
-    arm: Arm,
-    held: HeldOutErrors,
+    data: _FoldedReadings,
+    left_out: frozenset[int],
+    geometry: HeldOutErrors,
     *,
     compare: Callable[[str, HeldOutErrors, HeldOutErrors], ModelComparison],
-    validate: Callable[[tuple[JointErrorModel, ...]], HeldOutErrors],
     comparisons: list[ModelComparison],
     report: Callable[[str], None],
 ) -> tuple[tuple[JointErrorModel, ...], HeldOutErrors]:
     """Return the error models of joints that held-out points confirm, and the held-out errors with them.
 
     Args:
-        arm: the nominal arm.
-        held: held-out errors of geometry alone.
-        compare: held-out errors without and with a candidate.
-        validate: cross-validates with some models.
-        comparisons: grows by what is tried here.
+        data: the readings.
+        left_out: folds that are left out of everything.
+        geometry: held-out errors of geometry alone.
+        compare: compares held-out errors without and with a candidate.
+        comparisons: grows by those of the candidates.
         report: called with what is being done.
     """
-    fixed = f"no joint of {arm.name} is revolute"
-    candidates = [
-        ("joint compliance under gravity", compliances(arm), f"{arm.name} has no masses"),
-        ("transmission error, first harmonic", transmission_errors(arm, 1), fixed),
-        ("transmission error, second harmonic", transmission_errors(arm, 2), fixed),
-    ]
     joints: tuple[JointErrorModel, ...] = ()
-    accepted: list[tuple[int, tuple[JointErrorModel, ...]]] = []
-    for name, more, absent in candidates:
-        if not more:
-            comparisons.append(ModelComparison.rejected(name, absent))
+    held_out = geometry
+    accepted: list[int] = []
+    for candidate in data.candidates:
+        if not candidate.models:
+            comparisons.append(ModelComparison.rejected(candidate.name, candidate.reason_for_none))
             continue
-        report(f"cross-validating: {name}")
+        report(f"cross-validating: {candidate.name}")
         try:
-            better = validate((*joints, *more))
+            better = data.held_out_errors(left_out, (*joints, *candidate.models))
         except (ContradictionError, InvalidValueError) as error:
-            comparisons.append(ModelComparison.rejected(name, str(error)))
+            comparisons.append(ModelComparison.rejected(candidate.name, str(error)))
             continue
-        comparisons.append(compare(name, held, better))
+        comparisons.append(compare(candidate.name, held_out, better))
         if comparisons[-1].accepted:
-            joints, held = (*joints, *more), better
-            accepted.append((len(comparisons) - 1, more))
-    # What was accepted first may have stood in for what came later.
-    for number, part in accepted[:-1]:
-        name = comparisons[number].name
-        report(f"cross-validating: without {name}")
-        fewer = tuple(error for error in joints if error not in part)
-        less = validate(fewer)
-        if not compare(name, less, held).accepted:
-            joints, held = fewer, less
+            joints, held_out = (*joints, *candidate.models), better
+            accepted.append(len(comparisons) - 1)
+    # A model that was accepted early may explain the same errors as a later one. Geometry is the first comparison.
+    for number in accepted[:-1]:
+        candidate = data.candidates[number - 1]
+        report(f"cross-validating: without {candidate.name}")
+        fewer = tuple(error for error in joints if error not in candidate.models)
+        without = data.held_out_errors(left_out, fewer)
+        if not compare(candidate.name, without, held_out).accepted:
+            joints, held_out = fewer, without
             comparisons[number] = comparisons[number]._replace(
                 accepted=False, reason="superfluous beside a later candidate"
             )
-    return joints, held
+    return joints, held_out
 
 
 def _errors(calibration: Calibration, model: ResidualModel | None, measured: Readings) -> HeldOutErrors:
-    """Return by how much a calibrated arm misses readings, with its residual model where they are points."""
+    """Return the errors of a calibrated arm at readings; its residual model applies to points only."""
     errors, points = held_out_errors(calibration, measured), measured.with_point & (measured.frame == 0)
     if model is not None and points.any():
         errors.positions[points] += model.shift(measured.q[points])
