@@ -201,8 +201,8 @@ def test_joint_that_never_moved(arm: Arm, write: Write) -> None:
 
     assert measured.warnings == (
         (
-            "joint 2 never moved: it stands at 20 deg in all 2 rows. What it and its neighbours are off by cannot be "
-            "told apart"
+            "joint 2 never moved: it is at 20 deg in all 2 rows. Its errors cannot be distinguished from those of its "
+            "neighbours"
         ),
     )
 
@@ -214,7 +214,7 @@ def test_copies(arm: Arm, write: Write) -> None:
     measured = read_measurements(write(table(HEAD, [*ROWS, again, ROWS[1]])), arm)
 
     assert measured.warnings == (
-        "line 6 says to the last digit what line 3 said: a copy counts twice and tells nothing",
+        "line 6 equals line 3 to the last digit: a copied row adds weight, but no information",
     )
 
 
@@ -283,7 +283,7 @@ def test_radians_for_degrees(arm: Arm, write: Write) -> None:
             "joint_1_deg,joint_2_deg,x_t_mm,y_t_mm,z_t_mm,x_dif_um,y_dif_um,z_dif_um",
             "x_dif_um: nominal coordinates and deviations must have one unit in a file, but x_t_mm has another",
         ),
-        (f"{HEAD},name,pose", "points.csv:1: pose: rows have one name, and column name has it"),
+        (f"{HEAD},name,pose", "points.csv:1: pose: rows have a single name, and column name contains it"),
     ],
 )
 def test_columns(head: str, message: str, arm: Arm, write: Write) -> None:
@@ -368,8 +368,7 @@ def test_millimetres_of_a_slide(sliding: Arm, write: Write) -> None:
     said = refused(write(table("joint_1_deg,joint_2_m,x_mm,y_mm,z_mm", ["10,250,1,2,3"])), sliding)
 
     assert said == (
-        "points.csv:2: joint_2_m: joint 2 of slider stands at 250 m, and its limits are 0.1 to 0.5 m; are the units "
-        "right?"
+        "points.csv:2: joint_2_m: joint 2 of slider is at 250 m, and its limits are 0.1 to 0.5 m; are the units right?"
     )
 
 
@@ -378,7 +377,7 @@ def test_millimetres_of_a_slide(sliding: Arm, write: Write) -> None:
     [
         (("fit", "chek", "fit"), "points.csv:3: set: expected fit or check, got 'chek'; did you mean 'check'?"),
         (("fit", "", "fit"), "points.csv:3: set: empty; expected a name, or --skip-incomplete to omit the row"),
-        (("check", "check", "check"), "points.csv: set: every row is held out to check with; none is left to fit"),
+        (("check", "check", "check"), "points.csv: set: every row is held out for validation; none is left to fit"),
     ],
 )
 def test_sets(words: tuple[str, ...], message: str, arm: Arm, write: Write) -> None:
@@ -466,17 +465,17 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
         (
             f"{HEAD},distance_mm",
             "1,2,3,4,5,1",
-            "distance_mm: from where? Expected a column anchor, or a column to with",
+            "distance_mm: expected a column anchor, or a column to with",
         ),
         (
             f"{HEAD},anchor",
             "1,2,3,4,5,wire",
-            "points.csv:1: distance_mm: no such column; anchor says from where it is",
+            "points.csv:1: distance_mm: no such column; a row with anchor has a distance",
         ),
         (
             f"{HEAD},distance_mm,to",
             "1,2,3,4,5,1,a",
-            "points.csv:1: name: no such column; to has names of rows; there are",
+            "points.csv:1: name: no such column; column to has names of rows; there are",
         ),
         (f"{HEAD},plane", "1,2,,,,", "points.csv:2: x_mm or plane: empty; expected a position, a plane or a dist"),
         (f"{HEAD},frame", "1,2,3,4,5,", "points.csv:2: frame: empty; expected a name; where one point has a frame all"),
@@ -501,7 +500,11 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
             "1,2,3,4,5,first,7,fist",
             "to: expected the name of one row, got 'fist', which 0",
         ),
-        (f"{HEAD},name,distance_mm,to", "1,2,3,4,5,first,7,first", "points.csv:2: to: a row is not away from itself"),
+        (
+            f"{HEAD},name,distance_mm,to",
+            "1,2,3,4,5,first,7,first",
+            "points.csv:2: to: expected the name of another row, got that",
+        ),
         (f"{HEAD},name,distance_mm,to,anchor", "1,2,3,4,5,a,7,b,w", "got one from both"),
         (f"{HEAD},plan", "1,2,3,4,5,t", "plan: no such column. Did you mean 'plane'?"),
     ],
@@ -559,6 +562,6 @@ def test_copies_among_many(arm: Arm, write: Write) -> None:
     rows[24_000] = rows[3]
     path = write("\n".join([HEAD, *rows, ""]))
 
-    (warning,) = (text for text in read_measurements(path, arm).warnings if "copy" in text)
+    (warning,) = (text for text in read_measurements(path, arm).warnings if "copied" in text)
 
-    assert warning.startswith("line 24002 says to the last digit what line 5 said")
+    assert warning.startswith("line 24002 equals line 5 to the last digit")

@@ -46,7 +46,7 @@ class CalibrationAssessment:
         measurements: of it.
         full: with all errors that are identifiable.
         tabular: without rotations about y, for arm files.
-        nominal: (p,) distances of the points from the nominal arm; none where it stands in another frame [m].
+        nominal: (p,) distances of the points from the nominal arm; none if it was measured in another frame [m].
         held_out: from arms calibrated without the reading, all errors.
         held_out_region: from arms calibrated without the region of the workspace in which the reading lies; None where
             a region cannot be left out.
@@ -294,33 +294,32 @@ def _notes_on_fit(full: Calibration, measurements: Measurements) -> Iterator[str
     if full.outliers:
         names = ", ".join(measurements.names[fitted[i]] for i in full.outliers[:_MAX_NAMED])
         more = f" and {len(full.outliers) - _MAX_NAMED} more" if len(full.outliers) > _MAX_NAMED else ""
-        yield f"outliers, which do not count: {names}{more}"
+        yield f"outliers, without weight in the last fit: {names}{more}"
 
 
 def _note_on_held_out(held_out: HeldOutErrors, region: HeldOutErrors | None) -> str:
-    """Return what the figures of held-out readings are good for."""
+    """Return a note on the scope of the figures of held-out readings."""
     if region is None:
         return "held out by configuration only: no region of the workspace can be left out of these readings"
     return (
-        f"held out by configuration ({held_out.distance.mean() * 1e3:.4g} mm) is for poses like those measured, by "
-        f"region ({region.distance.mean() * 1e3:.4g} mm) for poses where nothing was measured: use the second wherever "
-        f"the arm works elsewhere"
+        f"held out by configuration ({held_out.distance.mean() * 1e3:.4g} mm) is the error at poses like those "
+        f"measured, held out by region ({region.distance.mean() * 1e3:.4g} mm) that in regions without measurements"
     )
 
 
 def _notes_on_nongeometric(beyond: NongeometricCalibration | None) -> Iterator[str]:
-    """Say of which points the figures of a non-geometric calibration are."""
+    """Give a note on the points of the figures of a non-geometric calibration."""
     if beyond is None:
         return
     if beyond.nested is None:
         yield (
-            "the non-geometric model was chosen by all points that were held out, and so few leave none to assess the "
-            "choice: measure more, or keep rows to check with"
+            "all held-out points were used to select the non-geometric model, and too few readings are left for a "
+            "nested cross-validation: measure more, or reserve rows of set check"
         )
         return
     yield (
-        f"non-geometric, held out ({beyond.nested.distance.mean() * 1e3:.4g} mm) is of points that neither fit nor "
-        f"choice has used (nested cross-validation); the table of candidates has those that chose"
+        f"non-geometric, held out ({beyond.nested.distance.mean() * 1e3:.4g} mm) is a nested cross-validation: neither "
+        f"the fit nor the selection of the model has used these points, unlike those in the table of candidates"
     )
 
 
@@ -347,7 +346,7 @@ def _nongeometric_tables(beyond: NongeometricCalibration) -> Iterator[ResultTabl
         return held_out, f"{comparison.gain * 1e3:+z.4f}", f"{comparison.standard_error * 1e3:.4f}"
 
     yield ResultTable(
-        title="Non-geometric candidates, on the held-out points that chose",
+        title="Non-geometric candidates, on the held-out points of the selection",
         heads=("", "mean mm", "gain mm", "±", "accepted"),
         rows=[
             (

@@ -48,7 +48,7 @@ class Element(NamedTuple):
 
 
 class JointErrorModel(NamedTuple):
-    """How a joint deviates from the position that its encoder tells: compliance or transmission error.
+    """Deviation of a joint from the position of its encoder: compliance or transmission error.
 
     Attributes:
         name: of the error that is its coefficient.

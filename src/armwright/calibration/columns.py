@@ -73,8 +73,8 @@ def read_columns(
         units: for columns whose names have none.
 
     Returns:
-        The header; the columns that tell where the tool was, points or nominal points and deviations from them; and
-        those that tell its orientation. Either may be empty.
+        The header; the columns of the position of the tool, points or nominal points and deviations from them; and
+        those of its orientation. Either may be empty.
 
     Raises:
         FileFormatError: the file is missing or empty; a column is missing, unknown, there twice or without unit; joints
@@ -106,10 +106,10 @@ def _require_related(header: Header) -> None:
     """Refuse columns that lack what they belong to."""
     labels = header.columns_present(NAMES)
     if len(labels) > 1:
-        raise header.error(labels[1], f"rows have one name, and column {labels[0]} has it")
+        raise header.error(labels[1], f"rows have a single name, and column {labels[0]} contains it")
     if DISTANCE in header and not header.columns_present(("anchor", "to")):
-        raise header.error(DISTANCE, "from where? Expected a column anchor, or a column to with names of rows")
+        raise header.error(DISTANCE, "expected a column anchor, or a column to with names of rows, beside it")
     for name in header.columns_present(("anchor", "to")):
-        header.require([DISTANCE], f"{name} says from where it is")
+        header.require([DISTANCE], f"a row with {name} has a distance")
     if "to" in header and not labels:
-        header.require(["name"], "to has names of rows")
+        header.require(["name"], "column to has names of rows")

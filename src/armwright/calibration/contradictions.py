@@ -1,7 +1,7 @@
-"""Signs that readings contradict an arm though its fit looks good: outliers that share a joint, impossible errors.
+"""Tests of whether readings contradict an arm in spite of small residuals: outliers that share a joint, large errors.
 
-A joint whose encoder turns another joint too (q3 = a2 q2 + q3, as on palletisers), one in other units or of the other
-sign, makes outliers of readings as soon as it moves. A robust fit then drops all of them and is sure of the rest.
+If a joint is coupled to another (q3 = a2 q2 + q3, as on palletisers), or its column has another unit or sign, readings
+become outliers as soon as it moves. A robust fit then discards all of them, and the residuals of the others are small.
 """
 
 from __future__ import annotations
@@ -15,15 +15,14 @@ from armwright.arrays import Array, Flags, positive
 from armwright.calibration.fitting import CHECKS, PRIOR_SIGMA_ANGLE, PRIOR_SIGMA_LENGTH, Calibration
 from armwright.calibration.readings import Readings
 
-# A hypothesis is rejected at this level of significance; so few outliers are not tested, and so large a part of all is
-# too many.
-_SIGNIFICANCE, _MIN_COUNT, _MANY = 1e-4, 5, 0.2
-# Errors of a link that are larger than so many prior sigmas are no errors of a link.
+# Level of significance; the smallest number of outliers that is tested; and the largest part of outliers.
+_SIGNIFICANCE, _MIN_COUNT, _MAX_OUTLIERS = 1e-4, 5, 0.2
+# The largest error of a link, in standard deviations of its prior.
 _MAX_SIGMAS = 3.0
 
 
 def find_contradictions(calibration: Calibration, measured: Readings, noise: float | None = None) -> Iterator[str]:
-    """Give the reasons, in words, for which readings contradict the arm that was fitted to them.
+    """Give the reasons, as text, for which the readings contradict the fitted arm.
 
     Args:
         calibration: of the arm.
@@ -39,13 +38,13 @@ def find_contradictions(calibration: Calibration, measured: Readings, noise: flo
     shared = _shared_joint(measured.q, outlying) if _MIN_COUNT <= count <= len(measured) - _MIN_COUNT else None
     if shared is not None:
         yield (
-            f"the {count} readings that do not count are those in which joint {shared + 1} is elsewhere "
-            f"than in the {len(measured) - count} that do; the residuals of the rest say nothing of it: {CHECKS}"
+            f"the {count} outliers differ from the other {len(measured) - count} readings in the position of joint "
+            f"{shared + 1}, so that the residuals of the others do not test that joint: {CHECKS}"
         )
-    elif outlying.mean() > _MANY:
+    elif outlying.mean() > _MAX_OUTLIERS:
         yield (
-            f"{count} of {len(measured)} readings do not count, and a fit that leaves out so many "
-            f"praises the rest: {CHECKS}"
+            f"{count} of {len(measured)} readings are outliers, so many that the residuals of the others do not "
+            f"confirm the model: {CHECKS}"
         )
     lengths = dict(zip(calibration.model.names, calibration.model.is_length, strict=True))
     impossible = [
@@ -55,13 +54,13 @@ def find_contradictions(calibration: Calibration, measured: Readings, noise: flo
         and abs(value) > _MAX_SIGMAS * (PRIOR_SIGMA_LENGTH if lengths[name] else PRIOR_SIGMA_ANGLE)
     ]
     if impossible:
-        yield f"{', '.join(impossible)}: no link is made so badly; {CHECKS}"
+        yield f"{', '.join(impossible)}: larger than any manufacturing error of a link; {CHECKS}"
     if noise is not None:
         yield from _excess_residuals(calibration, measured, noise)
 
 
 def _excess_residuals(calibration: Calibration, measured: Readings, noise: float) -> Iterator[str]:
-    """Test by chi-square whether the residuals are larger than the stated noise makes them."""
+    """Give a message if a chi-square test finds larger residuals than the stated noise explains."""
     positive(noise, "noise", "m")
     residuals = calibration.model.residuals(measured, calibration.errors)
     # Lengths have their share of the degrees of freedom.
@@ -71,13 +70,13 @@ def _excess_residuals(calibration: Calibration, measured: Readings, noise: float
     if p_value < _SIGNIFICANCE:
         yield (
             f"the residuals have a standard deviation of {calibration.noise.length * 1e3:.3g} mm per coordinate, "
-            f"{ratio:.3g} times the {noise * 1e3:.3g} mm that are stated, which comes by chance in {100 * p_value:.2g} "
-            f"% of cases: the geometry of this arm does not explain the readings; --beyond tries what else may"
+            f"{ratio:.3g} times the stated {noise * 1e3:.3g} mm (chi-square test, p = {p_value:.2g}): the geometry of "
+            f"this arm does not explain the readings; --beyond tries non-geometric models"
         )
 
 
 def _shared_joint(q: Array, outlying: Flags) -> int | None:
-    """Return the joint, from 0, by which outliers differ most from the others; None if that may be chance."""
+    """Return the joint, from 0, by which outliers differ most from the others; None if it is not significant."""
     joints = [i for i in range(q.shape[1]) if np.ptp(q[:, i]) > 0]
     p_values = []
     for i in joints:

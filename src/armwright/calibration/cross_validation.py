@@ -1,4 +1,4 @@
-"""Cross-validation of a calibration: by how much it misses readings that it was not fitted to."""
+"""Cross-validation of a calibration: the errors at readings that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FOLDS = 5
 
 
 class HeldOutErrors(NamedTuple):
-    """By how much readings miss arms that were calibrated without them.
+    """Errors of readings, each predicted by an arm that was calibrated without it.
 
     Attributes:
         distance: (m,) between tool and reading [m].
@@ -48,7 +48,7 @@ class HeldOutErrors(NamedTuple):
 
 
 def held_out_errors(calibration: Calibration, measured: Readings) -> HeldOutErrors:
-    """Return by how much a calibrated arm misses readings."""
+    """Return the errors of a calibrated arm at readings."""
     errors = calibration.model.pose_errors(measured, calibration.errors)
     return HeldOutErrors(errors.distance, errors.angle, calibration.predict(measured.q))
 
@@ -96,7 +96,7 @@ def cross_validate(
     without: Sequence[str] = (),
     regions: bool = False,
 ) -> HeldOutErrors:
-    """Return by how much each reading misses an arm that was calibrated without it.
+    """Return the error of each reading, predicted by an arm that was calibrated without it.
 
     Configurations are assigned to folds at random; each fold is compared with a calibration by all others.
 
@@ -178,7 +178,7 @@ def _configurations_for_folds(q: Array, folds: int) -> tuple[Numbers, int]:
 def distinct_configurations(q: Array) -> Numbers:
     """Return by number which configuration each row (m, n) has, in the order of their first rows.
 
-    Positions that encoders tell are never quite the same: rows that differ by less than a tenth of a milliradian or
+    Positions of encoders are never exactly equal: rows that differ by less than a tenth of a milliradian or
     millimetre are one configuration.
     """
     rows = len(q)

@@ -63,7 +63,7 @@ _JOINT_ERROR_FACTOR = 0.05
 # What may be wrong where an arm and its readings do not belong together.
 CHECKS = (
     "check the units, the sign and the zero of the joint, the order of the columns, and whether a joint is coupled to "
-    "another (q3 = a2 q2 + q3, as on palletisers), which arm files cannot say"
+    "another (q3 = a2 q2 + q3, as on palletisers), which arm files cannot represent"
 )
 
 
@@ -76,8 +76,8 @@ class Calibration:
         identifiability: which errors are fitted, and why the others are not.
         errors: (k,) all errors, 0 where they are fixed [m], [rad].
         covariance: (f, f) of the errors that are fitted.
-        before: by how much each of m readings misses the nominal arm, its base best-fitted.
-        after: by how much it misses the corrected arm.
+        before: residuals of m readings with the nominal arm, its base best-fitted.
+        after: residuals with the corrected arm.
         noise: of the measurement, from the residuals.
         degrees_of_freedom: how many more numbers were measured than errors fitted, without outliers.
         outliers: numbers of readings whose residuals are too large for the noise; they do not count.
@@ -264,7 +264,7 @@ def _select_and_fit(
     max_standard_error = _by_error_type(model, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE)
     errors, fitted = np.zeros(len(model.names)), tuple[int, ...]()
     rounds: list[tuple[Identifiability, Array, Noise]] = []
-    # Before anything is fitted, the residuals say nothing of the noise.
+    # Before anything is fitted, the residuals do not estimate the noise.
     start = median_noise(model.residuals(measured), 0)
     noise = before = Noise(*map(min, start, TYPICAL_NOISE))
     for _ in range(_ROUNDS):
@@ -291,8 +291,8 @@ def _select_and_fit(
             break
         if not selected.fitted:
             raise ContradictionError(
-                f"what {model.chain.arm.name} misses its readings by, {noise.length * 1e3:.3g} mm, hides every error "
-                f"that it may have: are these its readings? If so, {CHECKS}"
+                f"the residuals of {model.chain.arm.name}, {noise.length * 1e3:.3g} mm, are too large for any of its "
+                f"errors to be identifiable: are these its readings? If so, {CHECKS}"
             )
         fitted, before = selected.fitted, noise
         if not is_overdetermined(count, len(fitted)):

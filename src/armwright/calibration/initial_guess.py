@@ -73,27 +73,27 @@ def initial_guess(
     distance = float(np.median(errors.distance))
     if distance > _MAX_DISTANCE:
         raise ContradictionError(
-            f"the points lie {distance * 1e3:.0f} mm from where {arm.name} would have its tool, wherever it stands: "
-            f"are these its joints, in this order and these units?"
+            f"the median distance of the points from the tool of {arm.name} is {distance * 1e3:.4g} mm"
+            f"{'' if is_base_known else ' with its base best-fitted'}: are these its joints, in this order and these "
+            f"units?"
         )
     angles = errors.angle[readings.with_rotation]
     # Points on a line leave a rotation of the base about it free, which the fit estimates.
     if len(angles) and np.median(angles) > _MAX_ANGLE and (is_base_known or not _are_collinear(readings.points[first])):
         raise ContradictionError(
-            f"half of the poses are rotated {np.degrees(np.median(angles)):.0f} degrees or more from where {arm.name} "
-            f"would have its tool, however the target is fixed to it: are these its rotations, in this order and "
-            f"these units?"
+            f"the median rotation of the poses from the tool of {arm.name} is {np.degrees(np.median(angles)):.0f} "
+            f"degrees with the target best-fitted: are these its rotations, in this order and these units?"
         )
     return model
 
 
 def register_base(chain: Chain, q: Array, points: Array) -> Array:
-    """Return (4, 4) the base frame that brings the nominal arm nearest to the points."""
+    """Return (4, 4) the base frame with which the nominal arm fits the points best."""
     return _rigid_motion(chain.forward(q).position, points)
 
 
 def _rigid_motion(points: Array, goals: Array) -> Array:
-    """Return the pose (4, 4) that brings points nearest to goals.
+    """Return the pose (4, 4) that maps points to goals with the least squares of distances.
 
     Source:
         Kabsch (1976).
@@ -125,7 +125,7 @@ def _mean_distance_from_centre(points: Array) -> float:
 
 
 def _target_rotation(chain: Chain, readings: Readings, frames: Sequence[Array]) -> Array:
-    """Return (3, 3) the rotation of the measured target in the tool; none where it is small enough to be an error."""
+    """Return (3, 3) the rotation of the measured target in the tool; none where it is within the errors of the tool."""
     which = np.flatnonzero(readings.with_rotation)
     if not len(which):
         return np.eye(3)
@@ -139,11 +139,11 @@ def _initial_frame(chain: Chain, readings: Readings, number: int) -> Array:
     which = readings.with_point & (readings.frame == number)
     measured, name = readings.points[which], readings.frames[number]
     if not which.any():
-        return np.eye(4)  # nothing is read in it here
+        return np.eye(4)  # these readings have no points in it
     if _are_collinear(measured):
         raise TooFewError(
             f"frame {name}: {len(measured)} points"
-            f"{' on a line' if len(measured) > 2 else ''} do not tell where it stands; measure 3 or more that are not "
+            f"{' on a line' if len(measured) > 2 else ''} do not determine its pose; measure 3 or more that are not "
             f"on a line"
         )
     return _rigid_motion(measured, chain.forward(readings.q[which]).position)
@@ -158,7 +158,7 @@ def _are_collinear(points: Array) -> bool:
 
 
 def _initial_plane(chain: Chain, readings: Readings, number: int) -> Plane:
-    """Return the plane nearest to the points at which the nominal arm would have touched it."""
+    """Return the best-fit plane of the points at which the nominal arm touches it."""
     which = readings.plane == number
     if not which.any():
         return Plane(np.zeros(3), np.eye(3))
@@ -179,7 +179,7 @@ def _initial_anchor(chain: Chain, readings: Readings, number: int) -> Array:
     def residuals(position: Array) -> Array:
         return np.asarray(np.linalg.norm(points - position, axis=1) - distances, dtype=np.float64)
 
-    # From all sides: points near a plane have an image of the anchor behind it.
+    # From all sides: if the points are near a plane, the mirror image of the anchor is a local minimum.
     centre, radius = points.mean(axis=0), float(np.median(distances))
     starts = [centre + radius * sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
     solutions = [least_squares(residuals, start, loss="soft_l1", f_scale=1e-2) for start in starts]
@@ -189,4 +189,4 @@ def _initial_anchor(chain: Chain, readings: Readings, number: int) -> Array:
 
 def _refuse_few(what: str, name: str, count: int, of: str) -> None:
     if count < 4:
-        raise TooFewError(f"{what} {name}: {count} {of} only tell where it is; measure 4 or more")
+        raise TooFewError(f"{what} {name}: {count} {of} do not determine its position; measure 4 or more")

@@ -1,4 +1,4 @@
-"""What was measured of an arm, from CSV whose column names have units.
+"""Measurements of an arm, from CSV whose column names have units.
 
 One row for each measurement: ``joint_1_deg, joint_2_deg, ...`` and what was measured in that joint configuration:
 
@@ -9,7 +9,7 @@ One row for each measurement: ``joint_1_deg, joint_2_deg, ...`` and what was mea
 - ``distance_mm`` from an ``anchor``, or ``to`` the tool in the row of that name.
 
 Cells may be empty where a row has something else. ``set`` marks the rows that are held out to check with, and ``name``
-names the rows. docs/tables.md says how columns may be named.
+names the rows. docs/tables.md describes the names of columns.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from armwright.spatial.rotations import rotation_from_quaternion
 _SETS = ("fit", "check")
 # A joint whose positions differ by less has not moved [rad], [m].
 _MIN_MOTION = 1e-6
-# Limits of a slide that are gone beyond by so many times its way are in another unit.
+# A prismatic joint is in another unit if it exceeds its limits by this multiple of its range.
 _MAX_LIMIT_EXCESS = 20.0
-# Turning joints that all stay within so many degrees may be in radians [deg].
+# Revolute joints that all stay within this angle may be in radians [deg].
 _MAX_RADIANS = 2 * math.pi
 # How many lines a warning names.
 _SHOWN = 5
@@ -50,14 +50,14 @@ _QUATERNION_TOLERANCE = 1e-3
 
 @attrs.frozen(kw_only=True, eq=False)
 class Measurements:
-    """What was measured of an arm.
+    """Measurements of an arm.
 
     Attributes:
-        path: where it was read.
+        path: of the file.
         readings: m of them.
         names: of the readings; their lines in the file where it names none.
-        check: (m,) whether each is kept to check with, not to fit.
-        warnings: what is odd but may be so.
+        check: (m,) whether each is reserved for validation.
+        warnings: of unusual readings.
     """
 
     path: Path
@@ -73,7 +73,7 @@ class Measurements:
 
     @property
     def points(self) -> Array:
-        """(m, 3) where the tool was; NaN where that was not measured [m]."""
+        """(m, 3) positions of the tool; NaN where they were not measured [m]."""
         return self.readings.points
 
 
@@ -206,18 +206,18 @@ def _other_configurations(table: UnitTable, q: Array, distances: Array) -> Array
             hint = f"; did you mean {near}?" if near and not rows else ""
             raise table.error(i, "to", f"expected the name of one row, got '{to}', which {len(rows)} rows have{hint}")
         if rows[0] == i:
-            raise table.error(i, "to", "a row is not away from itself")
+            raise table.error(i, "to", "expected the name of another row, got that of the row itself")
         other[i] = q[rows[0]]
     return other
 
 
 def _check_flags(table: UnitTable) -> Flags:
-    """Return which rows are held out to check with."""
+    """Return which rows are held out for validation."""
     if "set" not in table:
         return np.zeros(len(table), dtype=np.bool_)
     check = np.array([table.choice("set", i, _SETS) == "check" for i in range(len(table))], dtype=np.bool_)
     if check.all():
-        raise FileFormatError(table.path, None, "set", "every row is held out to check with; none is left to fit")
+        raise FileFormatError(table.path, None, "set", "every row is held out for validation; none is left to fit")
     return check
 
 
@@ -239,20 +239,20 @@ def _refuse_other_units(table: UnitTable, arm: Arm, q: Array, headings: Sequence
             raise table.error(
                 worst,
                 heading.column.name,
-                f"{arm.called(i)} of {arm.name} stands at {q[worst, i]:.4g} m, and its limits are {lower:.4g} to "
+                f"{arm.called(i)} of {arm.name} is at {q[worst, i]:.4g} m, and its limits are {lower:.4g} to "
                 f"{upper:.4g} m; are the units right?",
             )
 
 
 def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequence[Heading]) -> tuple[str, ...]:
-    """Return what is odd but may be so."""
+    """Return warnings of unusual readings."""
     texts, q = [], readings.q
     for i, (joint, heading) in enumerate(zip(arm.joints, headings, strict=True)):
         scale, unit = heading.scale, heading.unit
         if len(q) > 1 and np.ptp(q[:, i]) < _MIN_MOTION:
             texts.append(
-                f"{arm.called(i)} never moved: it stands at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. What it "
-                f"and its neighbours are off by cannot be told apart"
+                f"{arm.called(i)} never moved: it is at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. Its errors "
+                f"cannot be distinguished from those of its neighbours"
             )
         beyond = (q[:, i] < joint.limits.lower - _MIN_MOTION) | (q[:, i] > joint.limits.upper + _MIN_MOTION)
         if beyond.any():
@@ -270,11 +270,11 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequ
 
 
 def _duplicate_warnings(readings: Readings, lines: Sequence[int]) -> list[str]:
-    """Return a warning of rows that say the same to the last digit, which no second measurement does."""
-    told = [readings.q, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
+    """Return a warning of rows that are equal to the last digit, which independent measurements never are."""
+    quantities = [readings.q, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
 
     def row_bytes(rows: slice) -> list[bytes]:
-        return [row.tobytes() for row in np.hstack([part[rows] for part in told]) + 0.0]  # -0.0 + 0.0 is 0.0
+        return [row.tobytes() for row in np.hstack([part[rows] for part in quantities]) + 0.0]  # -0.0 + 0.0 is 0.0
 
     # Whole rows are compared where their hashes agree alone: those of a million rows take little room.
     blocks = (slice(start, start + _BLOCK_ROWS) for start in range(0, len(readings), _BLOCK_ROWS))
@@ -292,8 +292,8 @@ def _duplicate_warnings(readings: Readings, lines: Sequence[int]) -> list[str]:
         return []
     return [
         (
-            f"{_lines_of_rows(copies, lines)} {'says' if len(copies) == 1 else 'say'} to the last digit what "
-            f"{_lines_of_rows(originals, lines)} said: a copy counts twice and tells nothing"
+            f"{_lines_of_rows(copies, lines)} {'equals' if len(copies) == 1 else 'equal'} "
+            f"{_lines_of_rows(originals, lines)} to the last digit: a copied row adds weight, but no information"
         )
     ]
 

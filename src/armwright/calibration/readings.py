@@ -1,4 +1,4 @@
-"""What was measured of an arm: points, poses, planes that were touched, distances.
+"""Readings of an arm: points, poses, planes that were touched, distances.
 
 A reading is a joint configuration and what was measured in it: the position of the tool, or its pose; contact with a
 plane; or the distance from a fixed anchor, or from the position of the tool in another configuration. Points may refer
@@ -31,21 +31,21 @@ def _nan_array(m: int, *shape: int) -> Array:
 
 
 def _nan_or_read_only(array: Array) -> Array:
-    """Return a copy that cannot be written to; of what no reading tells there is one NaN, which takes no room."""
+    """Return a read-only copy; an array of nothing but NaN shares a single NaN in memory."""
     return np.broadcast_to(np.nan, array.shape) if np.isnan(array).all() else read_only(array)
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Readings:
-    """Measurements of an arm of n joints, m of them. What a reading does not tell is NaN, or -1.
+    """Measurements of an arm of n joints, m of them. What was not measured is NaN, or -1.
 
     Attributes:
         q: (m, n) joint positions [rad] or [m].
-        points: (m, 3) where the tool was [m].
-        rotations: (m, 3, 3) how it was turned.
-        frame: (m,) number of the frame in which that is told; the first is that of the measurements.
+        points: (m, 3) positions of the tool [m].
+        rotations: (m, 3, 3) its rotations.
+        frame: (m,) number of the frame of these; the first is that of the measurements.
         plane: (m,) number of the plane that was touched.
-        distances: (m,) from an anchor, or from where the tool was in another configuration [m].
+        distances: (m,) from an anchor, or from the tool in another configuration [m].
         anchor: (m,) number of the anchor.
         other: (m, n) the other configuration [rad] or [m].
         frames: names of the frames.
@@ -75,12 +75,12 @@ class Readings:
 
     @property
     def with_point(self) -> Flags:
-        """(m,) which tell a point."""
+        """(m,) which have a point."""
         return np.isfinite(self.points[:, 0])
 
     @property
     def with_rotation(self) -> Flags:
-        """(m,) which tell a rotation."""
+        """(m,) which have a rotation."""
         return np.isfinite(self.rotations[:, 0, 0])
 
 
@@ -98,10 +98,10 @@ def readings(
 
     Args:
         q: (m, n) joint positions [rad] or [m].
-        points: (m, 3) where the tool was [m], or (m, 4, 4) how it stood.
-        frame: (m,) names of the frames in which that is told; one frame for all when left out.
+        points: (m, 3) positions of the tool [m], or (m, 4, 4) its poses.
+        frame: (m,) names of the frames of these; one frame for all when left out.
         plane: (m,) names of the planes that the tool touched.
-        distances: (m,) how far the tool was from an anchor or another configuration [m].
+        distances: (m,) of the tool from an anchor, or from the tool in another configuration [m].
         anchor: (m,) names of the anchors.
         other: (m, n) the other configurations [rad] or [m].
 
@@ -128,7 +128,9 @@ def readings(
     if points is None and plane is None and distances is None:
         raise InvalidValueError("expected points, poses, planes or distances, got none of them")
     if (distances is not None) != ((anchor is not None) or (other is not None)) or None not in (anchor, other):
-        raise InvalidValueError("distances: tell from which anchor they are, or from which other configuration")
+        raise InvalidValueError(
+            "distances: expected an anchor or another configuration for each, and distances for these"
+        )
     others = _nan_array(m, n) if other is None else exact_shape(np.atleast_2d(floats(other, "other")), (m, n), "other")
     frames = [""] * m if frame is None and points is not None else _label_list(frame, m, "frame")
     labels = number_labels(frame=frames, plane=_label_list(plane, m, "plane"), anchor=_label_list(anchor, m, "anchor"))
@@ -164,7 +166,7 @@ def concatenate(*parts: Readings) -> Readings:
 
 
 def refuse_unlocated(fitted: Readings, others: Readings) -> None:
-    """Refuse readings whose frame, plane or anchor no reading tells that is fitted: nothing says where it is.
+    """Refuse readings whose frame, plane or anchor is that of no fitted reading: its pose is not estimated.
 
     Raises:
         InvalidValueError: there are some.
@@ -174,8 +176,8 @@ def refuse_unlocated(fitted: Readings, others: Readings) -> None:
         unknown = sorted(set(numbers.tolist()) - set(getattr(fitted, what).tolist()) - {-1})
         if unknown:
             raise InvalidValueError(
-                f"{what} {names[unknown[0]]}: no reading that is fitted tells where it is, so that the "
-                f"{int((numbers == unknown[0]).sum())} others in it cannot be held against the arm"
+                f"{what} {names[unknown[0]]}: no fitted reading locates it, so that the "
+                f"{int((numbers == unknown[0]).sum())} other readings with it cannot be compared with the arm"
             )
 
 
