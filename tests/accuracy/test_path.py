@@ -228,8 +228,8 @@ def test_through_the_band_between_samples() -> None:
 def test_posing_time() -> None:
     """From leaving the first position by 1 mm to the band of the second: 100 mm in 1 s after half a second of rest."""
     t = np.linspace(0, 5, 501)
-    x = np.clip(t - 0.5, 0, 1) * 0.1
-    run = Trace(positions=np.stack([x, 0 * x, 0 * x], axis=1), times=t)
+    x = 0.3 + np.clip(t - 0.5, 0, 1) * 0.1
+    run = Trace(positions=np.stack([x, 0 * x, 0 * x + 0.2], axis=1), times=t)
 
     result = posing_time([run] * 3, 1e-3)
 

@@ -169,3 +169,10 @@ def test_unknown_measure() -> None:
         manipulability(arm, np.zeros(6), motion="linar")  # type: ignore[arg-type]
     with pytest.raises(InvalidValueError, match="length: expected a characteristic length above 0"):
         manipulability(arm, np.zeros(6), length=0.0)
+
+
+def test_manipulability_without_motion() -> None:
+    """A tool on the axis of the only joint cannot be displaced: its inverse condition number is 0."""
+    arm = Arm(name="pin", joints=[Joint(kind="revolute")])
+
+    assert manipulability(arm, [0.3], measure="inverse-condition", motion="linear") == 0.0
