@@ -14,7 +14,7 @@ from armwright.cell.simulator import Simulator
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
 from armwright.program import Source, compile as compile_program, known_cell
-from armwright.program.vm.interpreter import interpret, warnings as warnings_of
+from armwright.program.vm.interpreter import interpret, motion_warnings as warnings_of
 from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import homogeneous
 from oracles.with_pinocchio import pinocchio_model, with_rotors

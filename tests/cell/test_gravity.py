@@ -32,7 +32,7 @@ from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.solver import solver_of
 from armwright.motion.straight import straight_line
 from armwright.program import Source, compile as compile_program, known_cell
-from armwright.program.vm.interpreter import interpret, warnings as warnings_of
+from armwright.program.vm.interpreter import interpret, motion_warnings as warnings_of
 from armwright.program.vm.recording import Recording
 from armwright.simulation.simulator import simulate
 from armwright.spatial.poses import homogeneous

@@ -113,7 +113,7 @@ def test_many_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of many lines that come at once the first and the last are shown, and how many there are between."""
     program = tmp_path / "many.rlo"
     program.write_text('VAR i : SCALAR ;\nBEGIN\n  FOR i = 1 TO 20000 DO PRINT("again") ;\nEND.\n')
-    monkeypatch.setattr(excerpt, "ON_A_TERMINAL", 4)
+    monkeypatch.setattr(excerpt, "MAX_TERMINAL_LINES", 4)
 
     done = CliRunner().invoke(app, ["debug", str(program), "--cell", str(STANFORD)], input="c\nq\n")
 

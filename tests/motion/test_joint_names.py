@@ -17,7 +17,7 @@ from armwright.motion.plan import Obstacle
 from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.straight import straight_line
 from armwright.motion.time_optimal_path import time_optimal
-from armwright.program.vm.move_diagnostics import stopped
+from armwright.program.vm.move_diagnostics import obstacle_message
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
@@ -97,4 +97,5 @@ def test_program() -> None:
         cause="limits", reason="", joint=3, pose=0, fraction=0.5, length=0.2, place=np.zeros(3), certain=False
     )
 
-    assert stopped(obstacle, "f", "ARM_1", PUMA) == "the path to `f` leads joint 3 ('elbow') of ARM_1 beyond its limits"
+    message = obstacle_message(obstacle, "f", "ARM_1", PUMA)
+    assert message == "the path to `f` leads joint 3 ('elbow') of ARM_1 beyond its limits"

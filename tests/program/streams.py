@@ -5,7 +5,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.motion.polynomials import derivative, extremes, shifted
-from armwright.program.vm.recording import Recording, RunStage, motion_rows
+from armwright.program.vm.recording import Recording, RunStage, motion_csv_lines
 
 # What a limit may be exceeded by.
 AT_MOST = 1.001
@@ -45,7 +45,7 @@ class Differences:
 
 def differences(recording: Recording) -> Differences:
     """Return what differences over one tick come to in what a run writes into motion.csv."""
-    rows = [line.split(",") for line in list(motion_rows(recording.streams))[1:]]
+    rows = [line.split(",") for line in list(motion_csv_lines(recording.streams))[1:]]
     worst = Differences(speed=0.0, acceleration=0.0, off=0.0)
     for name in recording.cell.arms:
         worst = worst.worst(_of_arm(recording, name, [row for row in rows if row[1] == name]))

@@ -17,8 +17,8 @@ from armwright.motion.path import report_speed
 from armwright.program import compile as compile_program, known_cell
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
-from armwright.program.vm.interpreter import RunError, interpret, warnings
-from armwright.program.vm.move_diagnostics import note_of
+from armwright.program.vm.interpreter import RunError, interpret, motion_warnings
+from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Recording, RunStage
 from armwright.spatial.rotations import angle_between
 
@@ -92,14 +92,14 @@ def test_the_warning(by: Around) -> None:
     """A line that is gone round is told at its MOVE, with the place and cause of the error, the way and the price."""
     recording = run(SEAM, cell(around=by))
 
-    (warning,) = warnings(recording.stages, recording.cell)
+    (warning,) = motion_warnings(recording.stages, recording.cell)
     assert (warning.code, warning.is_error) == ("W402", False)
     assert SEAM[warning.span.start : warning.span.end] == "MOVE ARM_1 TO bottom STRAIGHTLY"
     assert "the straight line to `bottom`" in warning.message
     assert stops(SEAM, cell()).notes[0] in warning.notes[0]
     assert ("via pose" if by == "via" else "damped least squares") in warning.notes[1]
     assert re.search(r"[\d.]+ mm off the line, [\d.]+ mrad, \+[\d.]+ s$", warning.message)
-    assert "the straight line is infeasible at 50 % of the path" in note_of(the_line(recording))
+    assert "the straight line is infeasible at 50 % of the path" in stage_note(the_line(recording))
 
 
 @pytest.mark.parametrize("by", ["via", "damped"])
@@ -150,7 +150,7 @@ def test_no_way_round_where_none_is_needed() -> None:
     plain, asked = run(text, cell()), run(text, cell(around="via"))
 
     np.testing.assert_array_equal(asked.streams[0].q, plain.streams[0].q)
-    assert warnings(asked.stages, asked.cell) == warnings(plain.stages, plain.cell)
+    assert motion_warnings(asked.stages, asked.cell) == motion_warnings(plain.stages, plain.cell)
 
 
 def test_round_a_limit() -> None:
@@ -162,7 +162,7 @@ def test_round_a_limit() -> None:
 
     assert error.code == "E402"
     assert "leads joint 3 of ARM_1 beyond its limits" in error.message
-    (warning,) = warnings(recording.stages, recording.cell)
+    (warning,) = motion_warnings(recording.stages, recording.cell)
     assert error.notes[0] in warning.notes[0]
     line = the_line(recording)
     assert line.stage.obstacle is not None

@@ -54,7 +54,9 @@ def test_weld() -> None:
     expect(recording, TIP=down(0.45, 0, 0.12))
     assert recording.tree.world("ARM_1")[2, 3] == pytest.approx(0.24, abs=EXACT)
     fast = run(corpus_text("p06").replace("SPEED = 20", "SPEED = 100"))
-    slow_leg, fast_leg = (next(stage for stage in one.stages if stage.to == ("finish",)) for one in (recording, fast))
+    slow_leg, fast_leg = (
+        next(stage for stage in one.stages if stage.goal_names == ("finish",)) for one in (recording, fast)
+    )
     peaks = []
     for leg in (slow_leg.stage, fast_leg.stage):
         t = np.linspace(0.0, leg.trajectory.duration, 4001)

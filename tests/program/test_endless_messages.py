@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from armwright.files.message_stream import MessageStream
-from armwright.program.debugger.dap_messages import Noise, messages
+from armwright.program.debugger.dap_messages import InvalidMessage, read_messages
 
 TOO_LARGE = "a message is too large: the limit is 16 MB (`armwright --raise message_mb=NUMBER ...`"
 TOO_LONG = "the header of a message is too large: the limit is 8,192 bytes"
@@ -32,8 +32,8 @@ def test_too_large(header: bytes, said: str) -> None:
     assert incoming.refused.startswith(said)
     assert incoming.readline() == b""
 
-    *_, last = messages(io.BytesIO(header))
-    assert isinstance(last, Noise)
+    *_, last = read_messages(io.BytesIO(header))
+    assert isinstance(last, InvalidMessage)
     assert last.text.startswith(said)
     assert last.text.endswith("the connection ends")
 

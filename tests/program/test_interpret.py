@@ -14,7 +14,7 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
 from armwright.program import compile as compile_program, known_cell
 from armwright.program.language.source import Source
-from armwright.program.vm.interpreter import RunError, interpret, warnings
+from armwright.program.vm.interpreter import RunError, interpret, motion_warnings
 from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import homogeneous
 
@@ -349,7 +349,7 @@ def test_effort_over_the_limit_is_a_warning() -> None:
     compiled = compile_program(Source("t.rlo", (EXAMPLES / "stacking.rlo").read_text()), known_cell(weak))
     assert compiled.code is not None
 
-    found = warnings(interpret(compiled.code, weak, Simulator(weak)).stages, weak)
+    found = motion_warnings(interpret(compiled.code, weak, Simulator(weak)).stages, weak)
 
     assert [one.code for one in found] == ["W401"] * 3  # one for each MOVE: joint 2 alone is weak
     assert "joint 2 of ARM_1 would need" in found[0].message

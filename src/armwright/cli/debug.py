@@ -10,7 +10,7 @@ from armwright.errors import ExitStatus
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.program.debugger.dap_session import Launch, Loaded
+    from armwright.program.debugger.dap_session import LaunchRequest, LoadedProgram
     from armwright.program.vm.recording import Recording
 
 
@@ -38,9 +38,11 @@ def debug(
         _serve()
         return
     from armwright.cli.debug_terminal import Terminal
-    from armwright.program.debugger.dap_session import Launch, LoadError
+    from armwright.program.debugger.dap_session import LaunchRequest, LoadError
 
-    launch = Launch(program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False, strict=strict)
+    launch = LaunchRequest(
+        program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False, strict=strict
+    )
     try:
         loaded = load(launch)
     except LoadError as error:
@@ -64,7 +66,7 @@ def _serve() -> None:
     serve(incoming, outgoing, load, save)
 
 
-def load(launch: "Launch") -> "Loaded":
+def load(launch: "LaunchRequest") -> "LoadedProgram":
     """Return the compiled program of a session with its cell.
 
     Raises:
@@ -75,7 +77,7 @@ def load(launch: "Launch") -> "Loaded":
     from armwright.files.inputs import read_program
     from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
-    from armwright.program.debugger.dap_session import Loaded, LoadError
+    from armwright.program.debugger.dap_session import LoadedProgram, LoadError
     from armwright.program.diagnostics.render import render
     from armwright.program.language.diagnostic import count_line
     from armwright.program.language_server.cell_lookup import Cells
@@ -85,7 +87,9 @@ def load(launch: "Launch") -> "Loaded":
         if cell is None:
             message = f"{launch.program.name} needs a cell to run in"
             raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
-        return Loaded(code=assemble(read_program(launch.program), str(launch.program)), cell=cell, is_listed=True)
+        return LoadedProgram(
+            code=assemble(read_program(launch.program), str(launch.program)), cell=cell, is_code_file=True
+        )
     if cell is None:
         nearby = Cells().around(launch.program.parent, read_program(launch.program), None)
         cell = None if nearby is None else nearby.cell
@@ -100,17 +104,17 @@ def load(launch: "Launch") -> "Loaded":
         )
         raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
     imports = imported_files(launch.program, compiled)
-    return Loaded(code=compiled.code, cell=compiled.cell, diagnostics=compiled.diagnostics, imports=imports)
+    return LoadedProgram(code=compiled.code, cell=compiled.cell, diagnostics=compiled.diagnostics, imports=imports)
 
 
-def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
+def save(launch: "LaunchRequest", loaded: "LoadedProgram", recording: "Recording") -> str:
     """Write the results of a run as ``armwright run -o`` does; return a line with the path of the report.
 
     Raises:
         OutputError: the folder cannot be written.
     """
     from armwright.files.output import write_folder
-    from armwright.program.vm.interpreter import warnings
+    from armwright.program.vm.interpreter import motion_warnings
     from armwright.report.files import Origin, result_files, run_record
 
     assert launch.output is not None  # noqa: S101 - the session calls this only with an output
@@ -122,7 +126,7 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
         options={"std": launch.std.value, "strict": launch.strict},
     )
     failed = () if recording.failure is None else (recording.failure.diagnostic,)
-    diagnostics = (*loaded.diagnostics, *warnings(recording.stages, recording.cell), *failed)
+    diagnostics = (*loaded.diagnostics, *motion_warnings(recording.stages, recording.cell), *failed)
     results = (recording, diagnostics, origin)
     write_folder(launch.output, result_files(*results), run_record(*results))
     return f"report{' up to the failure' if failed else ''}: {launch.output / 'report.html'}"

@@ -11,9 +11,9 @@ from armwright.cli.repl_lines import Script
 from armwright.errors import ArmwrightError, ExitStatus, shortened
 
 if TYPE_CHECKING:
-    from armwright.program.debugger.dap_session import Loaded
+    from armwright.program.debugger.dap_session import LoadedProgram
     from armwright.program.debugger.debugger import Command
-    from armwright.program.debugger.history import Path
+    from armwright.program.debugger.history import ProcessPath
     from armwright.program.debugger.stop_reason import Stop
 
 _HELP = """\
@@ -53,13 +53,13 @@ _EVENT_LOG_HINT = "`armwright run -o FOLDER` writes all to events.jsonl"
 class Terminal:
     """A session of the debugger on a terminal."""
 
-    def __init__(self, loaded: "Loaded") -> None:
+    def __init__(self, loaded: "LoadedProgram") -> None:
         """Load the program."""
         from armwright.program.debugger.debugger import Debugger
 
         self._loaded = loaded
         self._debugger = Debugger(loaded.code, loaded.cell)
-        self._path: Path = ()
+        self._path: ProcessPath = ()
         self._last, self._script = "", Script()
         self._interrupted = False
         self._commands: dict[str, Callable[[str], None]] = {
@@ -134,14 +134,16 @@ class Terminal:
         self._print_stop()
 
     def _work(self) -> "Stop":
-        from armwright.program.vm.excerpt import ON_A_TERMINAL, listed
+        from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, shorten_list
 
         debugger = self._debugger
         with self._interruptible():
             while True:
-                stop = debugger.work(_SLICE)
-                news = [effect for effect in debugger.new_effects() if effect.kind not in {"PLACE", "LOCK"}]
-                for text in listed([f"{e.t1:9.3f} s  {e.text}" for e in news], ON_A_TERMINAL, _EVENT_LOG_HINT):
+                stop = debugger.run_slice(_SLICE)
+                news = [effect for effect in debugger.take_effects() if effect.kind not in {"PLACE", "LOCK"}]
+                for text in shorten_list(
+                    [f"{e.t1:9.3f} s  {e.text}" for e in news], MAX_TERMINAL_LINES, _EVENT_LOG_HINT
+                ):
                     print(text)
                 if self._interrupted and debugger.running:
                     stop = debugger.pause()
@@ -172,7 +174,7 @@ class Terminal:
             print(render([stop.diagnostic], source), end="")
         self._path = stop.path if any(process.path == stop.path for process in debugger.processes) else ()
         reason = stop.text or ("" if stop.reason in {"step", "entry"} else stop.reason)
-        if stop.over:
+        if stop.has_ended:
             print(f"{debugger.time:9.3f} s  the program has ended; `back` still undoes its statements")
             return
         frame = debugger.stack(self._path)[0]
@@ -184,20 +186,20 @@ class Terminal:
 
     def _break(self, argument: str) -> None:
         line, _, condition = argument.partition(" if ")
-        breakpoint_ = self._debugger.break_at(_number(line), condition=condition.strip())
+        breakpoint_ = self._debugger.add_breakpoint(_number(line), condition=condition.strip())
         if breakpoint_.start is None:
             print(breakpoint_.message)
-            self._debugger.forget(breakpoint_.number)
+            self._debugger.remove_breakpoint(breakpoint_.number)
         else:
             print(f"breakpoint {breakpoint_.number} in line {breakpoint_.start.line}")
 
     def _watch(self, name: str) -> None:
         variable = self._debugger.evaluate(name, self._path).slot
-        watch = self._debugger.watch(variable or name)
+        watch = self._debugger.add_watch(variable or name)
         print(f"breakpoint {watch.number}: when {name} changes")
 
     def _forget(self, number: str) -> None:
-        if not self._debugger.forget(_number(number)):
+        if not self._debugger.remove_breakpoint(_number(number)):
             print(f"there is no breakpoint {number}")
 
     # ---- inspection ------------------------------------------------------------------------------------------------
@@ -217,7 +219,7 @@ class Terminal:
     def _variables(self, _: str) -> None:
         for scope in self._debugger.scopes(self._path):
             print(scope.name)
-            for shown in scope.inside() if scope.inside else ():
+            for shown in scope.children() if scope.children else ():
                 print(f"  {shown.name} = {shown.value}  {shown.type}".rstrip())
 
     def _where(self, _: str) -> None:

@@ -152,12 +152,12 @@ class _Printer:
         """Print the effects of an input in order, and then its diagnostics."""
         from armwright.cli.programs import print_diagnostics
         from armwright.program.repl.undo_report import SILENT
-        from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
+        from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, excerpt, omission_text
 
         self.status = max(self.status, answer.status)
         effects = [effect for effect in answer.effects if effect.kind not in SILENT]
-        shown = excerpt(effects, ON_A_TERMINAL).mapped(_shown)
-        for text, style in shown.joined((more(shown.left_out, _EVENT_LOG_HINT), _DIM)):
+        shown = excerpt(effects, MAX_TERMINAL_LINES).map(_shown)
+        for text, style in shown.join((omission_text(shown.omitted, _EVENT_LOG_HINT), _DIM)):
             self._console.print(text, style=style)
         if answer.diagnostics:
             print_diagnostics(answer.diagnostics, answer.source)
@@ -184,11 +184,11 @@ class _Printer:
 
 def _shown(effect: "Effect") -> tuple[str, str]:
     """Return the text and the style of an effect."""
-    from armwright.program.vm.excerpt import one_line
+    from armwright.program.vm.excerpt import shorten_line
 
     if effect.kind == "PRINT":
-        return one_line(effect.data["printed"], _EVENT_LOG_HINT), ""
-    return f"{effect.t1:9.3f}  {one_line(effect.text, _EVENT_LOG_HINT)}", _DIM
+        return shorten_line(effect.data["printed"], _EVENT_LOG_HINT), ""
+    return f"{effect.t1:9.3f}  {shorten_line(effect.text, _EVENT_LOG_HINT)}", _DIM
 
 
 class _JsonPrinter(_Printer):

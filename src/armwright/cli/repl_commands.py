@@ -189,7 +189,7 @@ class Commands:
         from armwright.files.output import write_folder
         from armwright.program import Source, compile as compile_program, run
         from armwright.program.api import import_reader
-        from armwright.program.vm.interpreter import warnings
+        from armwright.program.vm.interpreter import motion_warnings
         from armwright.report.files import Origin, result_files, run_record
 
         session, program = self._session, folder / _PROGRAM
@@ -198,7 +198,7 @@ class Commands:
             Source(program.name, text), session.state.cell, std=session.std, read_import=import_reader(folder)
         )
         recording = run(compiled)
-        diagnostics = (*compiled.diagnostics, *warnings(recording.stages, recording.cell))
+        diagnostics = (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell))
         command = ["armwright", "run", str(program), *(["--cell", str(self._cell)] if self._cell else [])]
         origin = Origin(
             program=program,

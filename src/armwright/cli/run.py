@@ -117,14 +117,15 @@ def _finish(
     from armwright.cli.programs import print_diagnostics
     from armwright.cli.results import write_results
     from armwright.cli.terminal import console
-    from armwright.program.vm.excerpt import KEPT, NOT_KEPT
-    from armwright.program.vm.interpreter import warnings
+    from armwright.program.vm.excerpt import EVENT_LOG_HINT, NO_EVENT_LOG_HINT
+    from armwright.program.vm.interpreter import motion_warnings
     from armwright.report.files import left_out, result_files, run_record
     from armwright.report.run_summary import RunSummary, frame_table
 
     failed = () if error is None else (error.diagnostic,)
-    diagnostics = (*compiler_diagnostics, *warnings(recording.stages, recording.cell), *failed)
-    result = RunSummary(recording=recording, diagnostics=diagnostics, hint=KEPT if output else NOT_KEPT)
+    diagnostics = (*compiler_diagnostics, *motion_warnings(recording.stages, recording.cell), *failed)
+    hint = EVENT_LOG_HINT if output else NO_EVENT_LOG_HINT
+    result = RunSummary(recording=recording, diagnostics=diagnostics, hint=hint)
     notes = left_out(recording, origin.motion_rows) if output is not None else ()
     if output is not None:
         results = (recording, diagnostics, origin)

@@ -17,9 +17,9 @@ from armwright.files.inputs import hash_of_read_file
 from armwright.files.output import sha256
 from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
-from armwright.program.vm.excerpt import IN_A_LIST, KEPT, Excerpt, excerpt, listed, more
+from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
 from armwright.program.vm.machine import RunError
-from armwright.program.vm.recording import Effect, Recording, RunStage, motion_rows
+from armwright.program.vm.recording import Effect, Recording, RunStage, motion_csv_lines
 from armwright.report.page import COLLISIONS, run_page
 from armwright.report.run_data import page_of
 from armwright.spatial.poses import to_noap
@@ -65,7 +65,7 @@ def result_files(
         origin: the inputs of the run.
     """
     return {
-        "motion.csv": motion_rows(recording.streams, _written_ticks(recording, origin.motion_rows)),
+        "motion.csv": motion_csv_lines(recording.streams, _written_ticks(recording, origin.motion_rows)),
         "events.jsonl": _events(recording),
         "frames.json": _json(frames(recording)),
         "report.html": run_page(
@@ -110,7 +110,7 @@ def ending(recording: Recording) -> dict[str, Any]:
     return {"ended": "failed", "exit_status": int(RunError.exit_status), "error": error}
 
 
-def summary(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str = KEPT) -> dict[str, Any]:
+def summary(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str = EVENT_LOG_HINT) -> dict[str, Any]:
     """Return a summary of a run as plain data in SI units.
 
     Args:
@@ -123,10 +123,10 @@ def summary(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str =
         "program": source.name,
         "cell": recording.cell.name,
         "duration": recording.duration,
-        "trace": listed(recording.trace(), IN_A_LIST, hint),
+        "trace": shorten_list(recording.trace(), MAX_LIST_ITEMS, hint),
         "contacts": [
             {"line": source.line(e.span.start), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
-            for e in _contacts(recording).joined()
+            for e in _contacts(recording).join()
         ],
         "collisions": COLLISIONS,
         "stages": [_stage(stage, recording) for stage in recording.stages],
@@ -137,7 +137,7 @@ def summary(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str =
 
 def _contacts(recording: Recording) -> Excerpt[Effect]:
     # The STOP of an arm that is braked has the contact too.
-    return excerpt([e for e in recording.effects if e.kind == "MOVE" and "contact" in e.data], IN_A_LIST)
+    return excerpt([e for e in recording.effects if e.kind == "MOVE" and "contact" in e.data], MAX_LIST_ITEMS)
 
 
 def _stage(run: RunStage, recording: Recording) -> dict[str, Any]:
@@ -147,7 +147,7 @@ def _stage(run: RunStage, recording: Recording) -> dict[str, Any]:
         "line": recording.code.source.line(run.span.start),
         "arm": run.arm,
         "kind": run.stage.kind,
-        "to": list(run.to),
+        "to": list(run.goal_names),
         "speed": run.speed,
         "start": run.t0,
         "duration": motion.duration,
@@ -222,8 +222,8 @@ def left_out(recording: Recording, most_rows: int) -> tuple[str, ...]:
         recording: the recording of the run.
         most_rows: limit of the rows of ``motion.csv``.
     """
-    rows, contacts = sum(len(stream.t) for stream in recording.streams), _contacts(recording).left_out
-    more_contacts = (f"run.json lists the first and the last contacts: {more(contacts)}",) if contacts else ()
+    rows, contacts = sum(len(stream.t) for stream in recording.streams), _contacts(recording).omitted
+    more_contacts = (f"run.json lists the first and the last contacts: {omission_text(contacts)}",) if contacts else ()
     if rows <= most_rows:
         return more_contacts
     ticks = len(recording.streams[0].t)

@@ -12,8 +12,8 @@ from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell, CellArm, base_name
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.program.language.diagnostic import Diagnostic
-from armwright.program.vm.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line
-from armwright.program.vm.move_diagnostics import note_of
+from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt, omission_text, shorten_line
+from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
 from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
 from armwright.report.sticks import joints_of, sticks, thinned
@@ -40,12 +40,12 @@ def page_of(
         left_out: notes on what other files of the run omit.
     """
     source, cell, failure = recording.code.source, recording.cell, recording.failure
-    stages, fewer_stages = _fewer(recording.stages, IN_A_LIST, "stages", "all in run.json")
+    stages, fewer_stages = _fewer(recording.stages, MAX_LIST_ITEMS, "stages", "all in run.json")
     animation, fewer_frames = _animation(recording)
     status = "finished" if failure is None else f"failed: {failure.diagnostic.code} at {failure.time:.3f} s"
     reasons = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
     errors_first = sorted(diagnostics, key=lambda diagnostic: not diagnostic.is_error)
-    listed, fewer = _fewer(errors_first, IN_A_LIST, "messages", "all in run.json")
+    listed, fewer = _fewer(errors_first, MAX_LIST_ITEMS, "messages", "all in run.json")
     notes = (*reasons, *left_out, *fewer, *fewer_stages, *fewer_frames)
     return RunPage(
         title=f"{source.name} in {cell.name}" + ("" if failure is None else ": failed"),
@@ -68,24 +68,24 @@ def page_of(
     )
 
 
-def _fewer(items: Sequence[_T], most: int, name: str, hint: str = KEPT) -> tuple[list[_T], list[str]]:
+def _fewer(items: Sequence[_T], most: int, name: str, hint: str = EVENT_LOG_HINT) -> tuple[list[_T], list[str]]:
     """Return the first and last items, as many as a page can hold, and a note if others are omitted."""
     shown = excerpt(items, most)
     text = f"this page shows the first and the last {len(shown.first):,} of {len(items):,} {name}; {hint}"
-    return shown.joined(), [text] if shown.left_out else []
+    return shown.join(), [text] if shown.omitted else []
 
 
 def _effects(recording: Recording) -> list[Effect]:
     """Return the effects of a run; a line stands for those that a page cannot hold."""
     several = len(recording.processes) > 1
-    effects = excerpt(recording.effects, IN_A_LIST)
+    effects = excerpt(recording.effects, MAX_LIST_ITEMS)
 
     def shown(effect: RunEffect) -> Effect:
         number, process = recording.code.source.line(effect.span.start), effect.process if several else ""
-        return Effect(t0=effect.t0, t1=effect.t1, line=number, text=one_line(effect.text), process=process)
+        return Effect(t0=effect.t0, t1=effect.t1, line=number, text=shorten_line(effect.text), process=process)
 
-    omitted = [attrs.evolve(shown(effects.first[-1]), text=more(effects.left_out))] if effects.left_out else []
-    return effects.mapped(shown).joined(*omitted)
+    omitted = [attrs.evolve(shown(effects.first[-1]), text=omission_text(effects.omitted))] if effects.omitted else []
+    return effects.map(shown).join(*omitted)
 
 
 def _stage(run: RunStage, line: int) -> StageRow:
@@ -95,13 +95,13 @@ def _stage(run: RunStage, line: int) -> StageRow:
         line=line,
         arm=run.arm,
         kind=run.stage.kind,
-        to=run.to,
+        to=run.goal_names,
         speed=run.speed,
         peak_speed=run.motion.peaks(1).tolist(),
         peak_effort=run.peak_effort.tolist(),
         hand_length=run.length,
         deviation=run.stage.deviation,
-        note=note_of(run),
+        note=stage_note(run),
     )
 
 
@@ -130,7 +130,7 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     hands = {name: poses[:, -1] for name, poses in links.items()}
     visible = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
     names, fewer_frames = _fewer(visible, _MAX_FRAMES, "frames", "all in frames.json")
-    changes, fewer_changes = _fewer([*_tree_changes(recording, t)], IN_A_LIST, "changes of the tree of frames")
+    changes, fewer_changes = _fewer([*_tree_changes(recording, t)], MAX_LIST_ITEMS, "changes of the tree of frames")
     animation = Animation(
         fps=fps,
         t=t,

@@ -10,7 +10,7 @@ from armwright.errors import counted
 from armwright.files.result_table import ResultTable
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
-from armwright.program.vm.excerpt import ON_A_TERMINAL, Excerpt, excerpt, listed, more, one_line
+from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, Excerpt, excerpt, omission_text, shorten_line, shorten_list
 from armwright.program.vm.interpreter import RunError
 from armwright.program.vm.recording import Effect, Recording, RunStage
 from armwright.report.files import ending, summary
@@ -37,7 +37,7 @@ class RunSummary:
         if recording.failure is not None:
             return ()
         slowed = [
-            f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.to[-1]} runs "
+            f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.goal_names[-1]} runs "
             f"{run.stage.slowed}"
             for run in recording.stages
             if run.stage.slowed
@@ -48,7 +48,7 @@ class RunSummary:
             f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, "
             f"{counted(moves, 'move')}, {counted(len(recording.stages), 'stage')}, {counted(ticks, 'servo tick')}"
         )
-        return (*listed(slowed, ON_A_TERMINAL, self.hint), numbers, "Collisions are not checked.")
+        return (*shorten_list(slowed, MAX_TERMINAL_LINES, self.hint), numbers, "Collisions are not checked.")
 
     def as_data(self) -> dict[str, Any]:
         """Return the summary as plain data in SI units."""
@@ -67,20 +67,20 @@ class RunSummary:
         def row(effect: Effect) -> tuple[str, ...]:
             end = f"{effect.t1:.3f}" if effect.t1 > effect.t0 else ""
             times = str(recording.code.source.line(effect.span.start)), f"{effect.t0:.3f}", end
-            return (*times, *((effect.process,) if several else ()), one_line(effect.text, self.hint))
+            return (*times, *((effect.process,) if several else ()), shorten_line(effect.text, self.hint))
 
-        effects = excerpt([effect for effect in recording.effects if effect.kind != "PLACE"], ON_A_TERMINAL)
+        effects = excerpt([effect for effect in recording.effects if effect.kind != "PLACE"], MAX_TERMINAL_LINES)
         heads = ("line", "from s", "to s", *(("process",) if several else ()), "effect")
-        omitted = (*[""] * (len(heads) - 1), more(effects.left_out, self.hint))
-        return ResultTable(title="", heads=heads, rows=effects.mapped(row).joined(omitted), numbers=(0, 1, 2))
+        omitted = (*[""] * (len(heads) - 1), omission_text(effects.omitted, self.hint))
+        return ResultTable(title="", heads=heads, rows=effects.map(row).join(omitted), numbers=(0, 1, 2))
 
     def _stages(self) -> ResultTable:
-        stages: Excerpt[RunStage | None] = excerpt(self.recording.stages, ON_A_TERMINAL)
+        stages: Excerpt[RunStage | None] = excerpt(self.recording.stages, MAX_TERMINAL_LINES)
         rows: list[tuple[str, ...]] = []
         exceeded: list[tuple[int, int]] = []
-        for run in stages.joined(None):
+        for run in stages.join(None):
             if run is None:
-                rows.append(("", more(stages.left_out, self.hint), *[""] * 6))
+                rows.append(("", omission_text(stages.omitted, self.hint), *[""] * 6))
                 continue
             stage, limits = run.stage, self.recording.cell.arms[run.arm].arm.limits
             peaks = []
@@ -89,7 +89,7 @@ class RunSummary:
                 peaks.append(f"{shares[joint] * 100:.0f} % j{joint + 1}")
                 if shares[joint] > 1 + 1e-9:
                     exceeded.append((len(rows), column))
-            title = f"{run.arm} {stage.kind} {' '.join(run.to)}{', stopped' if run.stopped else ''}"
+            title = f"{run.arm} {stage.kind} {' '.join(run.goal_names)}{', stopped' if run.stopped else ''}"
             numbers = f"{run.t0:.3f}", f"{run.duration:.3f}", f"{run.length * 1e3:.0f}"
             deviation = "" if stage.deviation is None else f"{stage.deviation * 1e3:.3f}"
             line = str(self.recording.code.source.line(run.span.start))
@@ -113,11 +113,11 @@ def frame_table(error: RunError, code: Code) -> ResultTable:
             position = ", ".join(f"{x * 1e3:z.1f}" for x in error.tree.world(name)[:3, 3])
         return code.spelled(name), "its base" if parent == name else code.spelled(parent), position
 
-    frames = excerpt([name for name in error.tree if name != WORLD and not name.endswith(".BASE")], ON_A_TERMINAL)
-    omitted = (more(frames.left_out, "all in frames.json of `-o FOLDER`"), "", "")
+    frames = excerpt([name for name in error.tree if name != WORLD and not name.endswith(".BASE")], MAX_TERMINAL_LINES)
+    omitted = (omission_text(frames.omitted, "all in frames.json of `-o FOLDER`"), "", "")
     return ResultTable(
         title=f"frames at {error.time:.3f} s",
         heads=("frame", "parent", "x, y, z in the world, mm"),
-        rows=frames.mapped(row).joined(omitted),
+        rows=frames.map(row).join(omitted),
         numbers=(2,),
     )

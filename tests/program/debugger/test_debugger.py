@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armwright.cell.simulator import Simulator
-from armwright.program.debugger.breakpoints import CountError
+from armwright.program.debugger.breakpoints import HitConditionError
 from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
 from armwright.program.debugger.expressions import ExpressionError
 from armwright.program.debugger.stop_reason import Stop
@@ -29,7 +29,7 @@ def load(text: str, cell: str = "cell1", limits: Limits | None = None) -> Debugg
     place = cell_of(cell)
     debugger = Debugger(code_of(text, place), place, limits)
     debugger.begin()
-    stop = debugger.work()
+    stop = debugger.run_slice()
     assert stop is not None
     assert stop.reason == "entry"
     return debugger
@@ -38,7 +38,7 @@ def load(text: str, cell: str = "cell1", limits: Limits | None = None) -> Debugg
 def run(debugger: Debugger, command: Command, path: tuple[int, ...] = ()) -> Stop:
     """Let the run go on to its next stop."""
     debugger.resume(command, path)
-    stop = debugger.work()
+    stop = debugger.run_slice()
     assert stop is not None
     return stop
 
@@ -57,8 +57,8 @@ def lines(debugger: Debugger, command: Command, count: int) -> list[int]:
 
 
 def inside(shown: Variable) -> dict[str, Variable]:
-    assert shown.inside is not None
-    return {one.name: one for one in shown.inside()}
+    assert shown.children is not None
+    return {one.name: one for one in shown.children()}
 
 
 def scope(debugger: Debugger, name: str, path: tuple[int, ...] = (), level: int = 0) -> dict[str, Variable]:
@@ -121,7 +121,7 @@ def test_whole_program_by_steps_is_the_same_run() -> None:
     text = corpus_text("p08")
     expected = interpret(code_of(text, cell), cell, Simulator(cell))
     debugger = load(text, "cell2")
-    while not debugger.over:
+    while not debugger.has_ended:
         run(debugger, "in")
     recording = debugger.machine.recording()
 
@@ -185,7 +185,7 @@ def test_every_step_back_is_where_a_step_forward_was() -> None:
     way = []
     while True:
         way.append((line(debugger), debugger.time, debugger.evaluate("frames").value))
-        if run(debugger, "next").over:
+        if run(debugger, "next").has_ended:
             break
     back = []
     for _ in way:
@@ -229,7 +229,7 @@ def test_tick_back() -> None:
 def test_reverse_finds_the_last_breakpoint() -> None:
     """Going back stops at the last passage of a breakpoint, then the one before, then at the start."""
     debugger = load(LOOP)
-    debugger.break_at(5)
+    debugger.add_breakpoint(5)
     for _ in range(4):
         run(debugger, "continue")
     values = []
@@ -274,7 +274,7 @@ def test_breakpoint_moves_to_a_statement() -> None:
     """A breakpoint in a line without a statement goes to the next that has one; behind the last it is none."""
     debugger = load(CALLS)
 
-    first, last, inner = debugger.break_at(7), debugger.break_at(99), debugger.break_at(2)
+    first, last, inner = debugger.add_breakpoint(7), debugger.add_breakpoint(99), debugger.add_breakpoint(2)
     assert first.start is not None
     assert first.start.line == 10
     assert last.start is None
@@ -286,7 +286,7 @@ def test_breakpoint_moves_to_a_statement() -> None:
 def test_breakpoint_in_a_procedure() -> None:
     """A breakpoint in a procedure stops each call of it."""
     debugger = load(CALLS)
-    debugger.break_at(5)
+    debugger.add_breakpoint(5)
 
     values = []
     while run(debugger, "continue").reason == "breakpoint":
@@ -298,12 +298,12 @@ def test_conditions_and_counts() -> None:
     """A breakpoint stops where its condition is true, or at the passages that its count names."""
     for more, expected in (
         ({"condition": "i > 2 AND n < 10"}, ["3", "4"]),
-        ({"hits": "2"}, ["2"]),
-        ({"hits": "% 2"}, ["2", "4"]),
-        ({"hits": ">= 4"}, ["4", "5"]),
+        ({"hit_condition": "2"}, ["2"]),
+        ({"hit_condition": "% 2"}, ["2", "4"]),
+        ({"hit_condition": ">= 4"}, ["4", "5"]),
     ):
         debugger = load(LOOP)
-        debugger.break_at(5, **more)
+        debugger.add_breakpoint(5, **more)
         seen = []
         while run(debugger, "continue").reason == "breakpoint":
             seen.append(debugger.evaluate("i").value)
@@ -314,19 +314,22 @@ def test_conditions_that_make_no_sense() -> None:
     """A breakpoint with a condition that makes no sense is none, and says why."""
     debugger = load(LOOP)
 
-    assert debugger.break_at(5, condition="i >").message == "expected a value after `>`"
-    assert debugger.break_at(5, condition="k = 1").message.startswith("`k` is not declared")
-    assert debugger.break_at(5, condition="XYZ(1,2,3)").message.startswith("expected a condition")
-    assert debugger.break_at(5, hits="often").message == "expected a count such as `3`, `>= 3` or `% 3`, got `often`"
-    with pytest.raises(CountError, match="expected a count"):
-        debugger.watch("N", hits="-1")
+    assert debugger.add_breakpoint(5, condition="i >").message == "expected a value after `>`"
+    assert debugger.add_breakpoint(5, condition="k = 1").message.startswith("`k` is not declared")
+    assert debugger.add_breakpoint(5, condition="XYZ(1,2,3)").message.startswith("expected a condition")
+    assert (
+        debugger.add_breakpoint(5, hit_condition="often").message
+        == "expected a count such as `3`, `>= 3` or `% 3`, got `often`"
+    )
+    with pytest.raises(HitConditionError, match="expected a count"):
+        debugger.add_watch("N", hit_condition="-1")
     assert run(debugger, "continue").reason == "end"
 
 
 def test_a_condition_without_a_value_stops() -> None:
     """Where the condition of a breakpoint has no value, the run stops and says so."""
     debugger = load("VAR i, n : SCALAR ;\nBEGIN\n  i = 1 ;\n  n = 2 ;\n  PRINT(n, i)\nEND.")
-    debugger.break_at(4, condition="n = 2")
+    debugger.add_breakpoint(4, condition="n = 2")
 
     stop = run(debugger, "continue")
     assert stop.reason == "breakpoint"
@@ -336,10 +339,10 @@ def test_a_condition_without_a_value_stops() -> None:
 def test_log_points() -> None:
     """A breakpoint with something to say says it and does not stop."""
     debugger = load(LOOP)
-    debugger.break_at(5, log="{i} of 5, n = {n * 10}")
+    debugger.add_breakpoint(5, log_message="{i} of 5, n = {n * 10}")
 
     assert run(debugger, "continue").reason == "end"
-    assert [text for text, _ in debugger.log_messages()] == [
+    assert [text for text, _ in debugger.take_log_messages()] == [
         f"{i} of 5, n = {10 * n}" for i, n in zip("12345", (0, 1, 3, 6, 10), strict=True)
     ]
 
@@ -347,7 +350,7 @@ def test_log_points() -> None:
 def test_watched_variable() -> None:
     """A watched variable stops the run where it changes, behind the statement, and nowhere else."""
     debugger = load(LOOP)
-    debugger.watch("N")
+    debugger.add_watch("N")
 
     texts = []
     while (stop := run(debugger, "continue")).reason == "data breakpoint":
@@ -359,14 +362,14 @@ def test_watched_frame_on_an_arm() -> None:
     """A watched frame stops the run at the first tick at which it moves, also because its parent does; once a MOVE."""
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 7)
-    debugger.watch("APF1")
+    debugger.add_watch("APF1")
     stop = run(debugger, "continue")
 
     assert stop.text == "apf1 begins to move with ARM_1"
     assert line(debugger) == 14
     motion = debugger.machine.state.program.motion
     assert motion is not None
-    assert 1 <= debugger.view.state.ticks - motion.begun.tick < 20
+    assert 1 <= debugger.view.state.ticks - motion.start.tick < 20
     assert run(debugger, "continue").reason == "end"
 
 
@@ -376,7 +379,7 @@ def test_watched_frame_that_is_placed() -> None:
         "VAR f, g : FRAME ;\nBEGIN\n  f = (1,0,0, 0,1,0, 0,0,1, 0,0,0) ;\n  g = f * XYZ(0, 0, 1) ;\n"
         "  AFFIX g TO f ;\n  f = f * XYZ(1, 0, 0) ;\n  UNFIX g ;\n  f = f * XYZ(1, 0, 0) ;\nEND.\n"
     )
-    debugger.watch("G")
+    debugger.add_watch("G")
 
     stops = [run(debugger, "continue") for _ in range(3)]
     assert [stop.text for stop in stops] == ["g has a value", "g has moved", ""]
@@ -387,7 +390,7 @@ def test_reverse_to_a_movement() -> None:
     """Going back stops at the tick at which a watched frame began to move, and going on from there passes it."""
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 9)
-    debugger.watch("OBJ1")
+    debugger.add_watch("OBJ1")
 
     stop = run(debugger, "reverse")
     assert stop.text == "obj1 begins to move with ARM_1"
@@ -401,7 +404,7 @@ def test_reverse_to_a_movement() -> None:
 def test_branches_have_stacks_of_their_own() -> None:
     """In a COBEGIN each branch is where it is, and the program waits at the COBEGIN."""
     debugger = load(corpus_text("p08"), "cell2")
-    debugger.break_at(26)
+    debugger.add_breakpoint(26)
     stop = run(debugger, "continue")
 
     assert stop.path == (1,)
@@ -412,7 +415,7 @@ def test_branches_have_stacks_of_their_own() -> None:
 def test_steps_of_one_branch() -> None:
     """Steps of one branch stop in its statements only, while the other goes on beside it."""
     debugger = load(corpus_text("p08"), "cell2")
-    debugger.break_at(25)
+    debugger.add_breakpoint(25)
     run(debugger, "continue")
     seen = []
     for _ in range(4):
@@ -440,7 +443,7 @@ def test_a_step_in_front_of_a_cobegin() -> None:
 def test_a_branch_that_ends() -> None:
     """A step behind the last statement of a branch ends where the program that began it goes on."""
     debugger = load(corpus_text("p08"), "cell2")
-    debugger.break_at(36)
+    debugger.add_breakpoint(36)
     run(debugger, "continue")
     stops = [run(debugger, "next", (1,)) for _ in range(2)]
 
@@ -451,7 +454,7 @@ def test_a_branch_that_ends() -> None:
 def test_waiting_is_one_statement() -> None:
     """A WAIT that has to wait is not begun a second time when its event comes."""
     debugger = load(corpus_text("p08"), "cell2")
-    debugger.break_at(27)
+    debugger.add_breakpoint(27)
 
     assert run(debugger, "continue").reason == "breakpoint"
     assert run(debugger, "continue").reason == "end"
@@ -501,7 +504,7 @@ def test_errors_with_a_recovery() -> None:
     quiet = load(text)
     assert run(quiet, "continue").reason == "end"
     debugger = load(text)
-    debugger.execution.catches = frozenset({"uncaught", "caught"})
+    debugger.execution.exception_filters = frozenset({"uncaught", "caught"})
     stop = run(debugger, "continue")
 
     assert (stop.reason, stop.caught, line(debugger)) == ("exception", True, 5)
@@ -581,11 +584,11 @@ def test_units() -> None:
 def test_arrays() -> None:
     """An array opens to its elements, by their indices."""
     debugger = load(corpus_text("p05"))
-    debugger.break_at(18)
+    debugger.add_breakpoint(18)
     run(debugger, "continue")
     slots = scope(debugger, "Variables")["slot"]
 
-    assert (slots.type, slots.elements) == ("ARRAY [2,3] OF FRAME", 6)
+    assert (slots.type, slots.element_count) == ("ARRAY [2,3] OF FRAME", 6)
     assert list(inside(slots)) == ["[1,1]", "[1,2]", "[1,3]", "[2,1]", "[2,2]", "[2,3]"]
     assert inside(inside(slots)["[2,3]"])["p"].value == "(480, -80, 40)"
     assert debugger.evaluate("slot[row, 1]").slot == "SLOT[1,1]"
@@ -623,12 +626,12 @@ def test_names_that_are_words_of_the_newer_language() -> None:
     cell = cell_of("cell1")
     debugger = Debugger(code_of(text, cell, std=Standard.RLO_83), cell)
     debugger.begin()
-    debugger.work()
+    debugger.run_slice()
     lines(debugger, "next", 3)
 
     assert debugger.evaluate("DIST(on, wait)").value == "0.2"
     assert debugger.evaluate("step > 3 AND step < 99").value == "true"
-    assert debugger.break_at(7, condition="step = 51").start is not None
+    assert debugger.add_breakpoint(7, condition="step = 51").start is not None
 
 
 def test_looking_changes_nothing() -> None:
@@ -636,11 +639,11 @@ def test_looking_changes_nothing() -> None:
     cell = cell_of("cell1")
     expected = interpret(code_of(corpus_text("p02"), cell), cell, Simulator(cell))
     debugger = load(corpus_text("p02"))
-    while not run(debugger, "stage").over:
+    while not run(debugger, "stage").has_ended:
         for one in debugger.scopes():
             for shown in inside(one).values():
-                if shown.inside is not None:
-                    list(shown.inside())
+                if shown.children is not None:
+                    list(shown.children())
         debugger.evaluate("ARM_1 * XYZ(0, 0, 1)")
     recording = debugger.machine.recording()
 
@@ -651,7 +654,7 @@ def test_looking_changes_nothing() -> None:
 def test_another_value() -> None:
     """The run goes on with a value that it was given, and a step back forgets it."""
     debugger = load(LOOP)
-    debugger.break_at(6)
+    debugger.add_breakpoint(6)
     run(debugger, "continue")
     assert debugger.assign("N", "n * 2 + 1").value == "31"
     run(debugger, "next")
@@ -696,7 +699,7 @@ def test_pause_of_an_endless_loop() -> None:
     """A loop that never ends can be stopped, looked at, and left by a value."""
     debugger = load("VAR n : SCALAR ;\nBEGIN\n  n = 0 ;\n  WHILE n = 0 DO\n    PAUSE 0.001 ;\n  PRINT(n)\nEND.\n")
     debugger.resume("continue")
-    assert debugger.work(0.05) is None
+    assert debugger.run_slice(0.05) is None
     with pytest.raises(DebuggerError, match="running"):
         run(debugger, "next")
     stop = debugger.pause()

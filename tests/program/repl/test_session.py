@@ -44,7 +44,7 @@ def codes(answer: Answer) -> list[str]:
 def places(machine: Machine) -> dict[str, list[float] | None]:
     """Return where everything is."""
     return {
-        name: machine.state.tree.world(name).ravel().tolist() if machine.has_place(name) else None
+        name: machine.state.tree.world(name).ravel().tolist() if machine.has_pose(name) else None
         for name in machine.state.tree
     }
 
@@ -55,7 +55,7 @@ def everything(talk: Session) -> tuple[object, ...]:
     configurations = {name: machine.hardware.configuration(name, machine.now).tolist() for name in machine.state.hands}
     parents = {name: machine.state.tree.parent(name) for name in machine.state.tree}
     values = {name: np.asarray(value).tolist() for name, value in machine.state.values.items()}
-    hands = {name: (hand.at, hand.holds) for name, hand in machine.state.hands.items()}
+    hands = {name: (hand.reached_frame, hand.held_frame) for name, hand in machine.state.hands.items()}
     rest = (
         dict(machine.state.events),
         machine.now,

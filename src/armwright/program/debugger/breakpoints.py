@@ -9,14 +9,14 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import ArmwrightError
-from armwright.program.debugger.history import Path
-from armwright.program.debugger.snapshot import mover
-from armwright.program.debugger.statements import Start
+from armwright.program.debugger.history import ProcessPath
+from armwright.program.debugger.snapshot import moving_process
+from armwright.program.debugger.statements import StatementStart
 from armwright.program.language.kinds import VariableKind
 from armwright.program.vm.machine import Machine
 
 # A frame that is farther from where it was than this has moved [m], and entries of rotations.
-_MOVED = 1e-9
+_MOVE_TOLERANCE = 1e-9
 _COUNT = re.compile(r"\s*(==|>=|<=|=|>|<|%)?\s*([0-9]{1,9})\s*")
 _COMPARISONS: Mapping[str, Callable[[int, int], bool]] = {
     "==": operator.eq,
@@ -29,11 +29,11 @@ _COMPARISONS: Mapping[str, Callable[[int, int], bool]] = {
 }
 
 
-class CountError(ArmwrightError, ValueError):
+class HitConditionError(ArmwrightError, ValueError):
     """A condition on how often a location is reached makes no sense."""
 
 
-def counts(condition: str, hits: int) -> bool:
+def matches_hit_count(condition: str, hits: int) -> bool:
     """Whether to stop at a location when it is reached for that time.
 
     Args:
@@ -45,7 +45,7 @@ def counts(condition: str, hits: int) -> bool:
     """
     match = _COUNT.fullmatch(condition)
     if match is None:
-        raise CountError(f"expected a count such as `3`, `>= 3` or `% 3`, got `{condition}`")
+        raise HitConditionError(f"expected a count such as `3`, `>= 3` or `% 3`, got `{condition}`")
     return _COMPARISONS[match[1] or "=="](hits, int(match[2]))
 
 
@@ -57,16 +57,16 @@ class Breakpoint:
         number: its own, from 1.
         start: the statement; None where there is none, or its condition makes no sense.
         condition: that must be true; empty for none.
-        hits: a condition on how often it has been come to; empty for none.
-        log: what to say instead of stopping, with expressions in braces; empty to stop.
+        hit_condition: a condition on how often it has been come to; empty for none.
+        log_message: what to say instead of stopping, with expressions in braces; empty to stop.
         message: why it is not as it was asked for; empty where it is.
     """
 
     number: int
-    start: Start | None
+    start: StatementStart | None
     condition: str = ""
-    hits: str = ""
-    log: str = ""
+    hit_condition: str = ""
+    log_message: str = ""
     message: str = ""
 
 
@@ -80,34 +80,34 @@ class Watch:
         number: its own, among the breakpoints.
         slot: where the frame or variable is kept.
         condition: that must be true; empty for none.
-        hits: a condition on how often it has changed; empty for none.
+        hit_condition: a condition on how often it has changed; empty for none.
         changes: how often it has changed since it is watched.
-        last: its value when it was last checked.
-        reported: the motion for which the run has stopped: process, beginning.
+        last_value: its value when it was last checked.
+        reported_motion: the motion for which the run has stopped: process, beginning.
     """
 
     number: int
     slot: str
     condition: str = ""
-    hits: str = ""
+    hit_condition: str = ""
     changes: int = 0
-    last: "Array | float | None" = None
-    reported: tuple[Path, int] | None = None
+    last_value: "Array | float | None" = None
+    reported_motion: tuple[ProcessPath, int] | None = None
 
-    def update(self, view: Machine) -> str | None:
+    def check_change(self, view: Machine) -> str | None:
         """Return what has changed since the last check, in words; None where nothing has."""
         now = _value(view, self.slot)
-        before, self.last = self.last, now
-        motion = _motion(view, self.slot)
-        if self.reported is not None:
+        before, self.last_value = self.last_value, now
+        motion = _motion_id(view, self.slot)
+        if self.reported_motion is not None:
             # The motion goes on, or has just come to its end.
-            self.reported = motion if motion == self.reported else None
+            self.reported_motion = motion if motion == self.reported_motion else None
             return None
-        if _same(before, now):
+        if _are_equal(before, now):
             return None
-        self.reported = motion
+        self.reported_motion = motion
         self.changes += 1
-        name = view.spelled(self.slot)
+        name = view.spelling(self.slot)
         if isinstance(now, float | int):
             return f"{name} = {now:g}" + ("" if before is None else f", was {before:g}")
         if now is None:
@@ -116,38 +116,38 @@ class Watch:
             return f"{name} begins to move with {view.carrier(self.slot)}"
         return f"{name} has moved" if before is not None else f"{name} has a value"
 
-    def start(self, view: Machine, *, reported: bool) -> None:
+    def reset(self, view: Machine, *, reported: bool) -> None:
         """Take the present value as the last.
 
         Args:
             view: the machine as it is seen now.
             reported: whether the run has stopped for the motion that moves it now.
         """
-        self.last = _value(view, self.slot)
-        self.reported = _motion(view, self.slot) if reported else None
+        self.last_value = _value(view, self.slot)
+        self.reported_motion = _motion_id(view, self.slot) if reported else None
 
     def is_moved(self, view: Machine) -> bool:
         """Whether an arm moves it, so that every tick has to be checked."""
-        motion = _motion(view, self.slot)
-        return motion is not None and motion != self.reported
+        motion = _motion_id(view, self.slot)
+        return motion is not None and motion != self.reported_motion
 
 
-def _motion(view: Machine, slot: str) -> tuple[Path, int] | None:
+def _motion_id(view: Machine, slot: str) -> tuple[ProcessPath, int] | None:
     """Return which motion of an arm moves a frame now: process, beginning; None where it is at rest."""
-    process = mover(view, slot)
-    return None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
+    process = moving_process(view, slot)
+    return None if process is None or process.motion is None else (process.path, process.motion.start.tick)
 
 
 def _value(view: Machine, slot: str) -> "Array | float | None":
     kind = view.type_of(slot).kind
     if kind is VariableKind.FRAME:
-        return view.state.tree.world(slot) if view.has_place(slot) else None
+        return view.state.tree.world(slot) if view.has_pose(slot) else None
     if kind is VariableKind.EVENT:
         return float(view.state.events.get(slot, 0))
     return view.state.values.get(slot)
 
 
-def _same(value: "Array | float | None", other: "Array | float | None") -> bool:
+def _are_equal(value: "Array | float | None", other: "Array | float | None") -> bool:
     if value is None or other is None:
         return value is other
-    return bool(np.allclose(value, other, rtol=0, atol=_MOVED if isinstance(value, np.ndarray) else 0))
+    return bool(np.allclose(value, other, rtol=0, atol=_MOVE_TOLERANCE if isinstance(value, np.ndarray) else 0))

@@ -6,13 +6,13 @@ from typing import Any
 
 from armwright.errors import ArmwrightError
 from armwright.program.debugger.dap_messages import Arguments
-from armwright.program.debugger.dap_session import LISTED, EditorSession
+from armwright.program.debugger.dap_session import CODE_SOURCE_REFERENCE, EditorSession
 
 
 def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setBreakpoints``: those of a file, instead of all it had."""
-    source = arguments.part("source")
-    requests = arguments.parts("breakpoints")
+    source = arguments.get_object("source")
+    requests = arguments.get_objects("breakpoints")
     for request in requests:
         request.get(int, "line")
     if session.launch is not None and not _is_debugged(session, source):
@@ -26,13 +26,13 @@ def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, A
 
 def _is_debugged(session: EditorSession, source: Arguments) -> bool:
     """Whether a text is that of the program, which lies in a file of its own or in a file of code."""
-    if session.loaded is not None and session.loaded.is_listed:
-        return source.get(int, "sourceReference", 0) == LISTED
+    if session.loaded is not None and session.loaded.is_code_file:
+        return source.get(int, "sourceReference", 0) == CODE_SOURCE_REFERENCE
     path = source.get(str, "path", "")
-    return bool(path) and session.launch is not None and _same(path, session.launch.program)
+    return bool(path) and session.launch is not None and _is_same_file(path, session.launch.program)
 
 
-def _same(path: str, program: Path) -> bool:
+def _is_same_file(path: str, program: Path) -> bool:
     try:
         return os.path.realpath(path) == os.path.realpath(program)
     except ValueError:  # a zero byte
@@ -43,15 +43,15 @@ def breakpoint_locations(session: EditorSession, arguments: Arguments) -> dict[s
     """Answer ``breakpointLocations``: where statements begin."""
     first = arguments.get(int, "line")
     offset = 1 - session.first_line
-    statements = session.live.execution.statements
-    starts = statements.between(first + offset, arguments.get(int, "endLine", first) + offset)
+    statements = session.launched_debugger.execution.statements
+    starts = statements.in_lines(first + offset, arguments.get(int, "endLine", first) + offset)
     return {"breakpoints": [session.location(start.span) for start in starts]}
 
 
 def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``dataBreakpointInfo``: what of all that is shown can be watched."""
     name = arguments.get(str, "name")
-    debugger = session.standing
+    debugger = session.stopped_debugger
     try:
         if arguments.get(int, "variablesReference", 0):
             variables, _, _ = session.variables(arguments)
@@ -68,10 +68,10 @@ def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[s
 
 def set_data_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setDataBreakpoints``: all frames and variables that are watched, instead of those before."""
-    debugger = session.live
+    debugger = session.launched_debugger
     session.data_breakpoints = [
         (next(session.ids), part.get(str, "dataId"), part.get(str, "condition", ""), part.get(str, "hitCondition", ""))
-        for part in arguments.parts("breakpoints")
+        for part in arguments.get_objects("breakpoints")
     ]
     debugger.execution.watches.clear()
     return {"breakpoints": [session.watch(*request) for request in session.data_breakpoints]}
@@ -79,7 +79,7 @@ def set_data_breakpoints(session: EditorSession, arguments: Arguments) -> dict[s
 
 def set_exception_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setExceptionBreakpoints``: which errors to stop at."""
-    session.catches = frozenset(map(str, arguments.get(list, "filters", [])))
+    session.exception_filters = frozenset(map(str, arguments.get(list, "filters", [])))
     if session.debugger is not None:
-        session.debugger.execution.catches = session.catches
+        session.debugger.execution.exception_filters = session.exception_filters
     return {}

@@ -27,13 +27,13 @@ class RequestError(ArmwrightError, ValueError):
     """A request cannot be answered; the text goes back to who sent it."""
 
 
-class Noise(NamedTuple):
+class InvalidMessage(NamedTuple):
     """What came in and is no message."""
 
     text: str
 
 
-def messages(stream: BinaryIO) -> Iterator[dict[str, Any] | Noise]:
+def read_messages(stream: BinaryIO) -> Iterator[dict[str, Any] | InvalidMessage]:
     """Give what comes in, one after the other, until the stream ends or a message is larger than its limit."""
     incoming = MessageStream(stream)
     while True:
@@ -42,7 +42,7 @@ def messages(stream: BinaryIO) -> Iterator[dict[str, Any] | Noise]:
             header += line
         length = CONTENT_LENGTH.search(header)
         if incoming.refused:
-            yield Noise(f"{incoming.refused}; the connection ends")
+            yield InvalidMessage(f"{incoming.refused}; the connection ends")
         if not line:
             return
         if length is not None:
@@ -51,18 +51,18 @@ def messages(stream: BinaryIO) -> Iterator[dict[str, Any] | Noise]:
                 return
             yield _message(body)
         elif header:
-            yield Noise("a header without a valid Content-Length")
+            yield InvalidMessage("a header without a valid Content-Length")
 
 
-def _message(body: bytes) -> dict[str, Any] | Noise:
+def _message(body: bytes) -> dict[str, Any] | InvalidMessage:
     try:
         message = json.loads(body.decode())
     except (ValueError, RecursionError):
-        return Noise("a message that is not JSON")
-    return message if isinstance(message, dict) else Noise("a message that is not a JSON object")
+        return InvalidMessage("a message that is not JSON")
+    return message if isinstance(message, dict) else InvalidMessage("a message that is not a JSON object")
 
 
-def framed(message: Mapping[str, Any]) -> bytes:
+def frame_message(message: Mapping[str, Any]) -> bytes:
     """Return a message as it is sent."""
     body = json.dumps(message, ensure_ascii=False).encode("utf-8", "backslashreplace")
     return b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
@@ -77,7 +77,7 @@ class Arguments:
         Raises:
             RequestError: they are no object.
         """
-        self._values: dict[str, Any] = {} if body is None else _checked(body, dict, "arguments")
+        self._values: dict[str, Any] = {} if body is None else _check_type(body, dict, "arguments")
 
     def __contains__(self, key: str) -> bool:
         """Whether something is given, and not null."""
@@ -93,9 +93,9 @@ class Arguments:
         value = default if value is None else value
         if value is None:
             raise RequestError(f"{key}: missing, expected {_TYPES[kind]}")
-        return _checked(value, kind, key)
+        return _check_type(value, kind, key)
 
-    def parts(self, key: str) -> "list[Arguments]":
+    def get_objects(self, key: str) -> "list[Arguments]":
         """Return a list of objects; an empty one where it is missing.
 
         Raises:
@@ -103,7 +103,7 @@ class Arguments:
         """
         return [Arguments(item) for item in self.get(list, key, [])]
 
-    def part(self, key: str) -> "Arguments":
+    def get_object(self, key: str) -> "Arguments":
         """Return an object.
 
         Raises:
@@ -112,7 +112,7 @@ class Arguments:
         return Arguments(self.get(dict, key))
 
 
-def _checked(value: object, kind: type[T], key: str) -> T:
+def _check_type(value: object, kind: type[T], key: str) -> T:
     # Of numbers only, true and false are none.
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is int):
         raise RequestError(f"{key}: expected {_TYPES[kind]}, got {str(value)[:40]!r}")

@@ -16,8 +16,14 @@ from typing import Any, BinaryIO
 from armwright.errors import ArmwrightError
 from armwright.files.inputs import regular_file
 from armwright.program.debugger import dap_breakpoints, dap_inspection
-from armwright.program.debugger.dap_messages import Arguments, Noise, RequestError, framed, messages
-from armwright.program.debugger.dap_session import EditorSession, Launch, Load, Save
+from armwright.program.debugger.dap_messages import (
+    Arguments,
+    InvalidMessage,
+    RequestError,
+    frame_message,
+    read_messages,
+)
+from armwright.program.debugger.dap_session import EditorSession, LaunchRequest, Load, Save
 from armwright.program.debugger.debugger import Command
 from armwright.program.language.words import Standard
 
@@ -69,9 +75,9 @@ class Adapter:
         self._outgoing = outgoing
         self._sent = 0
         self._session = EditorSession(load, save, self._event)
-        self._waiting: queue.SimpleQueue[dict[str, Any] | Noise | None] = queue.SimpleQueue()
+        self._incoming: queue.SimpleQueue[dict[str, Any] | InvalidMessage | None] = queue.SimpleQueue()
         self._connected = True
-        self._after: list[Callable[[], None]] = []
+        self._after_response: list[Callable[[], None]] = []
 
     def run(self, incoming: BinaryIO) -> None:
         """Answer what comes in, and let the program run in between."""
@@ -87,23 +93,23 @@ class Adapter:
         debugger = self._session.debugger
         running = debugger is not None and debugger.running
         try:
-            message = self._waiting.get(block=not running)
+            message = self._incoming.get(block=not running)
         except queue.Empty:
-            self._session.work(_SLICE)
+            self._session.run_slice(_SLICE)
             return
         if message is None:
             self._connected = False
-        elif isinstance(message, Noise):
+        elif isinstance(message, InvalidMessage):
             self._refuse(0, "", message.text)
         else:
             self._handle(message)
 
     def _listen(self, incoming: BinaryIO) -> None:
         try:
-            for message in messages(incoming):
-                self._waiting.put(message)
+            for message in read_messages(incoming):
+                self._incoming.put(message)
         finally:
-            self._waiting.put(None)
+            self._incoming.put(None)
 
     # ---- requests --------------------------------------------------------------------------------------------------
 
@@ -116,18 +122,18 @@ class Adapter:
             self._refuse(number, "", "a request without a command")
             return
         try:
-            body = self._body(command, message.get("arguments"))
+            body = self._dispatch(command, message.get("arguments"))
         except ArmwrightError as error:
             self._refuse(number, command, str(error))
         except Exception as error:  # noqa: BLE001 - a slip of ours must not take the session with it
             self._refuse(number, command, f"{type(error).__name__} in the debugger: {error}")
         else:
             self._answer(number, command, body)
-        after, self._after = self._after, []
+        after, self._after_response = self._after_response, []
         for event in after:
             event()
 
-    def _body(self, command: str, arguments: object) -> Mapping[str, Any] | None:
+    def _dispatch(self, command: str, arguments: object) -> Mapping[str, Any] | None:
         if command in _INSPECTIONS:
             return _INSPECTIONS[command](self._session, Arguments(arguments))
         if command in _STEPS:
@@ -135,7 +141,7 @@ class Adapter:
         own: Mapping[str, Callable[[Arguments], Mapping[str, Any] | None]] = {
             "initialize": self._initialize,
             "launch": self._launch,
-            "configurationDone": self._configured,
+            "configurationDone": self._configuration_done,
             "restart": self._restart,
             "pause": self._pause,
             "terminate": self._terminate,
@@ -154,26 +160,26 @@ class Adapter:
         session = self._session
         if session.debugger is not None:
             raise RequestError("a program has been launched already")
-        session.start(_launched(arguments))
+        session.start(_launch_request(arguments))
         # Now that the program is known, breakpoints can be set in it.
-        self._after += [lambda: self._event("initialized", {}), session.begin]
+        self._after_response += [lambda: self._event("initialized", {}), session.begin]
 
-    def _configured(self, _: Arguments) -> None:
+    def _configuration_done(self, _: Arguments) -> None:
         self._session.configured = True
-        self._after.append(self._session.begin)
+        self._after_response.append(self._session.begin)
 
     def _restart(self, arguments: Arguments) -> None:
         session = self._session
         if session.launch is None:
             raise RequestError("no program has been launched")
-        launch = _launched(arguments.part("arguments")) if "arguments" in arguments else session.launch
+        launch = _launch_request(arguments.get_object("arguments")) if "arguments" in arguments else session.launch
         session.start(launch)
-        self._after.append(session.begin)
+        self._after_response.append(session.begin)
 
     def _step(self, command: str, arguments: Arguments) -> Mapping[str, Any]:
         session = self._session
         if command in {"continue", "reverseContinue"}:
-            session.go(_STEPS[command], ())
+            session.resume(_STEPS[command], ())
             return {"allThreadsContinued": True}
         step: Command = _STEPS[command]
         granularity = arguments.get(str, "granularity", "statement")
@@ -181,18 +187,18 @@ class Adapter:
             raise RequestError(f"granularity: expected statement, line or instruction, got {granularity!r}")
         if granularity == "instruction":
             step = "tick back" if command == "stepBack" else "tick"
-        session.go(step, session.process(arguments.get(int, "threadId", 1)))
+        session.resume(step, session.process_path(arguments.get(int, "threadId", 1)))
         return {}
 
     def _pause(self, _: Arguments) -> None:
-        debugger = self._session.live
+        debugger = self._session.launched_debugger
         if not debugger.running:
             raise RequestError("the program is not running")
         stop = debugger.pause()
-        self._after.append(lambda: self._session.report(stop))
+        self._after_response.append(lambda: self._session.report_stop(stop))
 
     def _terminate(self, _: Arguments) -> None:
-        self._after.append(self._session.terminate)
+        self._after_response.append(self._session.terminate)
 
     def _disconnect(self, _: Arguments) -> None:
         self._connected = False
@@ -205,7 +211,7 @@ class Adapter:
 
     def _refuse(self, number: int, command: str, text: str) -> None:
         answer = {"request_seq": number, "command": command, "success": False, "message": text}
-        error = {"id": 1, "format": _unformatted(text), "showUser": True}
+        error = {"id": 1, "format": _escape_braces(text), "showUser": True}
         self._send("response", {**answer, "body": {"error": error}})
 
     def _event(self, event: str, body: Mapping[str, Any]) -> None:
@@ -213,20 +219,20 @@ class Adapter:
 
     def _send(self, kind: str, message: Mapping[str, Any]) -> None:
         self._sent += 1
-        self._outgoing.write(framed({"seq": self._sent, "type": kind, **message}))
+        self._outgoing.write(frame_message({"seq": self._sent, "type": kind, **message}))
         self._outgoing.flush()
 
 
-def _unformatted(text: str) -> str:
+def _escape_braces(text: str) -> str:
     """Return a text in which braces ask for nothing."""
     return text.replace("{", "(").replace("}", ")")
 
 
-def _launched(arguments: Arguments) -> Launch:
+def _launch_request(arguments: Arguments) -> LaunchRequest:
     standard = str(arguments.get(object, "std", Standard.RLO_2.value))
     if standard not in set(Standard):
         raise RequestError(f"std: expected 2 or 83, got {standard!r}")
-    return Launch(
+    return LaunchRequest(
         program=regular_file(Path(arguments.get(str, "program"))),
         cell=regular_file(Path(arguments.get(str, "cell"))) if arguments.get(str, "cell", "") else None,
         std=Standard(standard),

@@ -13,7 +13,7 @@ from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.breakpoints import Breakpoint
 from armwright.program.debugger.dap_messages import Arguments, RequestError
 from armwright.program.debugger.debugger import Command, Debugger
-from armwright.program.debugger.history import Path as ProcessPath
+from armwright.program.debugger.history import ProcessPath
 from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Variable
 from armwright.program.diagnostics.render import render
@@ -21,19 +21,19 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.position_codec import UTF_16, PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
-from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more, one_line
+from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, excerpt, omission_text, shorten_line
 from armwright.program.vm.recording import Effect, Recording
 
 _DESCRIPTIONS = {"start": "back at the start", "data breakpoint": "something has changed"}
 # The number of the text of a program that was read from a file of code.
-LISTED = 1
-_ALL_OF_IT = "with `output` in the launch configuration all are in events.jsonl"
+CODE_SOURCE_REFERENCE = 1
+_EVENT_LOG_HINT = "with `output` in the launch configuration all are in events.jsonl"
 # What the protocol has a word for.
 _REASONS = {"start": "entry"}
 
 
 @attrs.frozen(kw_only=True)
-class Launch:
+class LaunchRequest:
     """What a session is asked to run.
 
     Attributes:
@@ -56,7 +56,7 @@ class Launch:
 
 
 @attrs.frozen(kw_only=True)
-class Loaded:
+class LoadedProgram:
     """A program that can run.
 
     Attributes:
@@ -64,14 +64,14 @@ class Loaded:
         cell: what it runs in.
         diagnostics: warnings.
         imports: the files that it imports.
-        is_listed: whether it was read from a file of code, which holds the text of the program and is not that text.
+        is_code_file: whether it was read from a file of code, which holds the text of the program and is not that text.
     """
 
     code: Code
     cell: Cell
     diagnostics: Sequence[Diagnostic] = ()
     imports: Sequence[Path] = ()
-    is_listed: bool = False
+    is_code_file: bool = False
 
 
 class LoadError(ArmwrightError, ValueError):
@@ -90,9 +90,9 @@ class LoadError(ArmwrightError, ValueError):
         self.page, self.status = page, status
 
 
-Load = Callable[[Launch], Loaded]
+Load = Callable[[LaunchRequest], LoadedProgram]
 # Writes what a run leaves; returns a line that says so.
-Save = Callable[[Launch, Loaded, Recording], str]
+Save = Callable[[LaunchRequest, LoadedProgram, Recording], str]
 Send = Callable[[str, Mapping[str, Any]], None]
 
 
@@ -106,39 +106,39 @@ class EditorSession:
         loaded: what became of it.
         codec: counts the columns of its text as editors do, in UTF-16 as JavaScript.
         configured: whether breakpoints have been set, so that the program may begin.
-        begun: whether it has.
-        ended: whether its end has been reported.
+        has_begun: whether it has.
+        has_ended: whether its end has been reported.
         breakpoints: the breakpoints that were requested, with their numbers.
         data_breakpoints: what shall be watched: number, where it is kept, condition, count.
-        catches: the errors to stop at, ``uncaught`` and ``caught``.
-        frames: of the stacks that the editor has seen, process and level.
-        opened: what the editor can open, with process and level.
+        exception_filters: the errors to stop at, ``uncaught`` and ``caught``.
+        frame_references: of the stacks that the editor has seen, process and level.
+        variable_references: what the editor can open, with process and level.
         ids: new numbers for breakpoints.
-        numbers: of the breakpoints as the editor knows them, by those of the debugger.
+        breakpoint_ids: of the breakpoints as the editor knows them, by those of the debugger.
     """
 
     def __init__(self, load: Load, save: Save, send: Send) -> None:
         """Start without a program."""
         self._load, self._save, self.send = load, save, send
         self.debugger: Debugger | None = None
-        self.launch: Launch | None = None
-        self.loaded: Loaded | None = None
+        self.launch: LaunchRequest | None = None
+        self.loaded: LoadedProgram | None = None
         self.codec = PositionCodec("", UTF_16)
-        self.configured = self.begun = self.ended = False
+        self.configured = self.has_begun = self.has_ended = False
         self.first_line = self.first_column = 1
         self.breakpoints: list[tuple[int, Arguments]] = []
         self.data_breakpoints: list[tuple[int, str, str, str]] = []
-        self.numbers: dict[int, int] = {}
-        self.catches = frozenset({"uncaught"})
+        self.breakpoint_ids: dict[int, int] = {}
+        self.exception_filters = frozenset({"uncaught"})
         self.ids = itertools.count(1)
-        self._threads: dict[ProcessPath, int] = {(): 1}
-        self._alive: set[int] = set()
-        self.frames: list[tuple[ProcessPath, int]] = []
-        self.opened: list[tuple[Variable, ProcessPath, int]] = []
+        self._thread_ids: dict[ProcessPath, int] = {(): 1}
+        self._running_threads: set[int] = set()
+        self.frame_references: list[tuple[ProcessPath, int]] = []
+        self.variable_references: list[tuple[Variable, ProcessPath, int]] = []
 
     # ---- the program -----------------------------------------------------------------------------------------------
 
-    def start(self, launch: Launch) -> None:
+    def start(self, launch: LaunchRequest) -> None:
         """Load a program.
 
         Raises:
@@ -153,27 +153,27 @@ class EditorSession:
         self.launch, self.loaded = launch, loaded
         self.codec = PositionCodec(loaded.code.source.text, UTF_16)
         self.debugger = Debugger(loaded.code, loaded.cell)
-        self.begun = self.ended = False
+        self.has_begun = self.has_ended = False
         self.forget_references()
-        self.debugger.execution.catches = self.catches
+        self.debugger.execution.exception_filters = self.exception_filters
         if loaded.diagnostics:
             self.write(render(loaded.diagnostics, loaded.code.source), "console")
-        self.bind()
+        self.rebind_breakpoints()
 
     def begin(self) -> None:
         """Let the program run, once it is loaded and the breakpoints are known."""
-        if self.debugger is None or self.launch is None or not self.configured or self.begun:
+        if self.debugger is None or self.launch is None or not self.configured or self.has_begun:
             return
-        self.begun = True
+        self.has_begun = True
         if self.launch.no_debug:
             execution = self.debugger.execution
-            execution.breakpoints, execution.watches, execution.catches = [], [], frozenset()
+            execution.breakpoints, execution.watches, execution.exception_filters = [], [], frozenset()
         self.debugger.begin(stop_on_entry=self.launch.stop_on_entry and not self.launch.no_debug)
         self.send("thread", {"reason": "started", "threadId": 1})
-        self._alive = {1}
+        self._running_threads = {1}
 
     @property
-    def live(self) -> Debugger:
+    def launched_debugger(self) -> Debugger:
         """The debugger of the program.
 
         Raises:
@@ -184,57 +184,60 @@ class EditorSession:
         return self.debugger
 
     @property
-    def standing(self) -> Debugger:
+    def stopped_debugger(self) -> Debugger:
         """The debugger of a program that stands still.
 
         Raises:
             RequestError: it does not, or there is none.
         """
-        debugger = self.live
-        if debugger.running or not self.begun:
-            raise RequestError("the program is running" if self.begun else "the program has not begun")
+        debugger = self.launched_debugger
+        if debugger.running or not self.has_begun:
+            raise RequestError("the program is running" if self.has_begun else "the program has not begun")
         return debugger
 
-    def go(self, command: Command, path: ProcessPath) -> None:
+    def resume(self, command: Command, path: ProcessPath) -> None:
         """Let the program go on.
 
         Raises:
             RequestError: it does not stand still, or is over.
         """
-        self.standing.resume(command, path)
+        self.stopped_debugger.resume(command, path)
         self.forget_references()
 
-    def work(self, seconds: float) -> None:
+    def run_slice(self, seconds: float) -> None:
         """Do a slice of what the program has to do; state what came of it."""
-        debugger = self.live
-        stop = debugger.work(seconds)
+        debugger = self.launched_debugger
+        stop = debugger.run_slice(seconds)
         self._report_effects(debugger)
         if stop is not None and not debugger.running:
-            self.report(stop)
+            self.report_stop(stop)
 
-    def report(self, stop: Stop) -> None:
+    def report_stop(self, stop: Stop) -> None:
         """State why the program stands still."""
-        debugger = self.live
-        if stop.over:
-            self._end(stop)
+        debugger = self.launched_debugger
+        if stop.has_ended:
+            self._report_end(stop)
             return
         self._report_threads(debugger)
-        body = {"reason": _REASONS.get(stop.reason, stop.reason), "threadId": self.thread(stop.path)}
+        body = {"reason": _REASONS.get(stop.reason, stop.reason), "threadId": self.thread_id(stop.path)}
         body |= {"description": stop.text or _DESCRIPTIONS.get(stop.reason, stop.reason), "allThreadsStopped": True}
-        optional = {"text": stop.text, "hitBreakpointIds": [self.numbers[number] for number in stop.numbers]}
+        optional = {
+            "text": stop.text,
+            "hitBreakpointIds": [self.breakpoint_ids[number] for number in stop.breakpoint_numbers],
+        }
         self.send("stopped", {**body, **{key: value for key, value in optional.items() if value}})
 
-    def _end(self, stop: Stop) -> None:
+    def _report_end(self, stop: Stop) -> None:
         """The program is over: its output is written, and the editor told."""
-        if self.ended:
+        if self.has_ended:
             return
-        self.ended = True
+        self.has_ended = True
         assert self.loaded is not None  # noqa: S101 - it has run
         status = stop.status
         if stop.diagnostic is not None:
             self.write(render([stop.diagnostic], self.loaded.code.source), "stderr")
         if self.launch is not None and self.launch.output is not None:
-            recording = stop.recording or self.live.machine.recording
+            recording = stop.recording or self.launched_debugger.machine.recording
             try:
                 self.write(self._save(self.launch, self.loaded, recording()) + "\n", "console")
             except ArmwrightError as error:
@@ -245,10 +248,10 @@ class EditorSession:
 
     def terminate(self) -> None:
         """End the program where it is."""
-        if not self.ended and self.debugger is not None:
+        if not self.has_ended and self.debugger is not None:
             if self.debugger.running:
                 self.debugger.pause()
-            self.ended = True
+            self.has_ended = True
             self.send("exited", {"exitCode": int(ExitStatus.INTERRUPTED)})
             self.send("terminated", {})
 
@@ -260,48 +263,48 @@ class EditorSession:
         self.send("output", {"category": category, "output": text, **position})
 
     def _report_effects(self, debugger: Debugger) -> None:
-        effects = [effect for effect in debugger.new_effects() if effect.kind in {"PRINT", "ERROR"}]
-        shown = excerpt(effects, ON_A_TERMINAL).mapped(_output)
-        for text, category, span in shown.joined((f"{more(shown.left_out, _ALL_OF_IT)}\n", "console", None)):
+        effects = [effect for effect in debugger.take_effects() if effect.kind in {"PRINT", "ERROR"}]
+        shown = excerpt(effects, MAX_TERMINAL_LINES).map(_output_event)
+        for text, category, span in shown.join((f"{omission_text(shown.omitted, _EVENT_LOG_HINT)}\n", "console", None)):
             self.write(text, category, span)
-        for text, breakpoint_ in debugger.log_messages():
+        for text, breakpoint_ in debugger.take_log_messages():
             self.write(f"{text}\n", "console", breakpoint_.start.span if breakpoint_.start else None)
 
     def _report_threads(self, debugger: Debugger) -> None:
-        alive = {self.thread(process.path) for process in debugger.processes}
-        for number in sorted(alive - self._alive):
+        alive = {self.thread_id(process.path) for process in debugger.processes}
+        for number in sorted(alive - self._running_threads):
             self.send("thread", {"reason": "started", "threadId": number})
-        for number in sorted(self._alive - alive):
+        for number in sorted(self._running_threads - alive):
             self.send("thread", {"reason": "exited", "threadId": number})
-        self._alive = alive
+        self._running_threads = alive
 
     # ---- threads, locations and breakpoints ------------------------------------------------------------------------
 
-    def thread(self, path: ProcessPath) -> int:
+    def thread_id(self, path: ProcessPath) -> int:
         """Return the number of a process."""
-        return self._threads.setdefault(path, len(self._threads) + 1)
+        return self._thread_ids.setdefault(path, len(self._thread_ids) + 1)
 
-    def process(self, number: int) -> ProcessPath:
+    def process_path(self, number: int) -> ProcessPath:
         """Return the process of a number.
 
         Raises:
             RequestError: there is none.
         """
-        for path, known in self._threads.items():
-            if known == number and any(process.path == path for process in self.live.processes):
+        for path, known in self._thread_ids.items():
+            if known == number and any(process.path == path for process in self.launched_debugger.processes):
                 return path
         raise RequestError(f"there is no thread {number}")
 
     def forget_references(self) -> None:
         """Frames and variables have other numbers after the next stop."""
-        self.frames.clear()
-        self.opened.clear()
+        self.frame_references.clear()
+        self.variable_references.clear()
 
     def source(self) -> dict[str, Any]:
         """Return what the editor has to know of the text."""
         assert self.launch is not None  # noqa: S101 - asked for only with a program
-        if self.loaded is not None and self.loaded.is_listed:
-            return {"name": self.loaded.code.source.name, "sourceReference": LISTED}
+        if self.loaded is not None and self.loaded.is_code_file:
+            return {"name": self.loaded.code.source.name, "sourceReference": CODE_SOURCE_REFERENCE}
         return {"name": self.launch.program.name, "path": str(self.launch.program)}
 
     def location(self, span: Span, *, full: bool = True) -> dict[str, int]:
@@ -320,9 +323,9 @@ class EditorSession:
         if "frameId" not in arguments:
             return (), 0
         number = arguments.get(int, "frameId")
-        if not 0 < number <= len(self.frames):
+        if not 0 < number <= len(self.frame_references):
             raise RequestError(f"there is no stack frame {number}")
-        return self.frames[number - 1]
+        return self.frame_references[number - 1]
 
     def variables(self, arguments: Arguments) -> tuple[Sequence[Variable], ProcessPath, int]:
         """Return the variables inside of the one that a request names, with its process and level.
@@ -331,12 +334,12 @@ class EditorSession:
             RequestError: there is no such variable.
         """
         reference = arguments.get(int, "variablesReference")
-        if not 0 < reference <= len(self.opened):
+        if not 0 < reference <= len(self.variable_references):
             raise RequestError(f"there is nothing to open under {reference}")
-        group, path, level = self.opened[reference - 1]
-        return () if group.inside is None else group.inside(), path, level
+        group, path, level = self.variable_references[reference - 1]
+        return () if group.children is None else group.children(), path, level
 
-    def bind(self) -> None:
+    def rebind_breakpoints(self) -> None:
         """Set the breakpoints that were asked for before there was a program."""
         if self.debugger is None:
             return
@@ -349,10 +352,10 @@ class EditorSession:
     def watch(self, number: int, slot: str, condition: str, hits: str) -> dict[str, Any]:
         """Watch a frame or a variable; return what the editor has to know of it."""
         try:
-            watch = self.live.watch(slot, condition=condition.strip(), hits=hits.strip())
+            watch = self.launched_debugger.add_watch(slot, condition=condition.strip(), hit_condition=hits.strip())
         except ArmwrightError as error:
             return {"id": number, "verified": False, "message": str(error)}
-        self.numbers[watch.number] = number
+        self.breakpoint_ids[watch.number] = number
         return {"id": number, "verified": True}
 
     def set_breakpoint(self, number: int, request: Arguments) -> dict[str, Any]:
@@ -363,21 +366,21 @@ class EditorSession:
         if "column" in request:
             offset = self.codec.offset(line - 1, request.get(int, "column") - self.first_column)
             column = self.debugger.code.source.column(offset)
-        breakpoint_: Breakpoint = self.debugger.break_at(
+        breakpoint_: Breakpoint = self.debugger.add_breakpoint(
             line,
             column,
             condition=request.get(str, "condition", "").strip(),
-            hits=request.get(str, "hitCondition", "").strip(),
-            log=request.get(str, "logMessage", ""),
+            hit_condition=request.get(str, "hitCondition", "").strip(),
+            log_message=request.get(str, "logMessage", ""),
         )
-        self.numbers[breakpoint_.number] = number
+        self.breakpoint_ids[breakpoint_.number] = number
         if breakpoint_.start is None:
             return {"id": number, "verified": False, "message": breakpoint_.message}
         return {"id": number, "verified": True, "source": self.source(), **self.location(breakpoint_.start.span)}
 
 
-def _output(effect: Effect) -> tuple[str, str, Span | None]:
+def _output_event(effect: Effect) -> tuple[str, str, Span | None]:
     """Return what an editor shows of a PRINT or an error, its category, and where it comes from."""
     if effect.kind == "PRINT":
-        return f"{one_line(effect.data['printed'], _ALL_OF_IT)}\n", "stdout", effect.span
+        return f"{shorten_line(effect.data['printed'], _EVENT_LOG_HINT)}\n", "stdout", effect.span
     return f"recovered: {effect.text}\n", "stderr", effect.span

@@ -12,25 +12,25 @@ from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger import expressions, variables
-from armwright.program.debugger.breakpoints import Breakpoint, CountError, Watch, counts
-from armwright.program.debugger.execution import Execution, Position, RunToStop
-from armwright.program.debugger.expressions import ExpressionError, names_at
-from armwright.program.debugger.history import Path
-from armwright.program.debugger.snapshot import Frame, mover, process_of, stack
-from armwright.program.debugger.step_rules import step_of
+from armwright.program.debugger.breakpoints import Breakpoint, HitConditionError, Watch, matches_hit_count
+from armwright.program.debugger.execution import Execution, RunPosition, RunToStop
+from armwright.program.debugger.expressions import ExpressionError, visible_names
+from armwright.program.debugger.history import ProcessPath
+from armwright.program.debugger.snapshot import StackFrame, call_stack, find_process, moving_process
+from armwright.program.debugger.step_rules import begin_step
 from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Variable
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_arm
 from armwright.program.vm.interpreter import Limits, RunError
 from armwright.program.vm.machine import Machine
-from armwright.program.vm.process import Element, Process
+from armwright.program.vm.process import ElementReference, Process
 from armwright.program.vm.recording import Effect
 
 # To the next stop; to the next statement, over calls, into them, out of them; to the next stage of a MOVE; to the next
 # servo tick; back to the statement before, the tick before, the breakpoint before.
 Command: TypeAlias = Literal["continue", "next", "in", "out", "stage", "tick", "back", "tick back", "reverse"]
-_BACK = frozenset(("back", "tick back", "reverse"))
+_BACKWARD_COMMANDS = frozenset(("back", "tick back", "reverse"))
 
 
 class DebuggerError(ArmwrightError, RuntimeError):
@@ -58,15 +58,15 @@ class Debugger:
         self.execution = Execution(code, cell, limits)
         self._active: RunToStop | None = None
         # Where a run backwards was begun, to return to when it is given up.
-        self._origin: Position | None = None
+        self._origin: RunPosition | None = None
         self._numbers = count(1)
-        self._reported = 0
+        self._reported_count = 0
 
     # ---- going on --------------------------------------------------------------------------------------------------
 
     def begin(self, *, stop_on_entry: bool = True) -> None:
         """Let the run begin: it stops in front of the first statement, or where a breakpoint stops it."""
-        self._active = self.execution.entry() if stop_on_entry else self.execution.forward()
+        self._active = self.execution.stop_on_entry() if stop_on_entry else self.execution.run_forward()
 
     @property
     def running(self) -> bool:
@@ -74,11 +74,11 @@ class Debugger:
         return self._active is not None
 
     @property
-    def over(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether the program is over; it can only be taken back then."""
-        return self.machine.state.over or (self.stop is not None and self.stop.over)
+        return self.machine.state.has_ended or (self.stop is not None and self.stop.has_ended)
 
-    def resume(self, command: Command, path: Path = ()) -> None:
+    def resume(self, command: Command, path: ProcessPath = ()) -> None:
         """Let the run go on; ``work`` does it.
 
         Args:
@@ -88,26 +88,26 @@ class Debugger:
         Raises:
             DebuggerError: the run does not stand still, or the program is over.
         """
-        self._standing()
-        if self.over and command not in _BACK:
+        self._require_stopped()
+        if self.has_ended and command not in _BACKWARD_COMMANDS:
             raise DebuggerError("the program has ended")
         execution = self.execution
-        self._origin = execution.position if command in _BACK else None
+        self._origin = execution.position if command in _BACKWARD_COMMANDS else None
         match command:
             case "continue":
-                self._active = execution.forward()
+                self._active = execution.run_forward()
             case "tick":
-                self._active = execution.forward(tick=True)
+                self._active = execution.run_forward(tick=True)
             case "next" | "in" | "out" | "stage":
-                self._active = execution.forward(step_of(execution.machine, command, path))
+                self._active = execution.run_forward(begin_step(execution.machine, command, path))
             case "back":
-                self._active = execution.back(path)
+                self._active = execution.step_back(path)
             case "tick back":
-                self._active = execution.back_one_tick(path)
+                self._active = execution.step_back_tick(path)
             case "reverse":
-                self._active = execution.reverse()
+                self._active = execution.reverse_to_breakpoint()
 
-    def work(self, seconds: float = math.inf) -> Stop | None:
+    def run_slice(self, seconds: float = math.inf) -> Stop | None:
         """Do what the run has to do up to the next stop.
 
         Args:
@@ -121,7 +121,7 @@ class Debugger:
             try:
                 next(self._active)
             except StopIteration as done:
-                self._arrive(done.value)
+                self._record_stop(done.value)
             else:
                 if time.perf_counter() > end:
                     return None
@@ -132,39 +132,45 @@ class Debugger:
         if self._active is not None:
             self._active.close()
             if self._origin is not None:
-                self.execution.land(self._origin, passed=True)
-            self._arrive(Stop(reason="pause", path=self.execution.next_process))
+                self.execution.go_to(self._origin, passed=True)
+            self._record_stop(Stop(reason="pause", path=self.execution.next_process))
         assert self.stop is not None  # noqa: S101 - it stands still
         return self.stop
 
-    def _arrive(self, stop: Stop) -> None:
+    def _record_stop(self, stop: Stop) -> None:
         self._active, self.stop = None, stop
         if self._origin is not None:
             # What was done again on a run backwards is no news.
-            self._reported, self._origin = len(self.machine.state.effects), None
-        self._reported = min(self._reported, len(self.machine.state.effects))
+            self._reported_count, self._origin = len(self.machine.state.effects), None
+        self._reported_count = min(self._reported_count, len(self.machine.state.effects))
 
-    def new_effects(self) -> list[Effect]:
+    def take_effects(self) -> list[Effect]:
         """Return what the program has done since this was last asked for."""
         if self._origin is not None:
             return []
-        effects = self.machine.state.effects[self._reported :]
-        self._reported += len(effects)
+        effects = self.machine.state.effects[self._reported_count :]
+        self._reported_count += len(effects)
         return effects
 
-    def log_messages(self) -> list[tuple[str, Breakpoint]]:
+    def take_log_messages(self) -> list[tuple[str, Breakpoint]]:
         """Return what breakpoints have logged since this was last asked for."""
-        messages, self.execution.messages = self.execution.messages, []
+        messages, self.execution.log_messages = self.execution.log_messages, []
         return messages
 
-    def _standing(self) -> None:
+    def _require_stopped(self) -> None:
         if self._active is not None or self.stop is None:
             raise DebuggerError("the program is running")
 
     # ---- breakpoints -----------------------------------------------------------------------------------------------
 
-    def break_at(
-        self, line: int, column: int | None = None, *, condition: str = "", hits: str = "", log: str = ""
+    def add_breakpoint(
+        self,
+        line: int,
+        column: int | None = None,
+        *,
+        condition: str = "",
+        hit_condition: str = "",
+        log_message: str = "",
     ) -> Breakpoint:
         """Stop the run at a line from now on.
 
@@ -172,8 +178,8 @@ class Debugger:
             line: from 1; where no statement begins in it, the next in which one does.
             column: from 1, to choose among the statements of a line.
             condition: an expression that must be true.
-            hits: how often the statement must have been come to: ``3``, ``>= 3``, ``% 3``.
-            log: say this instead of stopping; expressions in braces are worked out.
+            hit_condition: how often the statement must have been come to: ``3``, ``>= 3``, ``% 3``.
+            log_message: say this instead of stopping; expressions in braces are worked out.
 
         Returns:
             The breakpoint; one without a ``start`` stops nothing, and its ``message`` says why.
@@ -181,22 +187,29 @@ class Debugger:
         start, message = self.execution.statements.find(line, column), "no statement begins on this line or below"
         if start is not None:
             try:
-                self._check(condition, hits, self.execution.statements.procedure(start.index))
+                self._check(condition, hit_condition, self.execution.statements.procedure_at(start.index))
                 message = ""
-            except (ExpressionError, CountError) as error:
+            except (ExpressionError, HitConditionError) as error:
                 start, message = None, str(error)
         number = next(self._numbers)
-        result = Breakpoint(number=number, start=start, condition=condition, hits=hits, log=log, message=message)
+        result = Breakpoint(
+            number=number,
+            start=start,
+            condition=condition,
+            hit_condition=hit_condition,
+            log_message=log_message,
+            message=message,
+        )
         self.execution.breakpoints.append(result)
         return result
 
-    def watch(self, slot: str, *, condition: str = "", hits: str = "") -> Watch:
+    def add_watch(self, slot: str, *, condition: str = "", hit_condition: str = "") -> Watch:
         """Stop the run when a frame moves or a variable changes.
 
         Args:
             slot: where it is kept, as ``Variable.slot`` says.
             condition: an expression that must be true then.
-            hits: how often it must have changed.
+            hit_condition: how often it must have changed.
 
         Raises:
             ExpressionError: nothing is kept there, or the condition makes no sense.
@@ -206,12 +219,12 @@ class Debugger:
         known = slot.partition("[")[0] in {*self.machine.state.types, *self.machine.state.tree}
         if kind.sizes or not known:
             raise ExpressionError(f"`{slot}` cannot be watched: it is not a frame, a variable or an element")
-        self._check(condition, hits, None)
-        result = Watch(number=next(self._numbers), slot=slot, condition=condition, hits=hits)
+        self._check(condition, hit_condition, None)
+        result = Watch(number=next(self._numbers), slot=slot, condition=condition, hit_condition=hit_condition)
         self.execution.watches.append(result)
         return result
 
-    def forget(self, number: int) -> bool:
+    def remove_breakpoint(self, number: int) -> bool:
         """Forget one breakpoint or watch; return whether there was one of that number."""
         execution = self.execution
         before = len(execution.breakpoints) + len(execution.watches)
@@ -221,9 +234,9 @@ class Debugger:
 
     def _check(self, text: str, hits: str, procedure: str | None) -> None:
         if hits:
-            counts(hits, 1)
+            matches_hit_count(hits, 1)
         if text:
-            expressions.condition(text, self.machine, procedure)
+            expressions.parse_condition(text, self.machine, procedure)
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 
@@ -247,18 +260,18 @@ class Debugger:
         """The processes of the program, in the order of the text."""
         return sorted(self.machine.state.processes, key=lambda process: process.path)
 
-    def stack(self, path: Path = ()) -> list[Frame]:
+    def stack(self, path: ProcessPath = ()) -> list[StackFrame]:
         """Return where a process is, the innermost first.
 
         Raises:
             DebuggerError: there is no such process.
         """
-        process = process_of(self.machine, path)
+        process = find_process(self.machine, path)
         if process is None:
             raise DebuggerError("this process has ended")
-        return stack(self.machine, process, self.execution.statements)
+        return call_stack(self.machine, process, self.execution.statements)
 
-    def scopes(self, path: Path = (), level: int = 0) -> list[Variable]:
+    def scopes(self, path: ProcessPath = (), level: int = 0) -> list[Variable]:
         """Return what there is to see from one level of a stack.
 
         Raises:
@@ -266,7 +279,7 @@ class Debugger:
         """
         return variables.scopes(self.view, self._frame(path, level))
 
-    def evaluate(self, text: str, path: Path = (), level: int = 0) -> Variable:
+    def evaluate(self, text: str, path: ProcessPath = (), level: int = 0) -> Variable:
         """Return the value of an expression, as a level of a stack sees it.
 
         Args:
@@ -279,16 +292,16 @@ class Debugger:
             DebuggerError: there is no such process or level.
         """
         frame, view = self._frame(path, level), self.view
-        if text.strip().upper() == "FRAMES" and "FRAMES" not in names_at(view, frame.procedure):
-            return Variable(name="frames", value="\n".join(variables.frames_text(view)))
-        parsed = expressions.parse(text, view, frame.procedure)
-        slot = expressions.slot_of(view, frame, parsed)
+        if text.strip().upper() == "FRAMES" and "FRAMES" not in visible_names(view, frame.procedure):
+            return Variable(name="frames", value="\n".join(variables.frame_tree_lines(view)))
+        parsed = expressions.parse_expression(text, view, frame.procedure)
+        slot = expressions.find_slot(view, frame, parsed)
         if slot is not None:
-            return attrs.evolve(variables.variable(view, slot, name=text), expression=text)
-        kind = "" if parsed.sort is None else parsed.sort.word
-        return variables.result(view, text, expressions.compute(view, frame, parsed), kind)
+            return attrs.evolve(variables.make_variable(view, slot, name=text), expression=text)
+        kind = "" if parsed.type is None else parsed.type.word
+        return variables.value_variable(view, text, expressions.evaluate(view, frame, parsed), kind)
 
-    def assign(self, slot: str, text: str, path: Path = (), level: int = 0) -> Variable:
+    def assign(self, slot: str, text: str, path: ProcessPath = (), level: int = 0) -> Variable:
         """Give a variable or a frame another value; the run goes on with it.
 
         Args:
@@ -301,30 +314,30 @@ class Debugger:
             ExpressionError: the expression has no such value, or nothing can be kept there.
             DebuggerError: the run does not stand still, or there is no such process or level.
         """
-        self._standing()
+        self._require_stopped()
         frame, view = self._frame(path, level), self.view
         kind = view.type_of(slot)
-        if kind.sizes or kind.kind is VariableKind.EVENT or self.over:
-            raise ExpressionError(f"`{view.spelled(slot)}` cannot be assigned a value here")
-        moving = mover(view, slot) if kind.kind is VariableKind.FRAME else None
+        if kind.sizes or kind.kind is VariableKind.EVENT or self.has_ended:
+            raise ExpressionError(f"`{view.spelling(slot)}` cannot be assigned a value here")
+        moving = moving_process(view, slot) if kind.kind is VariableKind.FRAME else None
         if moving is not None and not is_arm(slot):
-            raise ExpressionError(f"`{view.spelled(slot)}` is being moved; it can be assigned a pose after the MOVE")
-        value = expressions.value_for(view, frame, text, kind.kind)
+            raise ExpressionError(f"`{view.spelling(slot)}` is being moved; it can be assigned a pose after the MOVE")
+        value = expressions.evaluate_as(view, frame, text, kind.kind)
 
         def change(machine: Machine) -> None:
-            assert not isinstance(value, Element)  # noqa: S101 - elements have been read
+            assert not isinstance(value, ElementReference)  # noqa: S101 - elements have been read
             if isinstance(value, np.ndarray) and kind.kind is VariableKind.FRAME:
-                machine.place(process_of(machine, path) or machine.state.program, slot, value, frame.span)
+                machine.set_pose(find_process(machine, path) or machine.state.program, slot, value, frame.span)
             else:
                 machine.state.values[slot] = value
 
         try:
-            self.execution.timeline.change(change)
+            self.execution.timeline.apply_change(change)
         except RunError as error:
             raise ExpressionError(str(error)) from None
-        return variables.variable(self.view, slot)
+        return variables.make_variable(self.view, slot)
 
-    def _frame(self, path: Path, level: int) -> Frame:
+    def _frame(self, path: ProcessPath, level: int) -> StackFrame:
         frames = self.stack(path)
         if not 0 <= level < len(frames):
             raise DebuggerError("this procedure has been left")

@@ -8,14 +8,14 @@ import attrs
 
 from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code
-from armwright.program.debugger.breakpoints import Breakpoint, Watch, counts
-from armwright.program.debugger.expressions import ExpressionError, Parsed, compute, parse
-from armwright.program.debugger.history import Path, Timeline
-from armwright.program.debugger.snapshot import mover, process_of, sampled, stack
+from armwright.program.debugger.breakpoints import Breakpoint, Watch, matches_hit_count
+from armwright.program.debugger.expressions import CheckedExpression, ExpressionError, evaluate, parse_expression
+from armwright.program.debugger.history import ProcessPath, Timeline
+from armwright.program.debugger.snapshot import call_stack, find_process, moving_process, view_at
 from armwright.program.debugger.statements import Statements
 from armwright.program.debugger.step_rules import Step
 from armwright.program.debugger.stop_reason import Stop
-from armwright.program.debugger.variables import result
+from armwright.program.debugger.variables import value_variable
 from armwright.program.vm.interpreter import Limits, RunError
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Process
@@ -23,7 +23,7 @@ from armwright.program.vm.process import Process
 # A run to the next stop; it can be given up whenever it yields.
 RunToStop: TypeAlias = Generator[None, None, Stop]
 # A moment of a run: the steps done, and the servo tick.
-Position: TypeAlias = tuple[int, int]
+RunPosition: TypeAlias = tuple[int, int]
 
 _IN_BRACES = re.compile(r"\{([^{}]*)\}")
 
@@ -34,26 +34,26 @@ class Execution:
     Attributes:
         timeline: the run.
         statements: of the program.
-        ticks: the servo tick that is shown; the machine itself only knows those at which something is done.
+        tick: the servo tick that is shown; the machine itself only knows those at which something is done.
         breakpoints: lines at which it stops.
         watches: frames and variables at whose change it stops.
-        catches: what errors it stops at: ``uncaught`` ones, and ``caught`` ones.
-        messages: of breakpoints that log instead of stopping.
+        exception_filters: what errors it stops at: ``uncaught`` ones, and ``caught`` ones.
+        log_messages: of breakpoints that log instead of stopping.
     """
 
     def __init__(self, code: Code, cell: Cell, limits: Limits | None) -> None:
         """Stand in front of the first statement."""
         self.timeline = Timeline(code, cell, limits)
         self.statements = Statements(code)
-        self.ticks = 0
+        self.tick = 0
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[Watch] = []
-        self.catches = frozenset({"uncaught"})
-        self.messages: list[tuple[str, Breakpoint]] = []
+        self.exception_filters = frozenset({"uncaught"})
+        self.log_messages: list[tuple[str, Breakpoint]] = []
         # After so many steps it was stopped in front of a statement, or of an error, and now goes past it.
-        self._passed = self._raised = -1
+        self._passed_step = self._error_step = -1
         self._silent = False
-        self._conditions: dict[tuple[str, str | None], Parsed] = {}
+        self._conditions: dict[tuple[str, str | None], CheckedExpression] = {}
 
     @property
     def machine(self) -> Machine:
@@ -61,16 +61,16 @@ class Execution:
         return self.timeline.machine
 
     @property
-    def position(self) -> Position:
+    def position(self) -> RunPosition:
         """Where the run has come to."""
-        return self.timeline.done, self.ticks
+        return self.timeline.step_count, self.tick
 
     @property
     def view(self) -> Machine:
         """The machine as it is seen now."""
-        return sampled(self.machine, max(self.ticks, self.machine.state.ticks))
+        return view_at(self.machine, max(self.tick, self.machine.state.ticks))
 
-    def land(self, position: Position, *, passed: bool = True, reported: frozenset[int] = frozenset()) -> None:
+    def go_to(self, position: RunPosition, *, passed: bool = True, reported: frozenset[int] = frozenset()) -> None:
         """Come to a moment that the run has been at.
 
         Args:
@@ -78,26 +78,28 @@ class Execution:
             passed: whether it is in front of a statement at which the run now stands.
             reported: numbers of the watches that have spoken of the motion of this moment.
         """
-        done, self.ticks = position
+        done, self.tick = position
         self._silent = False
         self.timeline.seek(done)
-        self._passed, self._raised = done if passed else -1, -1
+        self._passed_step, self._error_step = done if passed else -1, -1
         self._start_watches(reported)
 
     def _start_watches(self, reported: frozenset[int]) -> None:
         view = self.view if self.watches else self.machine
         for watch in self.watches:
-            watch.start(view, reported=watch.number in reported)
+            watch.reset(view, reported=watch.number in reported)
 
     # ---- forwards --------------------------------------------------------------------------------------------------
 
-    def entry(self) -> RunToStop:
+    def stop_on_entry(self) -> RunToStop:
         """Stop in front of the first statement."""
         yield
-        self._passed = 0
+        self._passed_step = 0
         return Stop(reason="entry")
 
-    def forward(self, step: Step | None = None, *, tick: bool = False, until: Position | None = None) -> RunToStop:
+    def run_forward(
+        self, step: Step | None = None, *, tick: bool = False, until: RunPosition | None = None
+    ) -> RunToStop:
         """Go on to the next stop.
 
         Args:
@@ -105,212 +107,220 @@ class Execution:
             tick: whether the next servo tick ends it.
             until: no farther than to this moment, which is no stop.
         """
-        self._start_watches(frozenset(watch.number for watch in self.watches if watch.reported is not None))
+        self._start_watches(frozenset(watch.number for watch in self.watches if watch.reported_motion is not None))
         while until is None or self.position < until:
             yield
-            process = self.timeline.ready
+            process = self.timeline.next_process
             if process is not None:
-                stop = yield from self._wait(process.due or 0, until, tick=tick)
+                stop = yield from self._advance_clock(process.due_tick or 0, until, tick=tick)
                 if stop is not None:
                     return stop
                 if until is not None and self.position >= until:
                     break
-                if self.timeline.done != self._passed and self.timeline.arrives(process):
-                    stop = self._arrived(process, step)
+                if self.timeline.step_count != self._passed_step and self.timeline.begins_statement(process):
+                    stop = self._stop_at_statement(process, step)
                     if stop is not None:
-                        self._passed = self.timeline.done
+                        self._passed_step = self.timeline.step_count
                         return stop
-            stop = self._advance(process, step)
+            stop = self._execute_step(process, step)
             if stop is not None:
                 return stop
         return Stop(reason="pause")
 
-    def _wait(self, wake: int, until: Position | None, *, tick: bool) -> Generator[None, None, Stop | None]:
+    def _advance_clock(self, wake: int, until: RunPosition | None, *, tick: bool) -> Generator[None, None, Stop | None]:
         """Let the time go by until a process has something to do."""
-        while self.ticks < wake and (until is None or self.position < until):
+        while self.tick < wake and (until is None or self.position < until):
             if tick or any(watch.is_moved(self.machine) for watch in self.watches):
-                self.ticks += 1
-                stop = self._changed(None)
+                self.tick += 1
+                stop = self._stop_at_change(None)
                 if stop is not None or tick:
                     return stop or Stop(reason="step", path=self.next_process)
                 yield
             else:
-                last = wake if until is None or until[0] > self.timeline.done else min(wake, until[1])
-                self.ticks = max(self.ticks, last)
+                last = wake if until is None or until[0] > self.timeline.step_count else min(wake, until[1])
+                self.tick = max(self.tick, last)
         return None
 
     @property
-    def next_process(self) -> Path:
+    def next_process(self) -> ProcessPath:
         """The process that comes next."""
-        process = self.timeline.ready
+        process = self.timeline.next_process
         return () if process is None else process.path
 
-    def _arrived(self, process: Process, step: Step | None) -> Stop | None:
+    def _stop_at_statement(self, process: Process, step: Step | None) -> Stop | None:
         """Return why the run stops in front of a statement; None where it does not."""
         numbers, text = [], ""
         for breakpoint_ in self.breakpoints:
-            if breakpoint_.start is None or breakpoint_.start.index != process.at:
+            if breakpoint_.start is None or breakpoint_.start.index != process.pc:
                 continue
             try:
-                is_due = self._applies(breakpoint_, self.timeline.marks.visits.get(process.at, 0) + 1, process)
+                is_due = self._is_triggered(breakpoint_, self.timeline.marks.visits.get(process.pc, 0) + 1, process)
             except ExpressionError as error:
                 is_due, text = True, f"the condition of this breakpoint has no value: {error}"
-            if is_due and breakpoint_.log and not text:
+            if is_due and breakpoint_.log_message and not text:
                 self._log(breakpoint_, process)
             elif is_due:
                 numbers.append(breakpoint_.number)
         if numbers:
-            return Stop(reason="breakpoint", path=process.path, numbers=tuple(numbers), text=text)
-        return Stop(reason="step", path=process.path) if step is not None and step.ends(process) else None
+            return Stop(reason="breakpoint", path=process.path, breakpoint_numbers=tuple(numbers), text=text)
+        return Stop(reason="step", path=process.path) if step is not None and step.ends_at(process) else None
 
-    def _applies(self, point: Breakpoint | Watch, hits: int, process: Process) -> bool:
+    def _is_triggered(self, point: Breakpoint | Watch, hits: int, process: Process) -> bool:
         """Whether a breakpoint that is reached for that time, or a watch, has its count and its condition."""
-        if point.hits and not counts(point.hits, hits):
+        if point.hit_condition and not matches_hit_count(point.hit_condition, hits):
             return False
-        return not point.condition or self._holds(point.condition, process)
+        return not point.condition or self._condition_holds(point.condition, process)
 
-    def _holds(self, condition: str, process: Process) -> bool:
+    def _condition_holds(self, condition: str, process: Process) -> bool:
         view = self.view
-        frame = stack(view, process, self.statements)[0]
+        frame = call_stack(view, process, self.statements)[0]
         key = condition, frame.procedure
         if key not in self._conditions:
-            self._conditions[key] = parse(condition, view, frame.procedure)
-        return bool(compute(view, frame, self._conditions[key]))
+            self._conditions[key] = parse_expression(condition, view, frame.procedure)
+        return bool(evaluate(view, frame, self._conditions[key]))
 
     def _log(self, breakpoint_: Breakpoint, process: Process) -> None:
         if self._silent:
             return
         view = self.view
-        frame = stack(view, process, self.statements)[0]
+        frame = call_stack(view, process, self.statements)[0]
 
         def value(match: re.Match[str]) -> str:
             try:
-                parsed = parse(match[1], view, frame.procedure)
-                return match[1] if parsed.sort is None else result(view, "", compute(view, frame, parsed), "").value
+                parsed = parse_expression(match[1], view, frame.procedure)
+                return (
+                    match[1]
+                    if parsed.type is None
+                    else value_variable(view, "", evaluate(view, frame, parsed), "").value
+                )
             except ExpressionError as error:
                 return f"({error})"
 
-        self.messages.append((_IN_BRACES.sub(value, breakpoint_.log), breakpoint_))
+        self.log_messages.append((_IN_BRACES.sub(value, breakpoint_.log_message), breakpoint_))
 
-    def _advance(self, process: Process | None, step: Step | None) -> Stop | None:
+    def _execute_step(self, process: Process | None, step: Step | None) -> Stop | None:
         """Do one step of the program; return why the run stops with it."""
         timeline, machine = self.timeline, self.machine
-        done, effects = timeline.done, len(machine.state.effects)
+        done, effects = timeline.step_count, len(machine.state.effects)
         path = () if process is None else process.path
         try:
             timeline.advance()
         except RunError as error:
             stop = Stop(reason="exception", text=str(error), diagnostic=error.diagnostic)
-            if self._raised == done or "uncaught" not in self.catches:
-                self.ticks = max(self.ticks, machine.state.ticks)
+            if self._error_step == done or "uncaught" not in self.exception_filters:
+                self.tick = max(self.tick, machine.state.ticks)
                 return attrs.evolve(stop, reason="failed", path=path, recording=error.recording)
-            return self._before_error(done, path, stop)
-        if "caught" in self.catches and self._raised != done:
+            return self._stop_before_error(done, path, stop)
+        if "caught" in self.exception_filters and self._error_step != done:
             caught = next((effect for effect in machine.state.effects[effects:] if effect.kind == "ERROR"), None)
             if caught is not None:
-                return self._before_error(done, path, Stop(reason="exception", text=caught.text, caught=True))
-        self.ticks = max(self.ticks, machine.state.ticks)
-        if machine.state.over:
+                return self._stop_before_error(done, path, Stop(reason="exception", text=caught.text, caught=True))
+        self.tick = max(self.tick, machine.state.ticks)
+        if machine.state.has_ended:
             return Stop(reason="end", path=path)
-        changed = self._changed(path)
-        reason = None if step is None else step.took(machine, path)
+        changed = self._stop_at_change(path)
+        reason = None if step is None else step.record_step(machine, path)
         if changed is not None or reason is None:
             return changed
         assert step is not None  # noqa: S101 - it has ended
         return Stop(reason="step", path=step.path, text=reason)
 
-    def _before_error(self, done: int, path: Path, stop: Stop) -> Stop:
+    def _stop_before_error(self, done: int, path: ProcessPath, stop: Stop) -> Stop:
         """Go back to in front of the step that went wrong, so that everything can be looked at as it was then."""
         self.timeline.seek(done)
-        self._raised = done
-        if self.timeline.ready is None:
-            path = self.machine.state.stuck[0].path
+        self._error_step = done
+        if self.timeline.next_process is None:
+            path = self.machine.state.blocked_processes[0].path
         return attrs.evolve(stop, path=path)
 
-    def _changed(self, path: Path | None) -> Stop | None:
+    def _stop_at_change(self, path: ProcessPath | None) -> Stop | None:
         """Return the stop of the frames and variables that have changed; None where none has."""
         if not self.watches:
             return None
         # With all arms at rest the table is what one sees.
-        view = self.view if any(mover(self.machine, watch.slot) for watch in self.watches) else self.machine
+        view = self.view if any(moving_process(self.machine, watch.slot) for watch in self.watches) else self.machine
         texts, numbers = [], []
         for watch in self.watches:
-            text = watch.update(view)
-            if text is None or not self._stops_for(watch):
+            text = watch.check_change(view)
+            if text is None or not self._is_stopped_by(watch):
                 continue
-            moving = mover(view, watch.slot)
+            moving = moving_process(view, watch.slot)
             path = moving.path if path is None and moving is not None else path
             texts.append(text)
             numbers.append(watch.number)
         if not numbers:
             return None
-        present = process_of(self.machine, path) if path is not None else None
+        present = find_process(self.machine, path) if path is not None else None
         shown = self.next_process if present is None or path is None else path
-        return Stop(reason="data breakpoint", path=shown, text="; ".join(texts), numbers=tuple(numbers))
+        return Stop(reason="data breakpoint", path=shown, text="; ".join(texts), breakpoint_numbers=tuple(numbers))
 
-    def _stops_for(self, watch: Watch) -> bool:
+    def _is_stopped_by(self, watch: Watch) -> bool:
         try:
-            return self._applies(watch, watch.changes, self.timeline.ready or self.machine.state.program)
+            return self._is_triggered(watch, watch.changes, self.timeline.next_process or self.machine.state.program)
         except ExpressionError:
             return True
 
     # ---- back ------------------------------------------------------------------------------------------------------
 
-    def back(self, path: Path) -> RunToStop:
+    def step_back(self, path: ProcessPath) -> RunToStop:
         """Go back to the statement that a process began last, at the same level or further out."""
-        now = process_of(self.machine, path)
+        now = find_process(self.machine, path)
         depth = 0 if now is None else len(now.stack)
-        limit = self.timeline.done
-        for done in self.timeline.moments_before(limit):
+        limit = self.timeline.step_count
+        for done in self.timeline.snapshots_before(limit):
             self.timeline.seek(done)
-            nearest: tuple[Position, Path] | None = None
-            while self.timeline.done < limit:
+            nearest: tuple[RunPosition, ProcessPath] | None = None
+            while self.timeline.step_count < limit:
                 yield
-                process = self.timeline.ready
-                if process is not None and self.timeline.arrives(process):
+                process = self.timeline.next_process
+                if process is not None and self.timeline.begins_statement(process):
                     own = process.path == path and (len(process.stack) <= depth or now is None)
                     # A branch comes out of the process that began it.
                     if own or (len(process.path) < len(path) and path[: len(process.path)] == process.path):
-                        due = max(process.due or 0, self.machine.state.ticks)
-                        nearest = (self.timeline.done, due), process.path
+                        due = max(process.due_tick or 0, self.machine.state.ticks)
+                        nearest = (self.timeline.step_count, due), process.path
                 self.timeline.advance()
             if nearest is not None:
-                return self._landed(nearest[0], Stop(reason="step", path=nearest[1]))
+                return self._stop_at(nearest[0], Stop(reason="step", path=nearest[1]))
             limit = done
-        return self._landed((0, 0), Stop(reason="start"))
+        return self._stop_at((0, 0), Stop(reason="start"))
 
-    def back_one_tick(self, path: Path) -> RunToStop:
+    def step_back_tick(self, path: ProcessPath) -> RunToStop:
         """Go back to the servo tick before, as it was when the time had come to it."""
-        tick = self.ticks - 1
+        tick = self.tick - 1
         if tick < 0:
-            return self._landed((0, 0), Stop(reason="start"))
-        limit = self.timeline.done
-        for done in self.timeline.moments_before(limit + 1):
+            return self._stop_at((0, 0), Stop(reason="start"))
+        limit = self.timeline.step_count
+        for done in self.timeline.snapshots_before(limit + 1):
             self.timeline.seek(done)
             if not done or self.machine.state.ticks < tick:
                 break
-        while self.timeline.done < limit and (process := self.timeline.ready) and (process.due or 0) < tick:
+        while (
+            self.timeline.step_count < limit
+            and (process := self.timeline.next_process)
+            and (process.due_tick or 0) < tick
+        ):
             self.timeline.advance()
             yield
-        return self._landed((self.timeline.done, tick), Stop(reason="step", path=path), passed=False)
+        return self._stop_at((self.timeline.step_count, tick), Stop(reason="step", path=path), passed=False)
 
-    def reverse(self) -> RunToStop:
+    def reverse_to_breakpoint(self) -> RunToStop:
         """Go back to the last moment at which a breakpoint stops the run, or else to the start."""
         limit = self.position
-        for done in self.timeline.moments_before(max(limit[0], 1)):
-            self.land((done, 0), passed=False)
-            self.ticks, self._silent = self.machine.state.ticks, True
+        for done in self.timeline.snapshots_before(max(limit[0], 1)):
+            self.go_to((done, 0), passed=False)
+            self.tick, self._silent = self.machine.state.ticks, True
             begun, nearest = self.position, None
             while self.position < limit:
-                stop = yield from self.forward(until=limit)
+                stop = yield from self.run_forward(until=limit)
                 if self.position < limit:
                     nearest = self.position, stop
             if nearest is not None:
-                return self._landed(nearest[0], nearest[1], passed=nearest[1].reason != "data breakpoint")
+                return self._stop_at(nearest[0], nearest[1], passed=nearest[1].reason != "data breakpoint")
             limit = begun
-        return self._landed((0, 0), Stop(reason="start"))
+        return self._stop_at((0, 0), Stop(reason="start"))
 
-    def _landed(self, position: Position, stop: Stop, *, passed: bool = True) -> Stop:
-        self.land(position, passed=passed, reported=frozenset(stop.numbers))
-        self.timeline.forget()
+    def _stop_at(self, position: RunPosition, stop: Stop, *, passed: bool = True) -> Stop:
+        self.go_to(position, passed=passed, reported=frozenset(stop.breakpoint_numbers))
+        self.timeline.discard_later()
         return stop

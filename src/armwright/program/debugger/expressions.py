@@ -8,7 +8,7 @@ import attrs
 from armwright.errors import ArmwrightError
 from armwright.program.bytecode.emitter import Emitter
 from armwright.program.bytecode.instructions import Instruction, Op, Operand
-from armwright.program.debugger.snapshot import Frame
+from armwright.program.debugger.snapshot import StackFrame
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
@@ -21,7 +21,7 @@ from armwright.program.syntax.expressions import expression
 from armwright.program.syntax.lexer import TokenKind, scan
 from armwright.program.syntax.token_stream import LostError, Tokens
 from armwright.program.vm.expressions import evaluate_instructions
-from armwright.program.vm.machine import Machine, RunError, arrays_of
+from armwright.program.vm.machine import Machine, RunError, constant_values
 from armwright.program.vm.process import Activation, Process, Value
 
 
@@ -30,21 +30,21 @@ class ExpressionError(ArmwrightError, ValueError):
 
 
 @attrs.frozen(kw_only=True)
-class Parsed:
+class CheckedExpression:
     """An expression that makes sense where it was asked for.
 
     Attributes:
         source: its text.
         node: what it says.
-        sort: what its value is; None for a whole array.
+        type: what its value is; None for a whole array.
     """
 
     source: Source
     node: tree.Expression
-    sort: ExpressionType | None
+    type: ExpressionType | None
 
 
-def names_at(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
+def visible_names(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
     """Return what can be named: frames of the cell, arms aside, names of the program, and of the procedure if any."""
     inner = (name for name in machine.state.tree if not set(name) & set(".'["))
     own = {} if procedure is None else machine.code.procedures[procedure].types
@@ -52,7 +52,7 @@ def names_at(machine: Machine, procedure: str | None) -> dict[str, VariableType]
     return {**cell, **PREDECLARED, **machine.code.types, **own}
 
 
-def parse(text: str, machine: Machine, procedure: str | None) -> Parsed:
+def parse_expression(text: str, machine: Machine, procedure: str | None) -> CheckedExpression:
     """Read an expression and check what it is made of.
 
     Args:
@@ -63,31 +63,31 @@ def parse(text: str, machine: Machine, procedure: str | None) -> Parsed:
     Raises:
         ExpressionError: it makes no sense.
     """
-    source, types = Source("expression", text), names_at(machine, procedure)
+    source, types = Source("expression", text), visible_names(machine, procedure)
     scanned = scan(source, text)
-    _refuse(scanned.diagnostics)
+    _raise_errors(scanned.diagnostics)
     named = [attrs.evolve(token, kind=TokenKind.NAME) if token.key in types else token for token in scanned.tokens]
     tokens = Tokens(source, named, {})
     try:
         node = expression(tokens)
     except LostError:
         node = None
-    _refuse(tokens.diagnostics)
+    _raise_errors(tokens.diagnostics)
     if node is None or not tokens.done:
         raise ExpressionError(f"`{tokens.now.text}` does not belong here")
     if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
-        return Parsed(source=source, node=node, sort=None)
+        return CheckedExpression(source=source, node=node, type=None)
     names = Names(None)
     names.symbols.types = dict(types)
     names.symbols.units = machine.code.units
     sort = type_check.sort(names, node)
-    _refuse(names.diagnostics)
+    _raise_errors(names.diagnostics)
     if sort is None:
         raise ExpressionError(f"`{text}` has no value")
-    return Parsed(source=source, node=node, sort=sort)
+    return CheckedExpression(source=source, node=node, type=sort)
 
 
-def compute(machine: Machine, frame: Frame, parsed: Parsed) -> Value:
+def evaluate(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> Value:
     """Return the value of an expression; of an event, how often it was signalled and not yet taken.
 
     Args:
@@ -98,16 +98,16 @@ def compute(machine: Machine, frame: Frame, parsed: Parsed) -> Value:
     Raises:
         ExpressionError: something in it has no value.
     """
-    here, asking, operand = _worked_out(machine, frame, parsed)
-    if parsed.sort is ExpressionType.EVENT:
-        return float(here.state.events.get(here.name(asking, operand), 0))
+    here, asking, operand = _execute(machine, frame, parsed)
+    if parsed.type is ExpressionType.EVENT:
+        return float(here.state.events.get(here.resolve_name(asking, operand), 0))
     try:
         return here.read(asking, operand, Instruction(op=Op.PRINT, span=parsed.node.span))
     except RunError as error:
         raise ExpressionError(str(error)) from None
 
 
-def slot_of(machine: Machine, frame: Frame, parsed: Parsed) -> str | None:
+def find_slot(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> str | None:
     """Return where an expression is kept, if it is a variable, an element or an arm; None for anything else.
 
     Raises:
@@ -120,37 +120,37 @@ def slot_of(machine: Machine, frame: Frame, parsed: Parsed) -> str | None:
         return frame.activation.bindings.get(node.key, node.key)
     if not isinstance(node, tree.Index):
         return None
-    here, asking, operand = _worked_out(machine, frame, parsed)
-    return here.name(asking, operand)
+    here, asking, operand = _execute(machine, frame, parsed)
+    return here.resolve_name(asking, operand)
 
 
-def value_for(machine: Machine, frame: Frame, text: str, kind: VariableKind) -> Value:
+def evaluate_as(machine: Machine, frame: StackFrame, text: str, kind: VariableKind) -> Value:
     """Return the value of an expression that a variable of some kind shall get.
 
     Raises:
         ExpressionError: it makes no sense, has no value, or is of another kind.
     """
-    parsed = parse(text, machine, frame.procedure)
+    parsed = parse_expression(text, machine, frame.procedure)
     expected = OF_KIND[kind]
-    if parsed.sort not in FITTING[expected]:
-        actual = "an array" if parsed.sort is None else is_what(parsed.node, parsed.sort)
+    if parsed.type not in FITTING[expected]:
+        actual = "an array" if parsed.type is None else is_what(parsed.node, parsed.type)
         raise ExpressionError(f"expected {expected.value}, but `{text}` is {actual}")
-    return compute(machine, frame, parsed)
+    return evaluate(machine, frame, parsed)
 
 
-def condition(text: str, machine: Machine, procedure: str | None) -> Parsed:
+def parse_condition(text: str, machine: Machine, procedure: str | None) -> CheckedExpression:
     """Read a condition, or a number that may be 0.
 
     Raises:
         ExpressionError: it is neither.
     """
-    parsed = parse(text, machine, procedure)
-    if parsed.sort not in (ExpressionType.CONDITION, ExpressionType.SCALAR):
+    parsed = parse_expression(text, machine, procedure)
+    if parsed.type not in (ExpressionType.CONDITION, ExpressionType.SCALAR):
         raise ExpressionError(f"expected a condition, such as `n > 0`, but `{text}` is not one")
     return parsed
 
 
-def _worked_out(machine: Machine, frame: Frame, parsed: Parsed) -> tuple[Machine, Process, Operand]:
+def _execute(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> tuple[Machine, Process, Operand]:
     """Do the steps of an expression: they give values in passing, and nothing else.
 
     Returns:
@@ -164,7 +164,7 @@ def _worked_out(machine: Machine, frame: Frame, parsed: Parsed) -> tuple[Machine
     steps = tuple(emitter.instructions)
     here, asking = copy.copy(machine), copy.copy(frame.process)
     here.code = attrs.evolve(machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source)
-    here.constants = arrays_of(emitter.constants)
+    here.constants = constant_values(emitter.constants)
     asking.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
     try:
         evaluate_instructions(here, asking, steps)
@@ -173,7 +173,7 @@ def _worked_out(machine: Machine, frame: Frame, parsed: Parsed) -> tuple[Machine
     return here, asking, operand
 
 
-def _refuse(actual: Sequence[Diagnostic]) -> None:
+def _raise_errors(actual: Sequence[Diagnostic]) -> None:
     for diagnostic in actual:
         if diagnostic.is_error:
             raise ExpressionError("; ".join((diagnostic.message, *diagnostic.helps[:1])))

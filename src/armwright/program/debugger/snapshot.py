@@ -4,14 +4,14 @@ import copy
 
 import attrs
 
-from armwright.program.debugger.history import Path
+from armwright.program.debugger.history import ProcessPath
 from armwright.program.debugger.statements import Statements
 from armwright.program.language.source import Span
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Activation, Process
 
 
-def sampled(machine: Machine, ticks: int) -> Machine:
+def view_at(machine: Machine, ticks: int) -> Machine:
     """Return a machine for inspection, as things are at a tick; the machine itself stays as it is.
 
     Between the steps of a program its frame table says where an arm was last known to be. What one sees is where
@@ -26,7 +26,7 @@ def sampled(machine: Machine, ticks: int) -> Machine:
     view.state.ticks = ticks
     moving = {process.motion.arm for process in machine.state.processes if process.motion is not None}
     for name in machine.cell.arms:
-        last = machine.state.runs[name][-1] if machine.state.runs[name] else None
+        last = machine.state.segments[name][-1] if machine.state.segments[name] else None
         if name not in moving and (last is None or view.now > last.t0 + last.duration):
             # It rests, and the frame table knows where.
             continue
@@ -34,19 +34,19 @@ def sampled(machine: Machine, ticks: int) -> Machine:
     return view
 
 
-def process_of(machine: Machine, path: Path) -> Process | None:
+def find_process(machine: Machine, path: ProcessPath) -> Process | None:
     """Return a process by its position among the branches; None where it has ended or not begun."""
     return next((process for process in machine.state.processes if process.path == path), None)
 
 
-def mover(machine: Machine, frame: str) -> Process | None:
+def moving_process(machine: Machine, frame: str) -> Process | None:
     """Return the process that moves a frame by moving an arm; None where it rests."""
     arm = machine.carrier(frame) if frame in machine.state.tree else None
-    return None if arm is None else machine.mover(arm)
+    return None if arm is None else machine.moving_process(arm)
 
 
 @attrs.frozen(kw_only=True)
-class Frame:
+class StackFrame:
     """One level of the stack of a process: the program itself, a procedure, the action of a MOVE.
 
     Attributes:
@@ -64,25 +64,25 @@ class Frame:
     procedure: str | None
 
 
-def stack(machine: Machine, process: Process, statements: Statements) -> list[Frame]:
+def call_stack(machine: Machine, process: Process, statements: Statements) -> list[StackFrame]:
     """Return where a process is, the innermost first."""
     frames = []
-    index, span = process.at, _where(process, statements)
+    index, span = process.pc, _current_span(process, statements)
     for activation in reversed(process.stack):
-        title, procedure = _title(machine, process, activation), statements.procedure(index)
-        frames.append(Frame(process=process, title=title, span=span, activation=activation, procedure=procedure))
-        index = activation.back
-        if activation.called is not None:
-            span = activation.called
+        title, procedure = _frame_title(machine, process, activation), statements.procedure_at(index)
+        frames.append(StackFrame(process=process, title=title, span=span, activation=activation, procedure=procedure))
+        index = activation.return_address
+        if activation.call_span is not None:
+            span = activation.call_span
     return frames
 
 
-def _where(process: Process, statements: Statements) -> Span:
-    cause = process.waiting or process.pending or process.follows or statements.at(process.at)
+def _current_span(process: Process, statements: Statements) -> Span:
+    cause = process.waiting or process.pending_effect or process.followed_motion or statements.statement_at(process.pc)
     return cause.span
 
 
-def _title(machine: Machine, process: Process, activation: Activation) -> str:
+def _frame_title(machine: Machine, process: Process, activation: Activation) -> str:
     if activation.kind == "procedure":
-        return machine.spelled(activation.name)
+        return machine.spelling(activation.name)
     return f"ON of a MOVE of {process.title}" if activation.kind == "action" else process.title

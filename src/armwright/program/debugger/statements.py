@@ -13,7 +13,7 @@ _TRAILING = frozenset((Op.JMP, Op.ENDT, Op.ENDR, Op.UNLK, Op.RET, Op.QUIT))
 
 
 @attrs.frozen(kw_only=True)
-class Start:
+class StatementStart:
     """Where a statement begins.
 
     Attributes:
@@ -33,29 +33,29 @@ class Statements:
     def __init__(self, code: Code) -> None:
         """Check every instruction once."""
         self._code = code
-        self._begins = [index for index, step in enumerate(code.instructions) if step.begins]
+        self._start_indices = [index for index, step in enumerate(code.instructions) if step.begins]
         self._procedures = sorted((procedure.start, name) for name, procedure in code.procedures.items())
-        starts = tuple(self._starts())
+        starts = tuple(self._find_starts())
         self._by_index = {start.index: start for start in starts}
         # A line is entered by the first statement in it; a FOR has a second beginning for each further pass.
-        self._by_place = sorted(starts, key=lambda start: (start.line, start.span.start, start.index))
+        self._by_position = sorted(starts, key=lambda start: (start.line, start.span.start, start.index))
 
-    def at(self, index: int) -> Start:
+    def statement_at(self, index: int) -> StatementStart:
         """Return the statement that an instruction belongs to; behind the last one, the last."""
         index = min(index, len(self._code.instructions) - 1)
-        at = bisect_right(self._begins, index) - 1
-        start = self._by_index[self._begins[max(at, 0)]]
+        at = bisect_right(self._start_indices, index) - 1
+        start = self._by_index[self._start_indices[max(at, 0)]]
         step = self._code.instructions[index]
         if step.op in _TRAILING and not step.begins:
-            return Start(index=index, span=step.span, line=self._code.line(step))
+            return StatementStart(index=index, span=step.span, line=self._code.line(step))
         return start
 
-    def procedure(self, index: int) -> str | None:
+    def procedure_at(self, index: int) -> str | None:
         """Return the procedure that an instruction stands in; None for the main program."""
         at = bisect_right(self._procedures, index, key=lambda procedure: procedure[0]) - 1
         return self._procedures[at][1] if at >= 0 else None
 
-    def find(self, line: int, column: int | None = None) -> Start | None:
+    def find(self, line: int, column: int | None = None) -> StatementStart | None:
         """Return the statement at which a run can be stopped for a line.
 
         Args:
@@ -67,27 +67,27 @@ class Statements:
             statement follows.
         """
         source = self._code.source
-        for start in self._by_place:
+        for start in self._by_position:
             early = column is not None and start.line == line and source.column(start.span.start) < column
             if start.line >= line and not early:
                 return start
         return None
 
-    def between(self, first: int, last: int) -> Iterator[Start]:
+    def in_lines(self, first: int, last: int) -> Iterator[StatementStart]:
         """Give the statements that begin in some lines, in the order of the text, each once."""
         lines = set()
-        for start in self._by_place:
+        for start in self._by_position:
             if first <= start.line <= last and start.span.start not in lines:
                 lines.add(start.span.start)
                 yield start
 
-    def _starts(self) -> Iterator[Start]:
+    def _find_starts(self) -> Iterator[StatementStart]:
         instructions, source = self._code.instructions, self._code.source
-        ends = [*self._begins[1:], len(instructions)]
-        for first, end in zip(self._begins, ends, strict=True):
+        ends = [*self._start_indices[1:], len(instructions)]
+        for first, end in zip(self._start_indices, ends, strict=True):
             group = instructions[first:end]
             own = [group[0], *(step for step in group[1:] if step.op not in _TRAILING)]
             index = min(step.span.start for step in own)
             # A condition or an action of a MOVE lies inside of its statement, and never begins before it.
             span = Span(index, max(step.span.end for step in own if step.span.start == index))
-            yield Start(index=first, span=span, line=source.line(index))
+            yield StatementStart(index=first, span=span, line=source.line(index))

@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 import attrs
 
 from armwright.errors import ExitStatus
-from armwright.program.debugger.history import Path
+from armwright.program.debugger.history import ProcessPath
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
@@ -23,22 +23,22 @@ class Stop:
         reason: ``start``: it was taken back as far as it goes; ``end`` and ``failed``: it is over.
         path: of the process.
         text: more for people.
-        numbers: of the breakpoints.
+        breakpoint_numbers: of the breakpoints.
         diagnostic: of ``exception`` and ``failed``: what went wrong.
         caught: of ``exception``: whether the program goes on in a RECOVER.
         recording: of ``failed``: returns all that happened up to the failure, marked with it.
     """
 
     reason: Reason
-    path: Path = ()
+    path: ProcessPath = ()
     text: str = ""
-    numbers: tuple[int, ...] = ()
+    breakpoint_numbers: tuple[int, ...] = ()
     diagnostic: Diagnostic | None = None
     caught: bool = False
     recording: Callable[[], Recording] | None = attrs.field(default=None, eq=False)
 
     @property
-    def over(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether the program is over."""
         return self.reason in {"end", "failed"}
 

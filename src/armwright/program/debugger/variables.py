@@ -8,13 +8,13 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
-from armwright.program.debugger.snapshot import Frame
+from armwright.program.debugger.snapshot import StackFrame
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Process, Value
-from armwright.program.vm.value_text import hierarchy, matrix_text, noap_texts
+from armwright.program.vm.value_text import frames_with_depth, matrix_text, noap_texts
 
-_NOTHING = "no value yet"
+_NO_VALUE = "no value yet"
 # Less than this of a number between -1 and 1 is rounding.
 _ROUNDING = 1e-9
 
@@ -27,8 +27,8 @@ class Variable:
         name: what it is.
         value: for people; of what can be changed, as the program could write it.
         type: what kind of thing it is.
-        inside: gives the lines inside of it; None where there are none.
-        elements: how many of those are elements of an array.
+        children: gives the lines inside of it; None where there are none.
+        element_count: how many of those are elements of an array.
         expression: what asks for it again; empty where nothing does.
         slot: where it is kept, if it is a variable, an element or an arm.
     """
@@ -36,13 +36,13 @@ class Variable:
     name: str
     value: str
     type: str = ""
-    inside: Callable[[], "Sequence[Variable]"] | None = None
-    elements: int = 0
+    children: Callable[[], "Sequence[Variable]"] | None = None
+    element_count: int = 0
     expression: str = ""
     slot: str | None = None
 
 
-def scopes(machine: Machine, frame: Frame) -> list[Variable]:
+def scopes(machine: Machine, frame: StackFrame) -> list[Variable]:
     """Return what there is to see from one level of a stack.
 
     Args:
@@ -54,22 +54,22 @@ def scopes(machine: Machine, frame: Frame) -> list[Variable]:
     local = {key: frame.activation.bindings.get(key, key) for key in own if key in frame.activation.bindings}
     values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not VariableKind.FRAME}
     parts: list[tuple[str, Callable[[], Sequence[Variable]]]] = [
-        ("Locals", lambda: [variable(machine, slot, name=machine.spelled(key)) for key, slot in local.items()]),
-        ("Variables", lambda: [variable(machine, value) for value in values]),
-        ("Frames", lambda: [variable(machine, name) for name in frames(machine)]),
-        ("Arms", lambda: [_arm(machine, name) for name in machine.cell.arms]),
-        ("Run", lambda: list(_run(machine, frame.process))),
+        ("Locals", lambda: [make_variable(machine, slot, name=machine.spelling(key)) for key, slot in local.items()]),
+        ("Variables", lambda: [make_variable(machine, value) for value in values]),
+        ("Frames", lambda: [make_variable(machine, name) for name in frame_names(machine)]),
+        ("Arms", lambda: [_arm_variable(machine, name) for name in machine.cell.arms]),
+        ("Run", lambda: list(_run_variables(machine, frame.process))),
     ]
     there = {"Locals": local, "Variables": values}
-    return [Variable(name=name, value="", inside=inside) for name, inside in parts if there.get(name, True)]
+    return [Variable(name=name, value="", children=inside) for name, inside in parts if there.get(name, True)]
 
 
-def frames(machine: Machine) -> list[str]:
+def frame_names(machine: Machine) -> list[str]:
     """Return the single frames of a program and its cell, bases of arms and variables of procedures aside."""
     return [name for name in machine.state.tree if name != WORLD and not set(name) & set(".'[")]
 
 
-def variable(machine: Machine, slot: str, *, name: str = "") -> Variable:
+def make_variable(machine: Machine, slot: str, *, name: str = "") -> Variable:
     """Return a variable, an element, an array or the gripper of an arm.
 
     Args:
@@ -78,121 +78,130 @@ def variable(machine: Machine, slot: str, *, name: str = "") -> Variable:
         name: what to call it; as the program spells it when left out.
     """
     kind = machine.type_of(slot)
-    name = name or machine.spelled(slot)
+    name = name or machine.spelling(slot)
     if kind.sizes:
-        entry = _array(machine, slot, name, kind)
+        entry = _array_variable(machine, slot, name, kind)
     elif kind.kind is VariableKind.EVENT:
         entry = Variable(name=name, value=str(machine.state.events.get(slot, 0)), type="EVENT")
     elif kind.kind is VariableKind.FRAME:
-        entry = _frame(machine, slot, name)
+        entry = _frame_variable(machine, slot, name)
     elif (value := machine.state.values.get(slot)) is None:
-        entry = Variable(name=name, value=_NOTHING, type=str(kind))
+        entry = Variable(name=name, value=_NO_VALUE, type=str(kind))
     else:
-        entry = result(machine, name, value, str(kind))
+        entry = value_variable(machine, name, value, str(kind))
     return attrs.evolve(entry, expression=name, slot=slot)
 
 
-def result(machine: Machine, name: str, value: Value, kind: str) -> Variable:
+def value_variable(machine: Machine, name: str, value: Value, kind: str) -> Variable:
     """Return a value that stands for itself."""
     if isinstance(value, np.ndarray):
-        return Variable(name=name, value=_matrix(machine, value), type=kind, inside=lambda: _columns(machine, value))
+        return Variable(
+            name=name, value=_pose_text(machine, value), type=kind, children=lambda: _pose_columns(machine, value)
+        )
     return Variable(name=name, value=_truth(value) if isinstance(value, bool) else f"{value:.12g}", type=kind)
 
 
-def frames_text(machine: Machine) -> list[str]:
+def frame_tree_lines(machine: Machine) -> list[str]:
     """Return the tree of frames, a line each, what hangs on something under it."""
-    _, *below = hierarchy(machine.state.tree, sorted)
-    return [WORLD, *(f"{'  ' * depth}{machine.spelled(name)}  {_position(machine, name)}" for name, depth in below)]
+    _, *below = frames_with_depth(machine.state.tree, sorted)
+    return [
+        WORLD,
+        *(f"{'  ' * depth}{machine.spelling(name)}  {_position_text(machine, name)}" for name, depth in below),
+    ]
 
 
 # ---- frames, steps, arrays -----------------------------------------------------------------------------------------
 
 
-def _frame(machine: Machine, slot: str, name: str) -> Variable:
-    if not machine.has_place(slot):
-        return Variable(name=name, value=_NOTHING, type="FRAME")
+def _frame_variable(machine: Machine, slot: str, name: str) -> Variable:
+    if not machine.has_pose(slot):
+        return Variable(name=name, value=_NO_VALUE, type="FRAME")
     parent = machine.state.tree.parent(slot)
-    kind = "FRAME" if parent is None else f"FRAME on {_above(machine, parent)}"
-    value = _matrix(machine, machine.state.tree.world(slot))
-    return Variable(name=name, value=value, type=kind, inside=lambda: _inside(machine, slot))
+    kind = "FRAME" if parent is None else f"FRAME on {_parent_name(machine, parent)}"
+    value = _pose_text(machine, machine.state.tree.world(slot))
+    return Variable(name=name, value=value, type=kind, children=lambda: _frame_contents(machine, slot))
 
 
-def _inside(machine: Machine, slot: str) -> list[Variable]:
-    lines = _columns(machine, machine.state.tree.world(slot))
+def _frame_contents(machine: Machine, slot: str) -> list[Variable]:
+    lines = _pose_columns(machine, machine.state.tree.world(slot))
     parent = machine.state.tree.parent(slot)
     if parent is not None:
-        above = _above(machine, parent)
+        above = _parent_name(machine, parent)
         X = machine.state.tree.relation(slot, parent)
-        inside = variable(machine, parent).inside if parent != WORLD else None
-        entry = Variable(name="parent", value=above, type="FRAME", inside=inside, expression=above)
-        lines += [entry, result(machine, "relation", X, "TRANS")]
+        inside = make_variable(machine, parent).children if parent != WORLD else None
+        entry = Variable(name="parent", value=above, type="FRAME", children=inside, expression=above)
+        lines += [entry, value_variable(machine, "relation", X, "TRANS")]
         if machine.state.tree.nodes[slot].rigid:
             lines.append(Variable(name="rigid", value="true"))
-    if slot in machine.state.written:
-        line = machine.code.source.line(machine.state.written[slot].start)
+    if slot in machine.state.pose_origins:
+        line = machine.code.source.line(machine.state.pose_origins[slot].start)
         lines.append(Variable(name="set in line", value=str(line)))
     return lines
 
 
-def _above(machine: Machine, parent: str) -> str:
-    return f"the base of {parent.removesuffix('.BASE')}" if parent.endswith(".BASE") else machine.spelled(parent)
+def _parent_name(machine: Machine, parent: str) -> str:
+    return f"the base of {parent.removesuffix('.BASE')}" if parent.endswith(".BASE") else machine.spelling(parent)
 
 
-def _columns(machine: Machine, X: Array) -> list[Variable]:
-    numbers = _numbers(machine, X)
+def _pose_columns(machine: Machine, X: Array) -> list[Variable]:
+    numbers = _pose_numbers(machine, X)
     units = ("", "", "", machine.code.units.length.lower())
     texts = [f"({', '.join(numbers[index : index + 3])})" for index in range(0, 12, 3)]
     return [Variable(name=name, value=text, type=unit) for name, text, unit in zip("noap", texts, units, strict=True)]
 
 
-def _matrix(machine: Machine, X: Array) -> str:
+def _pose_text(machine: Machine, X: Array) -> str:
     """Return a pose or a step as the program would write it."""
-    return matrix_text(_numbers(machine, X))
+    return matrix_text(_pose_numbers(machine, X))
 
 
-def _numbers(machine: Machine, X: Array) -> list[str]:
+def _pose_numbers(machine: Machine, X: Array) -> list[str]:
     return noap_texts(X, machine.code.units, 7, _ROUNDING)
 
 
-def _position(machine: Machine, name: str) -> str:
-    if not machine.has_place(name):
-        return _NOTHING
-    return f"({', '.join(_numbers(machine, machine.state.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
+def _position_text(machine: Machine, name: str) -> str:
+    if not machine.has_pose(name):
+        return _NO_VALUE
+    return (
+        f"({', '.join(_pose_numbers(machine, machine.state.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
+    )
 
 
-def _array(machine: Machine, slot: str, name: str, kind: VariableType) -> Variable:
-    count, elements = math.prod(kind.sizes), Elements(machine, slot, name, kind)
-    return Variable(name=name, value=f"{count} elements", type=str(kind), inside=lambda: elements, elements=count)
+def _array_variable(machine: Machine, slot: str, name: str, kind: VariableType) -> Variable:
+    count, elements = math.prod(kind.sizes), ArrayElements(machine, slot, name, kind)
+    return Variable(
+        name=name, value=f"{count} elements", type=str(kind), children=lambda: elements, element_count=count
+    )
 
 
-class Elements(Sequence[Variable]):
+class ArrayElements(Sequence[Variable]):
     """The elements of an array, made when they are looked at: there may be a million."""
 
-    def __init__(self, machine: Machine, slot: str, called: str, kind: VariableType) -> None:
-        self._machine, self._slot, self._called, self._sizes = machine, slot, called, kind.sizes
+    def __init__(self, machine: Machine, slot: str, name: str, kind: VariableType) -> None:
+        self._machine, self._slot, self._name, self._sizes = machine, slot, name, kind.sizes
 
     def __len__(self) -> int:
         return math.prod(self._sizes)
 
     def __getitem__(self, index: "int | slice") -> "Variable | list[Variable]":  # type: ignore[override]
         if isinstance(index, slice):
-            return [self._one(value) for value in range(*index.indices(len(self)))]
-        return self._one(range(len(self))[index])
+            return [self._element(value) for value in range(*index.indices(len(self)))]
+        return self._element(range(len(self))[index])
 
-    def _one(self, number: int) -> Variable:
+    def _element(self, number: int) -> Variable:
         indices = []
         for size in reversed(self._sizes):
             number, index = divmod(number, size)
             indices.append(str(index + 1))
         which = f"[{','.join(reversed(indices))}]"
-        element = variable(self._machine, self._slot + which, name=self._called + which)
+        element = make_variable(self._machine, self._slot + which, name=self._name + which)
         return attrs.evolve(element, name=which)
 
 
 # ---- arms and the run ----------------------------------------------------------------------------------------------
 
 
-def _arm(machine: Machine, name: str) -> Variable:
+def _arm_variable(machine: Machine, name: str) -> Variable:
     arm = machine.cell.arms[name].arm
     q = machine.hardware.configuration(name, machine.now)
     texts = [
@@ -202,41 +211,41 @@ def _arm(machine: Machine, name: str) -> Variable:
     joints = [Variable(name=f"joint {number}", value=text) for number, text in enumerate(texts, 1)]
 
     def inside() -> list[Variable]:
-        holds = machine.state.hands[name].holds
+        holds = machine.state.hands[name].held_frame
         force = ", ".join(f"{component:.6g}" for component in machine.hardware.force(name, machine.now).tolist())
-        hand = result(machine, "hand", machine.gripper_pose(name), "FRAME")
+        hand = value_variable(machine, "hand", machine.gripper_pose(name), "FRAME")
         return [
             *joints,
             attrs.evolve(hand, expression=name, slot=name),
-            Variable(name="moves", value=_motion(machine, name)),
-            Variable(name="holds", value=machine.spelled(holds) if holds else "nothing"),
+            Variable(name="moves", value=_motion_text(machine, name)),
+            Variable(name="holds", value=machine.spelling(holds) if holds else "nothing"),
             Variable(name="force", value=f"({force}) N"),
         ]
 
-    return Variable(name=name, value=", ".join(texts), type=arm.name, inside=inside)
+    return Variable(name=name, value=", ".join(texts), type=arm.name, children=inside)
 
 
-def _motion(machine: Machine, arm: str) -> str:
+def _motion_text(machine: Machine, arm: str) -> str:
     """Return which stage of which MOVE an arm is in."""
-    process = machine.mover(arm)
+    process = machine.moving_process(arm)
     if process is None or process.motion is None:
         return "nothing"
     motion = process.motion
-    stage = machine.state.stages[motion.record]
+    stage = machine.state.stages[motion.stage_index]
     line = machine.code.source.line(motion.span.start)
     since = machine.now - stage.t0
-    return f"{stage.stage.kind} {' '.join(stage.to)} of line {line}, {since:.3f} s of {stage.duration:.3f} s"
+    return f"{stage.stage.kind} {' '.join(stage.goal_names)} of line {line}, {since:.3f} s of {stage.duration:.3f} s"
 
 
-def _run(machine: Machine, process: Process) -> Iterable[Variable]:
+def _run_variables(machine: Machine, process: Process) -> Iterable[Variable]:
     yield Variable(name="clock", value=f"{machine.now:.6g} s")
     yield Variable(name="servo tick", value=str(machine.state.ticks))
-    devices = ", ".join(map(machine.spelled, sorted(machine.hardware.running())))
+    devices = ", ".join(map(machine.spelling, sorted(machine.hardware.running())))
     yield Variable(name="devices on", value=devices or "none")
     yield Variable(name="arm used last", value=process.last_arm or "none")
     yield Variable(name="priority", value=f"{process.priority:g}")
     if process.locks:
-        yield Variable(name="locks", value=", ".join(map(machine.spelled, process.locks)))
+        yield Variable(name="locks", value=", ".join(map(machine.spelling, process.locks)))
 
 
 def _truth(value: bool) -> str:  # noqa: FBT001 - a value, not a switch

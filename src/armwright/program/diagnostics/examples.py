@@ -21,7 +21,7 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadImport
-from armwright.program.vm.interpreter import Limits, RunError, warnings
+from armwright.program.vm.interpreter import Limits, RunError, motion_warnings
 
 _CELLS = Path(__file__).parent / "pages" / "cells"
 _RUN = re.compile(r"^// run in (\w+)$", re.MULTILINE)
@@ -56,7 +56,7 @@ def answer(source: Source) -> tuple[Diagnostic, ...]:
         recording = run(compiled, limits=limits)
     except RunError as error:
         return (*compiled.diagnostics, error.diagnostic)
-    return (*compiled.diagnostics, *warnings(recording.stages, recording.cell))
+    return (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell))
 
 
 def _cell(text: str) -> Cell | None:

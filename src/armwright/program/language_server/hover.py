@@ -19,7 +19,7 @@ from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.vm.value_text import shown
+from armwright.program.vm.value_text import value_text
 
 # Words that a statement can start with and that a word of the same statement is looked up by.
 _STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE"))
@@ -188,7 +188,7 @@ def _shown(frame: str) -> str:
 
 def pose_text(X: Array, units: UnitSystem) -> str:
     """Return a pose (4, 4) as a program writes it: n, o, a, p, lengths in the unit of the program."""
-    return f"`{shown(X, units)}` {units.length.lower()}"
+    return f"`{value_text(X, units)}` {units.length.lower()}"
 
 
 # ---- numbers -------------------------------------------------------------------------------------------------------

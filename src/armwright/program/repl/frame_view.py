@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.program.repl.session import Session
-from armwright.program.vm.value_text import hierarchy
+from armwright.program.vm.value_text import frames_with_depth
 
 # Where the middle of three turns is this near to a right angle, the other two turn about the same axis.
 _SAME_AXIS = 1e-9
@@ -20,10 +20,10 @@ def frames(session: Session) -> list[str]:
     """Return the frame tree as lines: each frame under the one it hangs on, seen from the world."""
     units, machine = session.state.symbols.units, session.state.machine
     rows = [["frame", "x", "y", "z", units.length.lower(), "z", "y", "x", "deg"]]
-    for name, depth in hierarchy(machine.state.tree):
+    for name, depth in frames_with_depth(machine.state.tree):
         rigid = name != WORLD and machine.state.tree.nodes[name].rigid
-        shown = "  " * depth + machine.spelled(name) + (" (rigidly)" if rigid else "")
-        if not machine.has_place(name):
+        shown = "  " * depth + machine.spelling(name) + (" (rigidly)" if rigid else "")
+        if not machine.has_pose(name):
             rows.append([shown, "no value yet"])
             continue
         X = machine.state.tree.world(name)
@@ -53,9 +53,9 @@ def arms(session: Session) -> list[str]:
             for joint, value in zip(arm.arm.joints, q.tolist(), strict=True)
         ]
         hand = machine.state.hands[name]
-        location = f"at {machine.spelled(hand.at)}" if hand.at else "at no frame"
-        holds = f", closed on {machine.spelled(hand.holds)}" if hand.holds else ""
-        hanging = [machine.spelled(frame) for frame, node in machine.state.tree.nodes.items() if node.parent == name]
+        location = f"at {machine.spelling(hand.reached_frame)}" if hand.reached_frame else "at no frame"
+        holds = f", closed on {machine.spelling(hand.held_frame)}" if hand.held_frame else ""
+        hanging = [machine.spelling(frame) for frame, node in machine.state.tree.nodes.items() if node.parent == name]
         carries = f", carries {', '.join(hanging)}" if hanging else ""
         lines += [f"{name}  {arm.arm.name}", f"  joints  {', '.join(shown)}", f"  hand    {location}{holds}{carries}"]
     return lines or ["no arms: begin with `--cell`, or with an IMPORT of a cell"]
@@ -64,7 +64,7 @@ def arms(session: Session) -> list[str]:
 def names(session: Session) -> list[str]:
     """Return the names that an input can use, as they are spelled: variables, frames, procedures, arms."""
     symbols, machine = session.state.symbols, session.state.machine
-    return [*map(machine.spelled, (*symbols.types, *symbols.procedures)), *machine.cell.arms]
+    return [*map(machine.spelling, (*symbols.types, *symbols.procedures)), *machine.cell.arms]
 
 
 def _degrees(angle: float) -> str:

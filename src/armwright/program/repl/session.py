@@ -317,12 +317,12 @@ class Session:
         diagnostics: list[Diagnostic] = []
         for number, statement in enumerate(entry.statements):
             before, shown = self.state, statement.span.start in entry.shown
-            if before.machine.state.over and not shown:
+            if before.machine.state.has_ended and not shown:
                 remark = "the program has executed HALT; `:undo` restores the state before it"
                 answer = Answer(source=source, remarks=(remark,), refused=True)
                 break
             machine = with_code(before.machine, checked.code(statement), self.limits)
-            machine.state.over = False
+            machine.state.has_ended = False
             try:
                 go_through(machine)
             except RunError as error:

@@ -12,7 +12,7 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source, Span
 from armwright.program.semantics.symbols import PREDECLARED
-from armwright.program.vm.interpreter import advance, due, warnings
+from armwright.program.vm.interpreter import advance, motion_warnings, next_process
 from armwright.program.vm.machine import Limits, Machine
 from armwright.program.vm.process import Process
 
@@ -32,11 +32,11 @@ def with_code(machine: Machine, code: Code, limits: Limits) -> Machine:
     """
     copied = machine.copy()
     state = copied.state
-    state.types, state.locks, state.owners, state.idle = dict(code.types), {}, {}, 0
+    state.types, state.locks, state.owners, state.idle_steps = dict(code.types), {}, {}, 0
     for name, kind in code.types.items():
         if kind == VariableType(VariableKind.FRAME):
             state.tree = state.tree.declare(name)
-    state.program = Process(wake=state.ticks, last_arm=state.program.last_arm)
+    state.program = Process(wake_tick=state.ticks, last_arm=state.program.last_arm)
     state.processes = [state.program]
     until = attrs.evolve(limits, time=machine.now + limits.time)
     return Machine(code, copied.cell, copied.hardware, until, state)
@@ -49,18 +49,18 @@ def go_through(machine: Machine) -> None:
         RunError: as ``interpret.run`` does.
     """
     program = machine.state.program
-    while not machine.state.over:
-        process = due(machine)
-        at_end = machine.code.instructions[program.at].op is Op.STOP
-        if process is program and at_end and program.pending is None and program.motion is None:
-            machine.state.ticks = max(machine.state.ticks, program.wake)
+    while not machine.state.has_ended:
+        process = next_process(machine)
+        at_end = machine.code.instructions[program.pc].op is Op.STOP
+        if process is program and at_end and program.pending_effect is None and program.motion is None:
+            machine.state.ticks = max(machine.state.ticks, program.wake_tick)
             return
         advance(machine, process)
 
 
 def new_warnings(before: Machine, after: Machine) -> tuple[Diagnostic, ...]:
     """Return the warnings about motions that one machine has made and its twin has not."""
-    return warnings(after.state.stages[len(before.state.stages) :], after.cell)
+    return motion_warnings(after.state.stages[len(before.state.stages) :], after.cell)
 
 
 # ---- names and cells that change -----------------------------------------------------------------------------------
@@ -77,10 +77,10 @@ def rename(machine: Machine, names: Mapping[str, str]) -> None:
     machine.state.trees = [(time, _renamed(tree, names, other)) for time, tree in machine.state.trees]
     machine.state.values = {other(name): value for name, value in machine.state.values.items()}
     machine.state.events = {other(name): count for name, count in machine.state.events.items()}
-    machine.state.written = {other(name): span for name, span in machine.state.written.items()}
+    machine.state.pose_origins = {other(name): span for name, span in machine.state.pose_origins.items()}
     for hand in machine.state.hands.values():
-        hand.at = hand.at and other(hand.at)
-        hand.holds = hand.holds and other(hand.holds)
+        hand.reached_frame = hand.reached_frame and other(hand.reached_frame)
+        hand.held_frame = hand.held_frame and other(hand.held_frame)
 
 
 def _renamed(tree: FrameTree, names: Mapping[str, str], other: Callable[[str], str]) -> FrameTree:
@@ -92,18 +92,18 @@ def _renamed(tree: FrameTree, names: Mapping[str, str], other: Callable[[str], s
 def forget(machine: Machine, names: Iterable[str]) -> None:
     """Take declared variables away that were never used."""
     for name in names:
-        if name in machine.state.tree and not machine.has_place(name):
+        if name in machine.state.tree and not machine.has_pose(name):
             machine.state.tree = machine.state.tree.without(name)
 
 
 def bring(machine: Machine, frames: Mapping[str, Node], span: Span) -> None:
     """Put frames of an imported file where they stand, those aside that have a place already."""
     nodes = dict(machine.state.tree.nodes)
-    waiting = {name: node for name, node in frames.items() if not machine.has_place(name)}
+    waiting = {name: node for name, node in frames.items() if not machine.has_pose(name)}
     while ready := [name for name, node in waiting.items() if node.parent == WORLD or node.parent in nodes]:
         nodes.update((name, waiting.pop(name)) for name in ready)
     machine.cell = attrs.evolve(machine.cell, frames={**frames, **machine.cell.frames})
     machine.state.tree = FrameTree(nodes)
     for name in frames:
         if name in nodes:
-            machine.grow(machine.state.tree, name, span)
+            machine.replace_tree(machine.state.tree, name, span)

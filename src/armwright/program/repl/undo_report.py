@@ -26,7 +26,7 @@ def taken_back(before: Machine, after: Machine) -> list[str]:
     done = [*done[:_MAX_LISTED], f"{count} more"] if count > 1 else done
     sentences = [f"effects before that were undone: {'; '.join(done)}"] if done else []
     back = _arms(before, after)
-    if frames := [after.spelled(name) for name in _frames(before, after)]:
+    if frames := [after.spelling(name) for name in _frames(before, after)]:
         back.append(f"{'frames' if len(frames) > 1 else 'frame'} {', '.join(frames)}")
     if after.state.ticks > before.state.ticks:
         back.append(f"the clock to {before.now:.3f} s")
@@ -48,6 +48,6 @@ def _frames(before: Machine, after: Machine) -> list[str]:
 
 def _differs(before: Machine, after: Machine, name: str) -> bool:
     old, new = before.state.tree, after.state.tree
-    if before.has_place(name) != after.has_place(name) or old.parent(name) != new.parent(name):
+    if before.has_pose(name) != after.has_pose(name) or old.parent(name) != new.parent(name):
         return True
-    return after.has_place(name) and not np.allclose(old.world(name), new.world(name), rtol=0, atol=_ROUNDING)
+    return after.has_pose(name) and not np.allclose(old.world(name), new.world(name), rtol=0, atol=_ROUNDING)

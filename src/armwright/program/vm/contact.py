@@ -16,16 +16,16 @@ from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.program.language.source import Span
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Motion, Process
-from armwright.program.vm.recording import Push, Run, efforts, peaks_of
+from armwright.program.vm.recording import ToolWrenches, TrajectorySegment, peak_efforts, trajectory_efforts
 
 # A duration so little too short is rounding.
 _ROUNDING = 1e-9
 # A speed that is advised leaves this part of the depth in hand.
-_IN_HAND = 0.8
-_SLOWEST = 1.0
+_DEPTH_RESERVE = 0.8
+_MIN_SPEED = 1.0
 
 
-def stop(machine: Machine, process: Process, span: Span) -> int:
+def stop_arm(machine: Machine, process: Process, span: Span) -> int:
     """Stop the arm of a process under control; return when it is at rest [ticks].
 
     The frame table holds the pose where it comes to rest from now on. An arm that is being stopped already is left to
@@ -33,34 +33,34 @@ def stop(machine: Machine, process: Process, span: Span) -> int:
     """
     motion, period = process.motion, machine.cell.period
     assert motion is not None  # noqa: S101 - asked for only then
-    if motion.rest is None:
-        note_contact(machine, motion)
-        runs = machine.state.runs[motion.arm]
+    if motion.rest_tick is None:
+        record_contact(machine, motion)
+        runs = machine.state.segments[motion.arm]
         local = machine.now - runs[-1].t0 if runs else 0.0
-        motion.rest = machine.state.ticks
+        motion.rest_tick = machine.state.ticks
         if runs and local < runs[-1].duration - _ROUNDING:
-            motion.rest += _stop_on_the_way(machine, motion, local)
+            motion.rest_tick += _stop_during_stage(machine, motion, local)
         else:
-            _begin(machine, motion, hold(machine.hardware.configuration(motion.arm, machine.now), period))
-    end = max(motion.rest, machine.state.ticks)
-    machine.set_hand(motion.arm, span, at=end)
+            _send_and_watch(machine, motion, hold(machine.hardware.configuration(motion.arm, machine.now), period))
+    end = max(motion.rest_tick, machine.state.ticks)
+    machine.update_hand_pose(motion.arm, span, tick=end)
     return end
 
 
-def _stop_on_the_way(machine: Machine, motion: Motion, local: float) -> int:
+def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
     """Stop an arm in the middle of its stage; return how many ticks it takes."""
-    arm, runs, period = machine.cell.arms[motion.arm].arm, machine.state.runs[motion.arm], machine.cell.period
+    arm, runs, period = machine.cell.arms[motion.arm].arm, machine.state.segments[motion.arm], machine.cell.period
     last = runs[-1]
     braking = brake(last.trajectory, local, arm.limit("acceleration"), period=period)
-    tau = efforts(arm, braking, period, _begin(machine, motion, braking))
+    tau = trajectory_efforts(arm, braking, period, _send_and_watch(machine, motion, braking))
     runs[-1] = attrs.evolve(last, duration=local)
-    runs.append(Run(t0=machine.now, trajectory=braking, duration=braking.duration, tau=tau))
-    if motion.record >= 0:
+    runs.append(TrajectorySegment(t0=machine.now, trajectory=braking, duration=braking.duration, tau=tau))
+    if motion.stage_index >= 0:
         done = join([last.trajectory.until(local), braking])
         before = [] if last.tau is None else [last.tau[: round(local / period)]]
-        peak, when = peaks_of(np.concatenate([*before, tau]), period)
-        machine.state.stages[motion.record] = attrs.evolve(
-            machine.state.stages[motion.record],
+        peak, when = peak_efforts(np.concatenate([*before, tau]), period)
+        machine.state.stages[motion.stage_index] = attrs.evolve(
+            machine.state.stages[motion.stage_index],
             motion=done,
             length=hand_length(arm, done),
             peak_effort=peak,
@@ -70,130 +70,128 @@ def _stop_on_the_way(machine: Machine, motion: Motion, local: float) -> int:
     return math.ceil(braking.duration / period - _ROUNDING)
 
 
-def _begin(machine: Machine, motion: Motion, trajectory: Trajectory) -> Push:
-    push = send(machine, motion, trajectory)
-    look_out(machine, motion)
+def _send_and_watch(machine: Machine, motion: Motion, trajectory: Trajectory) -> ToolWrenches:
+    push = send_trajectory(machine, motion, trajectory)
+    update_depth_alarm(machine, motion)
     return push
 
 
-def send(machine: Machine, motion: Motion, trajectory: Trajectory) -> Push:
+def send_trajectory(machine: Machine, motion: Motion, trajectory: Trajectory) -> ToolWrenches:
     """Let the arm of a motion follow a trajectory instead of what it does now; return what will push on its hand."""
-    machine.hardware.begin(motion.arm, trajectory, machine.now, motion.tip)
-    return _pushed(machine, motion.arm)
+    machine.hardware.begin(motion.arm, trajectory, machine.now, motion.X_HM)
+    return _record_wrenches(machine, motion.arm)
 
 
-def _pushed(machine: Machine, arm: str) -> Push:
+def _record_wrenches(machine: Machine, arm: str) -> ToolWrenches:
     """Check what pushes on the gripper of an arm from now on, and remember it."""
-    push = Push(machine.now, machine.hardware.wrenches(arm, machine.now))
-    machine.state.pushes[arm].append(push)
+    push = ToolWrenches(machine.now, machine.hardware.wrenches(arm, machine.now))
+    machine.state.tool_wrenches[arm].append(push)
     return push
 
 
-def pushed_otherwise(machine: Machine, arm: str, record: int | None) -> None:
+def recompute_efforts(machine: Machine, arm: str, stage_index: int | None) -> None:
     """Work out anew what the motors of an arm give from now on: what it pressed with may have been released.
 
     Args:
         machine: that runs the program.
         arm: its name.
-        record: number of the stage that it is on; None where it is on none.
+        stage_index: number of the stage that it is on; None where it is on none.
     """
-    if not any(push.wrenches.any() for push in machine.state.pushes[arm]):
+    if not any(push.wrenches.any() for push in machine.state.tool_wrenches[arm]):
         return
-    push, period, last = _pushed(machine, arm), machine.cell.period, machine.state.runs[arm][-1]
+    push, period, last = _record_wrenches(machine, arm), machine.cell.period, machine.state.segments[arm][-1]
     done = round((machine.now - last.t0) / period)
     if last.tau is None or done >= len(last.tau):
         return
-    later = Push(last.t0, np.concatenate([np.zeros((done, 6)), push.wrenches]))
-    tau = efforts(machine.cell.arms[arm].arm, last.trajectory, period, later, len(last.tau) - 1)
+    later = ToolWrenches(last.t0, np.concatenate([np.zeros((done, 6)), push.wrenches]))
+    tau = trajectory_efforts(machine.cell.arms[arm].arm, last.trajectory, period, later, len(last.tau) - 1)
     tau[:done] = last.tau[:done]
-    machine.state.runs[arm][-1] = attrs.evolve(last, tau=tau)
-    peak, when = peaks_of(tau, period)
-    if record is not None:
-        machine.state.stages[record] = attrs.evolve(machine.state.stages[record], peak_effort=peak, peak_time=when)
+    machine.state.segments[arm][-1] = attrs.evolve(last, tau=tau)
+    peak, when = peak_efforts(tau, period)
+    if stage_index is not None:
+        machine.state.stages[stage_index] = attrs.evolve(
+            machine.state.stages[stage_index], peak_effort=peak, peak_time=when
+        )
 
 
 # ---- contact -------------------------------------------------------------------------------------------------------
 
 
-def look_out(machine: Machine, motion: Motion) -> None:
+def update_depth_alarm(machine: Machine, motion: Motion) -> None:
     """See when an arm presses too deep by what it has begun to do, if it ever does."""
     deep = machine.hardware.too_deep_at(motion.arm)
-    motion.alarm = None if deep is None else max(machine.state.ticks, math.ceil(deep / machine.cell.period - _ROUNDING))
+    motion.alarm_tick = (
+        None if deep is None else max(machine.state.ticks, math.ceil(deep / machine.cell.period - _ROUNDING))
+    )
 
 
-def note_contact(machine: Machine, motion: Motion, tick: int | None = None) -> None:
+def record_contact(machine: Machine, motion: Motion, tick: int | None = None) -> None:
     """Remember how hard an arm has pressed by now, or by a later tick, before it begins something else."""
     pressed = machine.hardware.pressed(motion.arm, machine.now if tick is None else tick * machine.cell.period)
-    if pressed.depth > motion.pressed.depth:
-        motion.pressed = pressed
+    if pressed.depth > motion.deepest_contact.depth:
+        motion.deepest_contact = pressed
 
 
-def contact_of(motion: Motion) -> tuple[str, dict[str, object]]:
+def contact_report(motion: Motion) -> tuple[str, dict[str, object]]:
     """Return what the trace says of the contact of a motion, and its facts [m] and [N]; nothing without one."""
-    depth, force = motion.pressed
+    depth, force = motion.deepest_contact
     if depth <= 0:
         return "", {}
-    return f"; pressed {_deep(motion.pressed)}", {"contact": {"depth": depth, "force": force}}
+    return f"; pressed {_depth_text(motion.deepest_contact)}", {"contact": {"depth": depth, "force": force}}
 
 
-def _deep(pressed: Press) -> str:
+def _depth_text(pressed: Press) -> str:
     return f"{pressed.depth * 1e3:.3g} mm deep, {pressed.force:.3g} N"
 
 
-def too_deep(machine: Machine, process: Process, motion: Motion) -> NoReturn:
+def stop_too_deep(machine: Machine, process: Process, motion: Motion) -> NoReturn:
     """Stop an arm that presses deeper than the cell allows, and say so.
 
     Raises:
         RunError: always.
     """
-    motion.alarm = None
-    end = stop(machine, process, motion.span)
-    note_contact(machine, motion, end)
+    motion.alarm_tick = None
+    end = stop_arm(machine, process, motion.span)
+    record_contact(machine, motion, end)
     # On its path to rest it may come deeper; that is said now.
-    motion.alarm = None
+    motion.alarm_tick = None
     allowed = machine.cell.contact.deepest
-    least = _least_depth(machine, motion)
-    notes = [f"the arm brakes within its limits; at rest it is pressed {_deep(motion.pressed)}"]
+    least = _minimum_depth(machine, motion)
+    notes = [f"the arm brakes within its limits; at rest it is pressed {_depth_text(motion.deepest_contact)}"]
     helps = ["end the MOVE at a smaller force, or use a lower speed"]
     if least is not None and least > allowed:
         text = "at this speed that is unavoidable: even if it brakes from the first contact on, the depth is"
         notes.append(f"{text} {least * 1e3:.3g} mm")
-        helps = _slower(motion, allowed / least)
+        helps = _speed_advice(motion, allowed / least)
     elif least is not None:
         notes.append(f"if it brakes from the first contact on, the depth is {least * 1e3:.3g} mm")
-    raise machine.error(
-        process,
-        "E404",
-        f"`{machine.spelled(motion.moved)}` presses into the plane{_height(machine)} deeper than {allowed * 1e3:g} mm",
-        motion.span,
-        "this MOVE is stopped there",
-        notes=notes,
-        helps=helps,
-    )
+    into_plane = f"into the plane{_plane_height_text(machine)} deeper than {allowed * 1e3:g} mm"
+    message = f"`{machine.spelling(motion.moved)}` presses {into_plane}"
+    raise machine.error(process, "E404", message, motion.span, "this MOVE is stopped there", notes=notes, helps=helps)
 
 
-def _slower(motion: Motion, share: float) -> list[str]:
+def _speed_advice(motion: Motion, share: float) -> list[str]:
     """Advise a speed for a depth that is this share of the least there is: the depth grows with its square."""
-    speed = math.floor(motion.speed * math.sqrt(_IN_HAND * share))
-    if speed < _SLOWEST:
+    speed = math.floor(motion.speed * math.sqrt(_DEPTH_RESERVE * share))
+    if speed < _MIN_SPEED:
         return ["end this MOVE above the plane"]
     return [f"use a lower speed: `WITH SPEED = {speed}`"]
 
 
-def _least_depth(machine: Machine, motion: Motion) -> float | None:
+def _minimum_depth(machine: Machine, motion: Motion) -> float | None:
     """Return how deep a stop from the first servo tick in contact on presses [m]; None where nothing came down."""
-    if motion.touch is None or machine.cell.contact.height is None:
+    if motion.first_contact is None or machine.cell.contact.height is None:
         return None
-    trajectory, local = motion.touch
+    trajectory, local = motion.first_contact
     cell_arm, period = machine.cell.arms[motion.arm], machine.cell.period
     tick = min(math.ceil(local / period - _ROUNDING) * period, trajectory.duration)
     braking = brake(trajectory, tick, cell_arm.arm.limit("acceleration"), period=period)
     q: Array = braking(np.arange(round(braking.duration / period) + 1) * period)
-    X_WT = machine.state.tree.world(base_name(motion.arm)) @ forward(cell_arm.arm, q) @ motion.tip
+    X_WT = machine.state.tree.world(base_name(motion.arm)) @ forward(cell_arm.arm, q) @ motion.X_HM
     return machine.cell.contact.height - float(X_WT[:, 2, 3].min())
 
 
-def comes_down(machine: Machine, process: Process, motion: Motion, to: str) -> NoReturn:
+def refuse_contact(machine: Machine, process: Process, motion: Motion, to: str) -> NoReturn:
     """Refuse a stage that would come down on the plane, or press too deep into it, where no ON looks out for that.
 
     Raises:
@@ -202,13 +200,13 @@ def comes_down(machine: Machine, process: Process, motion: Motion, to: str) -> N
     raise machine.error(
         process,
         "E404",
-        f"`{machine.spelled(motion.moved)}` would enter the plane{_height(machine)} on its path to `{to}`",
+        f"`{machine.spelling(motion.moved)}` would enter the plane{_plane_height_text(machine)} on its path to `{to}`",
         motion.span,
         "this MOVE has no ON that ends it at the contact",
         helps=["guard the motion: `ON FORCE(Z) > 10 DO HALT`"],
     )
 
 
-def _height(machine: Machine) -> str:
+def _plane_height_text(machine: Machine) -> str:
     plane = machine.cell.contact.height
     return "" if plane is None else f" at z = {plane * 1e3:g} mm"

@@ -7,9 +7,9 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 # Rows of a table, or lines, that a terminal shows; items that a page or a record lists; letters of one of them.
-ON_A_TERMINAL, IN_A_LIST, IN_A_LINE = 1000, 4000, 1000
+MAX_TERMINAL_LINES, MAX_LIST_ITEMS, MAX_LINE_LENGTH = 1000, 4000, 1000
 # Where all is: in the files of the run, or nowhere, where none were asked for.
-KEPT, NOT_KEPT = "all in events.jsonl", "`-o FOLDER` keeps all in events.jsonl"
+EVENT_LOG_HINT, NO_EVENT_LOG_HINT = "all in events.jsonl", "`-o FOLDER` keeps all in events.jsonl"
 
 
 class Excerpt(NamedTuple, Generic[T]):
@@ -18,47 +18,47 @@ class Excerpt(NamedTuple, Generic[T]):
     Attributes:
         first: from the beginning on.
         last: up to the end; empty where nothing is left out.
-        left_out: how many stand between.
+        omitted: how many stand between.
     """
 
     first: Sequence[T]
     last: Sequence[T]
-    left_out: int
+    omitted: int
 
-    def mapped(self, show: Callable[[T], R]) -> "Excerpt[R]":
+    def map(self, show: Callable[[T], R]) -> "Excerpt[R]":
         """Return what ``show`` makes of each."""
-        return Excerpt([*map(show, self.first)], [*map(show, self.last)], self.left_out)
+        return Excerpt([*map(show, self.first)], [*map(show, self.last)], self.omitted)
 
-    def joined(self, *others: T) -> list[T]:
+    def join(self, *others: T) -> list[T]:
         """Return the items, with ``rest`` instead of those that are left out."""
-        return [*self.first, *(others if self.left_out else ()), *self.last]
+        return [*self.first, *(others if self.omitted else ()), *self.last]
 
 
-def excerpt(items: Sequence[T], most: int) -> Excerpt[T]:
+def excerpt(items: Sequence[T], max_count: int) -> Excerpt[T]:
     """Return as many items as can be shown.
 
     Args:
         items: in order; a text is one of letters.
-        most: how many, half of them from the end.
+        max_count: how many, half of them from the end.
     """
-    if len(items) <= most:
+    if len(items) <= max_count:
         return Excerpt(items, (), 0)
-    half = most // 2
+    half = max_count // 2
     return Excerpt(items[:half], items[len(items) - half :], len(items) - 2 * half)
 
 
-def more(left_out: int, where: str = KEPT) -> str:
+def omission_text(omitted: int, hint: str = EVENT_LOG_HINT) -> str:
     """Say how many items are not shown, and where they are."""
-    return f"... and {left_out:,} more; {where}"
+    return f"... and {omitted:,} more; {hint}"
 
 
-def one_line(text: str, where: str = KEPT) -> str:
+def shorten_line(text: str, hint: str = EVENT_LOG_HINT) -> str:
     """Return a text as one line of a list: the midst of a very long one is left out."""
-    shown = excerpt(text, IN_A_LINE)
-    return "".join(shown.joined(f" {more(shown.left_out, where)} "))
+    part = excerpt(text, MAX_LINE_LENGTH)
+    return "".join(part.join(f" {omission_text(part.omitted, hint)} "))
 
 
-def listed(texts: Sequence[str], most: int, where: str = KEPT) -> list[str]:
+def shorten_list(texts: Sequence[str], max_count: int, hint: str = EVENT_LOG_HINT) -> list[str]:
     """Return lines of a list, with one that says how many there are more."""
-    shown = excerpt(texts, most)
-    return [one_line(text, where) for text in shown.joined(more(shown.left_out, where))]
+    part = excerpt(texts, max_count)
+    return [shorten_line(text, hint) for text in part.join(omission_text(part.omitted, hint))]

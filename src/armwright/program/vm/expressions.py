@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 
 from armwright.program.bytecode.instructions import Constant, Instruction, Op
 from armwright.program.vm.machine import Handler, Machine, jump_target
-from armwright.program.vm.operators import IN_UNITS, PLAIN, ValueFault
-from armwright.program.vm.process import Element, Process
+from armwright.program.vm.operators import OPERATIONS_WITH_UNITS, UNITLESS_OPERATIONS, EvaluationError
+from armwright.program.vm.process import ElementReference, Process
 
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 # An index this near to a whole number is that number.
-_WHOLE = 1e-9
+_INTEGER_TOLERANCE = 1e-9
 
 
 def _load(machine: Machine, process: Process, step: Instruction) -> None:
@@ -26,29 +26,33 @@ def _copy(machine: Machine, process: Process, step: Instruction) -> None:
 def _compute(machine: Machine, process: Process, step: Instruction) -> None:
     values = [machine.read(process, operand, step) for operand in step.operands[1:]]
     try:
-        value = PLAIN[step.op](*values) if step.op in PLAIN else IN_UNITS[step.op](*values, machine.code.units)
-    except ValueFault as fault:
+        value = (
+            UNITLESS_OPERATIONS[step.op](*values)
+            if step.op in UNITLESS_OPERATIONS
+            else OPERATIONS_WITH_UNITS[step.op](*values, machine.code.units)
+        )
+    except EvaluationError as fault:
         raise machine.error(process, fault.code, fault.message, step.span, fault.label) from None
     machine.write(process, step.operands[0], value, step)
 
 
 def _element(machine: Machine, process: Process, step: Instruction) -> None:
     """Find an element; a value in passing becomes it, not what it holds."""
-    array = machine.name(process, step.operands[1])
+    array = machine.resolve_name(process, step.operands[1])
     sizes = machine.state.types[array].sizes
     indices = []
     for number, (operand, size) in enumerate(zip(step.operands[2:], sizes, strict=True), 1):
-        value = machine.number(process, operand, step)
+        value = machine.read_number(process, operand, step)
         index = round(value) if math.isfinite(value) else 0
-        if abs(value - index) > _WHOLE or not 1 <= index <= size:
+        if abs(value - index) > _INTEGER_TOLERANCE or not 1 <= index <= size:
             which = f"index {number}" if len(sizes) > 1 else "the index"
-            text = f"{which} of `{machine.spelled(array)}` is {value:g}, not an integer from 1 to {size}"
+            text = f"{which} of `{machine.spelling(array)}` is {value:g}, not an integer from 1 to {size}"
             raise machine.error(process, "E222", text, step.span, "no such element")
         indices.append(index)
     to = step.operands[0]
     assert isinstance(to, str)  # noqa: S101 - the translator gives a value in passing
-    process.now.passing[to] = Element(f"{array}[{','.join(map(str, indices))}]")
-    process.now.wrote[to] = step.span
+    process.activation.temporaries[to] = ElementReference(f"{array}[{','.join(map(str, indices))}]")
+    process.activation.temporary_spans[to] = step.span
 
 
 def _force(machine: Machine, process: Process, step: Instruction) -> None:
@@ -63,7 +67,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.LOADM: _load,
     Op.LOADS: _load,
     Op.COPY: _copy,
-    **dict.fromkeys((*PLAIN, *IN_UNITS), _compute),
+    **dict.fromkeys((*UNITLESS_OPERATIONS, *OPERATIONS_WITH_UNITS), _compute),
     Op.ELEM: _element,
     Op.FORCE: _force,
 }

@@ -1,5 +1,6 @@
 """AFFIX and UNFIX."""
 
+import itertools
 from collections.abc import Mapping
 
 from armwright.cell.frames import WORLD
@@ -12,8 +13,8 @@ from armwright.program.vm.process import Process
 def _affix(machine: Machine, process: Process, step: Instruction) -> None:
     operands = [operand for operand in step.operands if operand != "RIGIDLY"]
     rigid = len(operands) < len(step.operands)
-    child, parent = machine.name(process, operands[0]), machine.name(process, operands[1])
-    spelled = machine.spelled
+    child, parent = machine.resolve_name(process, operands[0]), machine.resolve_name(process, operands[1])
+    spelled = machine.spelling
     if is_arm(child) or child == WORLD:
         text = "an arm cannot be affixed to a frame" if is_arm(child) else f"`{WORLD}` cannot be affixed"
         raise machine.error(
@@ -21,39 +22,42 @@ def _affix(machine: Machine, process: Process, step: Instruction) -> None:
         )
     if is_arm(parent):
         process.last_arm = parent
-    step_X = machine.pose(process, operands[2], step) if step.op is Op.AFFAT else None
-    machine.held(parent, step, process)
+    step_X = machine.read_pose(process, operands[2], step) if step.op is Op.AFFAT else None
+    machine.slot_value(parent, step, process)
     if step_X is None:
-        machine.held(child, step, process)
+        machine.slot_value(child, step, process)
     if machine.state.tree.would_ring(child, parent):
         note = "frames form a tree with the root WORLD; each is attached to one parent"
         label = f"{spelled(child)} cannot be attached to {'itself' if child == parent else spelled(parent)}"
         chain = [frame for frame in (parent, *machine.state.tree.ancestors(parent)) if frame != child]
-        hung = [got for frame in chain for got in machine.origin(frame, f"{spelled(frame)} got its pose here")][:3]
+        labels = (machine.origin_labels(frame, f"{spelled(frame)} got its pose here") for frame in chain)
+        origins = list(itertools.chain.from_iterable(labels))[:3]
         text = "this AFFIX would close a cycle"
-        raise machine.error(process, "E305", text, step.span, label, secondary=hung, notes=[note])
-    machine.grow(machine.state.tree.affix(child, parent, step_X, rigid=rigid), child, step.span)
+        raise machine.error(process, "E305", text, step.span, label, secondary=origins, notes=[note])
+    machine.replace_tree(machine.state.tree.affix(child, parent, step_X, rigid=rigid), child, step.span)
     data = {"child": child, "parent": parent, "rigidly": rigid}
-    machine.effect(process, "AFFIX", f"AFFIX {spelled(child)} -> {spelled(parent)}", step.span, data=data)
+    machine.record_effect(process, "AFFIX", f"AFFIX {spelled(child)} -> {spelled(parent)}", step.span, data=data)
 
 
 def _unfix(machine: Machine, process: Process, step: Instruction) -> None:
-    child = machine.name(process, step.operands[0])
-    spelled = machine.spelled
+    child = machine.resolve_name(process, step.operands[0])
+    spelled = machine.spelling
     if is_arm(child) or child == WORLD:
         code, text = "E308" if is_arm(child) else "E309", f"`{spelled(child)}` cannot be unfixed"
         raise machine.error(process, code, text, step.span, "has no parent")
-    machine.held(child, step, process)
+    machine.slot_value(child, step, process)
     above = machine.state.tree.parent(child)
-    if len(step.operands) > 1 and (parent := machine.name(process, step.operands[1])) != above:
+    if len(step.operands) > 1 and (parent := machine.resolve_name(process, step.operands[1])) != above:
         hangs = above is not None and above != WORLD
         instead = f"write `UNFIX {spelled(child)} FROM {spelled(above or WORLD)}`" if hangs else "remove this UNFIX"
         text = f"`{spelled(child)}` is not affixed to `{spelled(parent)}`"
         label = f"is attached to {spelled(above or WORLD)}"
-        where = machine.origin(child, "it got its pose here")
+        where = machine.origin_labels(child, "it got its pose here")
         raise machine.error(process, "E306", text, step.span, label, secondary=where, helps=[instead])
-    machine.grow(machine.state.tree.unfix(child), child, step.span)
-    machine.effect(process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data={"child": child, "parent": above})
+    machine.replace_tree(machine.state.tree.unfix(child), child, step.span)
+    machine.record_effect(
+        process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data={"child": child, "parent": above}
+    )
 
 
 HANDLERS: Mapping[Op, Handler] = {Op.AFFIX: _affix, Op.AFFAT: _affix, Op.UNFIX: _unfix}

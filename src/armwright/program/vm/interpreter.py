@@ -6,6 +6,7 @@ served first, then the one that comes first in the text; so a run is the same on
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 
 import attrs
 import numpy as np
@@ -17,19 +18,19 @@ from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.bytecode.verify import verify
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm import control_flow, devices, expressions, frames, move, output
-from armwright.program.vm.contact import too_deep
-from armwright.program.vm.control_flow import recover, rest, words_of
+from armwright.program.vm.contact import stop_too_deep
+from armwright.program.vm.control_flow import recover, shut_down, switched_off_text
 from armwright.program.vm.machine import Handler, Limits, Machine, RunError
-from armwright.program.vm.move import go_on
-from armwright.program.vm.move_diagnostics import detour_warning, stops_warning
+from armwright.program.vm.move import advance_motion
+from armwright.program.vm.move_diagnostics import obstacle_warning
 from armwright.program.vm.process import Process
-from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, in_order
-from armwright.program.vm.synchronization import deadlock
+from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, sort_effects
+from armwright.program.vm.synchronization import deadlock_error
 
 # No TRY helps a program that runs for ever: what is tried again would run for ever again.
-_FINAL = ("E504", "E506")
+_UNRECOVERABLE = ("E504", "E506")
 # A time this part of a period before a tick is on it.
-_ON_A_TICK = 1e-6
+_TICK_TOLERANCE = 1e-6
 
 _FAMILIES = (expressions, frames, devices, move, control_flow, output)
 HANDLERS: Mapping[Op, Handler] = {op: handler for family in _FAMILIES for op, handler in family.HANDLERS.items()}
@@ -37,7 +38,18 @@ HANDLERS: Mapping[Op, Handler] = {op: handler for family in _FAMILIES for op, ha
 # Called now and then: the time on the clock [s], the line of the next statement.
 Progress = Callable[[float, int], None]
 
-__all__ = ["Limits", "Machine", "Progress", "RunError", "advance", "due", "interpret", "ready", "run", "warnings"]
+__all__ = [
+    "Limits",
+    "Machine",
+    "Progress",
+    "RunError",
+    "advance",
+    "interpret",
+    "motion_warnings",
+    "next_process",
+    "ready_process",
+    "run",
+]
 
 
 def interpret(
@@ -74,30 +86,30 @@ def run(machine: Machine, progress: Progress | None = None) -> None:
         RunError: as ``interpret`` does.
     """
     instructions = machine.code.instructions
-    while not machine.state.over:
-        process = due(machine)
-        if progress and instructions[process.at].begins:
-            progress(machine.now, machine.code.line(instructions[process.at]))
+    while not machine.state.has_ended:
+        process = next_process(machine)
+        if progress and instructions[process.pc].begins:
+            progress(machine.now, machine.code.line(instructions[process.pc]))
         advance(machine, process)
 
 
-def due(machine: Machine) -> Process:
+def next_process(machine: Machine) -> Process:
     """Return the process that is served next.
 
     Raises:
         RunError: all wait for one another.
     """
-    process = ready(machine)
+    process = ready_process(machine)
     if process is None:
-        raise _stopped(machine, deadlock(machine), machine.state.program, None)
+        raise _stopped_error(machine, deadlock_error(machine), machine.state.program, None)
     return process
 
 
-def ready(machine: Machine) -> Process | None:
+def ready_process(machine: Machine) -> Process | None:
     """Return the process that is served next; None where all wait for one another."""
     best = None
     for process in machine.state.processes:
-        if (due := process.due) is not None:
+        if (due := process.due_tick) is not None:
             rank = (due, -process.priority, process.path)
             if best is None or rank < best[0]:
                 best = (rank, process)
@@ -113,55 +125,60 @@ def advance(machine: Machine, process: Process) -> None:
     try:
         _advance(machine, process)
     except RunError as error:
-        if error.diagnostic.code in _FINAL or not recover(machine, process, error):
-            raise _stopped(machine, error, process, process.last_arm) from None
+        if error.diagnostic.code in _UNRECOVERABLE or not recover(machine, process, error):
+            raise _stopped_error(machine, error, process, process.last_arm) from None
 
 
 def _advance(machine: Machine, process: Process) -> None:
-    if process.due is not None and process.due > machine.state.ticks:
-        last = machine.limits.time / machine.cell.period + _ON_A_TICK
-        machine.state.ticks, machine.state.idle = process.due, 0
+    if process.due_tick is not None and process.due_tick > machine.state.ticks:
+        last = machine.limits.time / machine.cell.period + _TICK_TOLERANCE
+        machine.state.ticks, machine.state.idle_steps = process.due_tick, 0
         if machine.state.ticks > last:
             # The clock stops there, and moving arms have come as far as that.
             machine.state.ticks = max(0, math.floor(last))
-            under_way = process.pending or process.motion or machine.code.instructions[process.at]
+            under_way = process.pending_effect or process.motion or machine.code.instructions[process.pc]
             text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
             raise machine.error(process, "E506", text, under_way.span, "it has reached this statement")
-    if process.motion is not None and process.motion.alarm is not None and process.motion.alarm <= machine.state.ticks:
-        too_deep(machine, process, process.motion)
-    if (pending := process.pending) is not None:
-        process.pending = None
-        if pending.place is not None:
-            machine.place(process, *pending.place, pending.span)
-        span, since, arm = pending.span, pending.since, pending.arm
-        machine.effect(process, pending.kind, pending.text, span, since=since, arm=arm, data=pending.data)
+    if (
+        process.motion is not None
+        and process.motion.alarm_tick is not None
+        and process.motion.alarm_tick <= machine.state.ticks
+    ):
+        stop_too_deep(machine, process, process.motion)
+    if (pending := process.pending_effect) is not None:
+        process.pending_effect = None
+        if pending.frame_pose is not None:
+            machine.set_pose(process, *pending.frame_pose, pending.span)
+        span, since, arm = pending.span, pending.start, pending.arm
+        machine.record_effect(process, pending.kind, pending.text, span, since=since, arm=arm, data=pending.data)
         return
-    if process.follows is not None:
-        go_on(machine, process)
+    if process.followed_motion is not None:
+        advance_motion(machine, process)
         return
-    step = machine.code.instructions[process.at]
-    machine.state.idle += 1
-    if machine.state.idle > machine.limits.steps:
+    step = machine.code.instructions[process.pc]
+    machine.state.idle_steps += 1
+    if machine.state.idle_steps > machine.limits.steps:
         text = f"the program has executed {machine.limits.steps} steps, and no time has passed"
         help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"
         raise machine.error(process, "E504", text, step.span, "it is running this statement", helps=[help_])
-    process.at += 1
+    process.pc += 1
     HANDLERS[step.op](machine, process, step)
 
 
-def _stopped(machine: Machine, error: RunError, process: Process, arm: str | None) -> RunError:
+def _stopped_error(machine: Machine, error: RunError, process: Process, arm: str | None) -> RunError:
     """Return the error with the frames as they are when all arms are at rest and all devices off."""
-    stopped = rest(machine, error.diagnostic.span)
+    switched_off = shut_down(machine, error.diagnostic.span)
     failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm, process=process.title)
-    return RunError(error.diagnostic, machine.state.tree, machine.now, lambda: _failed(machine, failure, stopped))
+    recording = partial(_failure_recording, machine, failure, switched_off)
+    return RunError(error.diagnostic, machine.state.tree, machine.now, recording)
 
 
-def _failed(machine: Machine, failure: Failure, stopped: Sequence[str]) -> Recording:
+def _failure_recording(machine: Machine, failure: Failure, switched_off: Sequence[str]) -> Recording:
     """Return all that happened up to a failure, and as the last thing the failure, with the devices it switched off."""
     fault, recording = failure.diagnostic, machine.recording()
     line = machine.code.source.line(fault.span.start)
-    text = f"{fault.code} in line {line}: {fault.message}{words_of(machine, stopped)}"
-    data = {"code": fault.code, "failed_at": failure.time, "switched_off": list(stopped)}
+    text = f"{fault.code} in line {line}: {fault.message}{switched_off_text(machine, switched_off)}"
+    data = {"code": fault.code, "failed_at": failure.time, "switched_off": list(switched_off)}
     end = Effect(
         t0=failure.time,
         t1=machine.now,
@@ -169,14 +186,14 @@ def _failed(machine: Machine, failure: Failure, stopped: Sequence[str]) -> Recor
         span=fault.span,
         text=text,
         process=failure.process,
-        order=machine.starts().order,
+        order=machine.next_start().order,
         arm=failure.arm,
         data=data,
     )
-    return attrs.evolve(recording, effects=in_order((*recording.effects, end)), failure=failure)
+    return attrs.evolve(recording, effects=sort_effects((*recording.effects, end)), failure=failure)
 
 
-def warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic, ...]:
+def motion_warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic, ...]:
     """Return the warnings about stages that were run in a cell.
 
     For every straight line that was gone round, every VIA with stops because corners cannot be rounded, and every
@@ -184,7 +201,8 @@ def warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic, ...]:
     """
     diagnostics = []
     for stage in stages:
-        diagnostics += [warning for warning in (detour_warning(stage), stops_warning(stage)) if warning is not None]
+        if (warning := obstacle_warning(stage)) is not None:
+            diagnostics.append(warning)
         arm = cell.arms[stage.arm].arm
         excessive = np.flatnonzero(stage.peak_effort / arm.limit("effort") > 1)
         diagnostics += [_effort_warning(stage, arm, joint) for joint in excessive.tolist()]
@@ -201,6 +219,6 @@ def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:
         message=f"{arm.called(joint)} of {stage.arm} would need {needed:.1f} {unit}, "
         f"{(needed / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
         span=stage.span,
-        label=f"at {stage.t0 + stage.peak_time[joint]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
+        label=f"at {stage.t0 + stage.peak_time[joint]:.3f} s, in {stage.stage.kind} to {stage.goal_names[-1]}",
         helps=(f"a speed below {stage.speed:g} reduces the effort of acceleration, but not that of gravity",),
     )

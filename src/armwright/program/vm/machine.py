@@ -19,14 +19,14 @@ from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
-from armwright.program.vm.process import Element, Pending, Process, Start, Value
-from armwright.program.vm.recording import Effect, EffectKind, Recording, in_order, stream, thinned
+from armwright.program.vm.process import ElementReference, PendingEffect, Process, StartTime, Value
+from armwright.program.vm.recording import Effect, EffectKind, Recording, sample_stream, sort_effects, thin_trees
 from armwright.program.vm.state import MachineState
-from armwright.program.vm.value_text import shown
+from armwright.program.vm.value_text import value_text
 from armwright.spatial.poses import from_noap, to_noap
 
 # A time this part of a period behind a tick is on it.
-_ON_A_TICK = 1e-9
+_TICK_TOLERANCE = 1e-9
 # Frame trees that are kept; a page shows fewer.
 _MAX_TREES = 2000
 
@@ -81,7 +81,7 @@ class Machine:
         self.code, self.cell, self.hardware = code, cell, hardware
         self.limits = limits or Limits()
         self.state = state or MachineState.initial(code, cell)
-        self.constants = arrays_of(code.constants)
+        self.constants = constant_values(code.constants)
 
     def copy(self) -> "Machine":
         """Return a machine in the same state; what one of them does changes nothing in the other.
@@ -105,10 +105,17 @@ class Machine:
             code=self.code,
             cell=cell,
             duration=self.now,
-            effects=in_order(self.state.effects),
+            effects=sort_effects(self.state.effects),
             stages=tuple(self.state.stages),
             streams=tuple(
-                stream(name, arm, self.state.runs[name], self.state.pushes[name], duration=self.now, period=cell.period)
+                sample_stream(
+                    name,
+                    arm,
+                    self.state.segments[name],
+                    self.state.tool_wrenches[name],
+                    duration=self.now,
+                    period=cell.period,
+                )
                 for name, arm in cell.arms.items()
             ),
             trees=tuple(self.state.trees),
@@ -117,20 +124,20 @@ class Machine:
 
     # ---- names and values ------------------------------------------------------------------------------------------
 
-    def name(self, process: Process, operand: Operand) -> str:
+    def resolve_name(self, process: Process, operand: Operand) -> str:
         """Return what an operand names: where a variable or element is kept, an arm, a device."""
         assert isinstance(operand, str)  # noqa: S101 - the translator names what is written
         if operand.startswith("%"):
-            element = process.now.passing[operand]
-            assert isinstance(element, Element)  # noqa: S101 - only elements are written in passing
+            element = process.activation.temporaries[operand]
+            assert isinstance(element, ElementReference)  # noqa: S101 - only elements are written in passing
             return element.name
-        return process.now.bindings.get(operand, operand)
+        return process.activation.bindings.get(operand, operand)
 
     def names_variable(self, process: Process, operand: Operand) -> bool:
         """Whether an operand stands for something that can be written."""
         if not isinstance(operand, str):
             return False
-        return not operand.startswith("%") or isinstance(process.now.passing[operand], Element)
+        return not operand.startswith("%") or isinstance(process.activation.temporaries[operand], ElementReference)
 
     def type_of(self, name: str) -> VariableType:
         """Return what a kept name holds; of an element, what the element holds."""
@@ -149,30 +156,30 @@ class Machine:
             assert isinstance(operand, float | int)  # noqa: S101 - nothing else has a value
             return float(operand)
         if operand.startswith("%"):
-            value = process.now.passing[operand]
-            return self.held(value.name, step, process) if isinstance(value, Element) else value
-        return self.held(process.now.bindings.get(operand, operand), step, process)
+            value = process.activation.temporaries[operand]
+            return self.slot_value(value.name, step, process) if isinstance(value, ElementReference) else value
+        return self.slot_value(process.activation.bindings.get(operand, operand), step, process)
 
-    def held(self, name: str, step: Instruction, process: Process) -> Value:
+    def slot_value(self, name: str, step: Instruction, process: Process) -> Value:
         """Return what a kept name holds."""
         if self.type_of(name).kind is VariableKind.FRAME:
-            self.look(process, name)
-            if not self.has_place(name):
-                text = f"frame `{self.spelled(name)}` is used before it has a value"
+            self.update_frame(process, name)
+            if not self.has_pose(name):
+                text = f"frame `{self.spelling(name)}` is used before it has a value"
                 raise self.error(process, "E304", text, step.span, "no value here")
             return self.state.tree.world(name)
         if (value := self.state.values.get(name)) is None:
-            text = f"`{self.spelled(name)}` is used before it has a value"
+            text = f"`{self.spelling(name)}` is used before it has a value"
             raise self.error(process, "E303", text, step.span, "no value here")
         return value
 
-    def number(self, process: Process, operand: Operand, step: Instruction) -> float:
+    def read_number(self, process: Process, operand: Operand, step: Instruction) -> float:
         """Return the value of an operand that is a number."""
         value = self.read(process, operand, step)
         assert isinstance(value, float | int)  # noqa: S101 - the checker knows the kinds
         return float(value)
 
-    def pose(self, process: Process, operand: Operand, step: Instruction) -> Array:
+    def read_pose(self, process: Process, operand: Operand, step: Instruction) -> Array:
         """Return the value of an operand that is a pose or a step."""
         value = self.read(process, operand, step)
         assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
@@ -181,55 +188,54 @@ class Machine:
     def write(self, process: Process, operand: Operand, value: Value, step: Instruction) -> None:
         """Give a variable, an element or a value in passing its value."""
         assert isinstance(operand, str)  # noqa: S101 - the translator names what is written
-        if operand.startswith("%") and not isinstance(process.now.passing.get(operand), Element):
-            process.now.passing[operand] = value
-            process.now.wrote[operand] = step.span
+        if operand.startswith("%") and not isinstance(process.activation.temporaries.get(operand), ElementReference):
+            process.activation.temporaries[operand] = value
+            process.activation.temporary_spans[operand] = step.span
             return
-        name = self.name(process, operand)
+        name = self.resolve_name(process, operand)
         if self.type_of(name).kind is not VariableKind.FRAME:
-            assert not isinstance(value, Element)  # noqa: S101 - elements are read before they are written
+            assert not isinstance(value, ElementReference)  # noqa: S101 - elements are read before they are written
             self.state.values[name] = value
             return
         assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
-        self.place(process, name, value, step.span)
-        text, data = f"{self.spelled(name)} = {shown(value, self.code.units)}", pose_data(name, value)
-        self.effect(process, "PLACE", text, step.span, data=data)
+        self.set_pose(process, name, value, step.span)
+        text, data = f"{self.spelling(name)} = {value_text(value, self.code.units)}", pose_data(name, value)
+        self.record_effect(process, "PLACE", text, step.span, data=data)
 
-    def has_place(self, name: str) -> bool:
+    def has_pose(self, name: str) -> bool:
         """Whether a frame stands somewhere."""
         return name in self.state.tree and self.state.tree.has_value(name)
 
-    def label(self, process: Process, operand: Operand) -> str:
+    def operand_text(self, process: Process, operand: Operand) -> str:
         """Return what an operand is called in the trace: as the program writes it."""
         if isinstance(operand, str) and not self.names_variable(process, operand):
-            return " ".join(self.code.source.slice(process.now.wrote[operand]).split())
-        return self.spelled(self.name(process, operand))
+            return " ".join(self.code.source.slice(process.activation.temporary_spans[operand]).split())
+        return self.spelling(self.resolve_name(process, operand))
 
-    def spelled(self, name: str) -> str:
+    def spelling(self, name: str) -> str:
         """Return a kept name as the program writes it."""
         return self.code.spelled(name)
 
-    def place(self, process: Process, name: str, X: Array, span: Span) -> None:
+    def set_pose(self, process: Process, name: str, X: Array, span: Span) -> None:
         """Give a frame another pose.
 
         Raises:
             RunError: it cannot be placed.
         """
-        self.look(process, name)
+        self.update_frame(process, name)
         leader = self.state.tree.leader(name)
         if is_arm(name) or name == WORLD:
-            text = f"`{self.spelled(name)}` cannot be assigned a value"
+            text = f"`{self.spelling(name)}` cannot be assigned a value"
             raise self.error(process, "E218", text, span, "an arm" if is_arm(name) else "the root of all frames")
         if leader != name and (is_arm(leader) or leader == WORLD):
-            text = (
-                f"`{self.spelled(name)}` is rigidly attached to {self.spelled(leader)}, which an assignment cannot move"
-            )
+            attached = f"`{self.spelling(name)}` is rigidly attached to {self.spelling(leader)}"
+            text = f"{attached}, which an assignment cannot move"
             raise self.error(process, "E310", text, span, "cannot be assigned a pose")
-        self.grow(self.state.tree.place(name, X), name, span)
+        self.replace_tree(self.state.tree.place(name, X), name, span)
 
-    def set_hand(self, arm: str, span: Span, *, at: int | None = None) -> None:
+    def update_hand_pose(self, arm: str, span: Span, *, tick: int | None = None) -> None:
         """Let the frame table know where an arm is now, or will be at a later tick."""
-        self.grow(self.state.tree.place(arm, self.gripper_pose(arm, at)), arm, span)
+        self.replace_tree(self.state.tree.place(arm, self.gripper_pose(arm, tick)), arm, span)
 
     def gripper_pose(self, arm: str, tick: int | None = None) -> Array:
         """Return the pose of the gripper of an arm in the world, now or at a later tick."""
@@ -240,37 +246,37 @@ class Machine:
         """Return the arm that a frame is or hangs on; None where it hangs on none."""
         return next((frame for frame in (name, *self.state.tree.ancestors(name)) if is_arm(frame)), None)
 
-    def mover(self, arm: str) -> Process | None:
+    def moving_process(self, arm: str) -> Process | None:
         """Return the process that moves an arm; None where the arm is at rest."""
         return next((owner for owner in self.state.processes if owner.motion and owner.motion.arm == arm), None)
 
-    def origin(self, name: str, text: str) -> list[Label]:
+    def origin_labels(self, name: str, text: str) -> list[Label]:
         """Return a text about the statement that gave a frame its pose or its parent; nothing where none did."""
-        return [Label(self.state.written[name], text)] if name in self.state.written else []
+        return [Label(self.state.pose_origins[name], text)] if name in self.state.pose_origins else []
 
-    def look(self, process: Process, name: str) -> None:
+    def update_frame(self, process: Process, name: str) -> None:
         """Let the frame table know where a frame is now, if a moving arm carries it."""
         if name not in self.state.tree or not any(process.motion for process in self.state.processes):
             return
         arm = self.carrier(name)
-        mover = None if arm is None else self.mover(arm)
+        mover = None if arm is None else self.moving_process(arm)
         # A condition of a MOVE finds the arm of this MOVE where it is.
-        if arm is not None and mover is not None and not (mover is process and process.now.kind == "condition"):
+        if arm is not None and mover is not None and not (mover is process and process.activation.kind == "condition"):
             self.state.tree = self.state.tree.place(arm, self.gripper_pose(arm))
 
-    def grow(self, tree: FrameTree, name: str, span: Span) -> None:
+    def replace_tree(self, tree: FrameTree, name: str, span: Span) -> None:
         """Take another frame tree, in which ``name`` got its pose or its parent."""
         self.state.tree = tree
-        self.state.written[name] = span
+        self.state.pose_origins[name] = span
         if len(self.state.trees) > 1 and self.state.trees[-1][0] == self.now:
             self.state.trees.pop()
         self.state.trees.append((self.now, tree))
         if len(self.state.trees) > 2 * _MAX_TREES:
-            self.state.trees = thinned(self.state.trees, self.now / _MAX_TREES)
+            self.state.trees = thin_trees(self.state.trees, self.now / _MAX_TREES)
 
     # ---- arms and time ---------------------------------------------------------------------------------------------
 
-    def claim(self, process: Process, arm: str, span: Span, moved: str | None = None) -> None:
+    def claim_arm(self, process: Process, arm: str, span: Span, moved: str | None = None) -> None:
         """Let a process use an arm.
 
         Args:
@@ -292,43 +298,43 @@ class Machine:
             if not (owner.descends_from(process) or process.descends_from(owner)):
                 text = f"{arm} is used by {owner.title} and by {process.title} of one COBEGIN"
                 note = "each arm belongs to one process at a time"
-                hung = self._hung(moved, arm)
+                hung = self._affix_labels(moved, arm)
                 raise self.error(process, "E503", text, span, f"belongs to {owner.title}", secondary=hung, notes=[note])
         if process not in owners:
             owners.append(process)
 
-    def _hung(self, moved: str | None, arm: str) -> list[Label]:
+    def _affix_labels(self, moved: str | None, arm: str) -> list[Label]:
         """Return where a frame, or what it hangs on, was hung on an arm."""
         if moved is None or moved == arm:
             return []
         above = [moved, *self.state.tree.ancestors(moved)]
         name = above[above.index(arm) - 1]
-        return self.origin(name, f"{self.spelled(name)} was affixed to {arm} here")
+        return self.origin_labels(name, f"{self.spelling(name)} was affixed to {arm} here")
 
-    def take_time(self, process: Process, seconds: float, pending: Pending) -> None:
+    def schedule_effect(self, process: Process, seconds: float, pending: PendingEffect) -> None:
         """Let the time of a statement go by before it takes effect."""
-        process.pending = pending
-        process.wake = self.state.ticks + math.ceil(seconds / self.cell.period - _ON_A_TICK)
+        process.pending_effect = pending
+        process.wake_tick = self.state.ticks + math.ceil(seconds / self.cell.period - _TICK_TOLERANCE)
 
-    def starts(self) -> Start:
+    def next_start(self) -> StartTime:
         """Return the present tick as the start of what takes time, behind all that has begun before."""
-        self.state.begun += 1
-        return Start(self.state.ticks, self.state.begun)
+        self.state.start_count += 1
+        return StartTime(self.state.ticks, self.state.start_count)
 
-    def effect(
+    def record_effect(
         self,
         process: Process,
         kind: EffectKind,
         text: str,
         span: Span,
         *,
-        since: Start | None = None,
+        since: StartTime | None = None,
         until: int | None = None,
         arm: str | None = None,
         data: dict[str, object] | None = None,
     ) -> None:
         """Record what a process did up to now, or does up to a later tick."""
-        start, period = since or self.starts(), self.cell.period
+        start, period = since or self.next_start(), self.cell.period
         self.state.effects.append(
             Effect(
                 t0=start.tick * period,
@@ -359,9 +365,9 @@ class Machine:
     ) -> RunError:
         """Return the error that says why a process cannot go on."""
         calls = [
-            Label(activation.called, f"{self.spelled(activation.name)} is called here")
+            Label(activation.call_span, f"{self.spelling(activation.name)} is called here")
             for activation in process.stack[:0:-1]
-            if activation.kind == "procedure" and activation.called
+            if activation.kind == "procedure" and activation.call_span
         ]
         diagnostic = Diagnostic(
             code=code,
@@ -375,7 +381,7 @@ class Machine:
         return RunError(diagnostic, self.state.tree, self.now)
 
 
-def arrays_of(constants: Sequence[tuple[float, ...] | float]) -> list[float | Array]:
+def constant_values(constants: Sequence[tuple[float, ...] | float]) -> list[float | Array]:
     """Return the constants of a code as values: numbers, and poses (4, 4)."""
     return [from_noap(value) if isinstance(value, tuple) else float(value) for value in constants]
 

@@ -18,112 +18,123 @@ from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
-from armwright.program.vm.contact import comes_down, contact_of, look_out, note_contact, send, stop
+from armwright.program.vm.contact import (
+    contact_report,
+    record_contact,
+    refuse_contact,
+    send_trajectory,
+    stop_arm,
+    update_depth_alarm,
+)
 from armwright.program.vm.expressions import evaluate_instructions
 from armwright.program.vm.machine import Handler, Machine
-from armwright.program.vm.move_diagnostics import CODES, detour_advice, stopped, where_and_why
+from armwright.program.vm.move_diagnostics import CODES, detour_advice, obstacle_location, obstacle_message
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
 from armwright.program.vm.process import EarlyEnd, Guard, Motion, Process
-from armwright.program.vm.recording import Run, RunStage, efforts, peaks_of
+from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.spatial.poses import inverse
 
 # A pose this many times farther than the arm reaches was probably typed in another unit.
-_OTHER_UNIT = 50.0
+_WRONG_UNIT_FACTOR = 50.0
 # A gripper that closed on a frame still stands at it when both are so near [m], and entries of rotations.
-_SAME_PLACE = 1e-6
+_SAME_POSE = 1e-6
 # Planning a MOVE takes as long as so many steps of other kinds, whether it can be made or not.
-_STEPS_OF_A_MOVE = 1000
+_STEPS_PER_MOVE = 1000
 
 
 def move(machine: Machine, process: Process, step: Instruction) -> None:
     """Plan a MOVE and begin its first stage; in the action of a MOVE, when that one has come to rest."""
-    if process.motion is not None and not _made_way(machine, process, process.motion, step.span):
+    if process.motion is not None and not _finish_outer_move(machine, process, process.motion, step.span):
         return
     request = move_request(machine, process, step)
-    moved = machine.name(process, request.begin.operands[0])
+    moved = machine.resolve_name(process, request.begin.operands[0])
     arm, implied = _carrier(machine, process, moved, request.begin)
-    machine.claim(process, arm, step.span, moved)
-    _one_at_a_time(machine, process, arm, step.span)
-    machine.state.idle += _STEPS_OF_A_MOVE
-    stages = _plan(machine, process, request, arm, moved)
-    spelled = machine.spelled(moved)
+    machine.claim_arm(process, arm, step.span, moved)
+    _require_idle_arm(machine, process, arm, step.span)
+    machine.state.idle_steps += _STEPS_PER_MOVE
+    stages = _plan_stages(machine, process, request, arm, moved)
+    spelled = machine.spelling(moved)
     who = arm if moved == arm else f"{arm} [{spelled}]"
     manner = f"@{request.speed:g}" if request.duration is None else f"in {request.duration:g} s"
     process.motion = Motion(
         arm=arm,
         moved=moved,
-        tip=machine.state.tree.relation(moved, arm),
+        X_HM=machine.state.tree.relation(moved, arm),
         span=step.span,
         text=f"{who} MOVE: {stages_text(request.form).replace(' / ', '; ')} {manner}",
         goal=_goal_name(machine, process, request),
-        implied=implied,
+        implied_affix=implied,
         stages=stages,
         speed=request.speed,
-        depth=len(process.stack),
-        begun=machine.starts(),
+        stack_depth=len(process.stack),
+        start=machine.next_start(),
         guards=request.guards,
     )
-    _start(machine, process, process.motion)
+    _start_stage(machine, process, process.motion)
 
 
-def go_on(machine: Machine, process: Process) -> None:
+def advance_motion(machine: Machine, process: Process) -> None:
     """Follow a motion at a tick at which something may happen: a guard, the end of a stage, the end of the MOVE."""
     motion = process.motion
     assert motion is not None  # noqa: S101 - asked for only then
     for guard in motion.guards:
-        if not guard.done and _condition_holds(machine, process, motion, guard):
-            guard.done = True
-            machine.set_hand(motion.arm, motion.span)
-            action = process.now.inner("action", back=process.at, called=motion.span, locks=len(process.locks))
+        if not guard.triggered and _condition_holds(machine, process, motion, guard):
+            guard.triggered = True
+            machine.update_hand_pose(motion.arm, motion.span)
+            action = process.activation.create_nested(
+                "action", return_address=process.pc, call_span=motion.span, lock_count=len(process.locks)
+            )
             process.stack.append(action)
-            process.at = guard.action
+            process.pc = guard.action
             return
-    if machine.state.ticks < motion.until:
-        process.wake = machine.state.ticks + 1 if any(not guard.done for guard in motion.guards) else motion.until
+    if machine.state.ticks < motion.stage_end_tick:
+        process.wake_tick = (
+            machine.state.ticks + 1 if any(not guard.triggered for guard in motion.guards) else motion.stage_end_tick
+        )
     elif motion.stages:
-        _start(machine, process, motion)
+        _start_stage(machine, process, motion)
     else:
-        _finish(machine, process, motion)
+        _finish_move(machine, process, motion)
 
 
-def halt(machine: Machine, process: Process, step: Instruction) -> None:
+def halt_motion(machine: Machine, process: Process, step: Instruction) -> None:
     """End the motion from inside an action: the arm stops under control, and the MOVE is over."""
     motion, action = process.motion, process.stack.pop()
     assert action.kind == "action"  # noqa: S101 - procedures that it called have been left
-    release(machine, process, action.locks)
-    process.at = action.back
+    release_locks(machine, process, action.lock_count)
+    process.pc = action.return_address
     if motion is None:
         # An error has stopped the arm before, and a TRY in the action has gone on from there.
         return
-    _break_off(machine, process, motion, step.span)
+    _stop_motion(machine, process, motion, step.span)
 
 
-def _break_off(machine: Machine, process: Process, motion: Motion, span: Span) -> None:
-    motion.until = process.wake = stop(machine, process, span)
+def _stop_motion(machine: Machine, process: Process, motion: Motion, span: Span) -> None:
+    motion.stage_end_tick = process.wake_tick = stop_arm(machine, process, span)
     motion.stages, motion.guards = [], []
-    motion.ended = EarlyEnd.HALTED
+    motion.early_end = EarlyEnd.HALTED
 
 
-def _made_way(machine: Machine, process: Process, motion: Motion, span: Span) -> bool:
+def _finish_outer_move(machine: Machine, process: Process, motion: Motion, span: Span) -> bool:
     """Whether the MOVE around an action is over, so that another can begin; its arm is brought to rest before."""
-    if motion.ended is EarlyEnd.HALTED:
-        _finish(machine, process, motion)
+    if motion.early_end is EarlyEnd.HALTED:
+        _finish_move(machine, process, motion)
         return True
-    _break_off(machine, process, motion, span)
+    _stop_motion(machine, process, motion, span)
     # When the arm is at rest the same instruction is looked at again.
-    process.at -= 1
+    process.pc -= 1
     return False
 
 
-def release(machine: Machine, process: Process, keep: int) -> None:
-    """Give back the locks that a process took after its first ``keep``; whoever waits for one looks again."""
-    for name in process.locks[keep:]:
-        if name not in process.locks[:keep]:
+def release_locks(machine: Machine, process: Process, keep_count: int) -> None:
+    """Give back the locks that a process took after its first ``keep_count``; whoever waits for one looks again."""
+    for name in process.locks[keep_count:]:
+        if name not in process.locks[:keep_count]:
             machine.state.locks.pop(name, None)
-    del process.locks[keep:]
+    del process.locks[keep_count:]
     for other in machine.state.processes:
-        if other.waiting and other.waiting.what == "locks":
-            other.waiting, other.wake = None, machine.state.ticks
+        if other.waiting and other.waiting.kind == "locks":
+            other.waiting, other.wake_tick = None, machine.state.ticks
 
 
 # ---- planning ------------------------------------------------------------------------------------------------------
@@ -131,41 +142,41 @@ def release(machine: Machine, process: Process, keep: int) -> None:
 
 def _goal_name(machine: Machine, process: Process, request: MoveRequest) -> str:
     goal = request.begin.operands[1]
-    return machine.name(process, goal) if machine.names_variable(process, goal) else request.form.goal
+    return machine.resolve_name(process, goal) if machine.names_variable(process, goal) else request.form.goal
 
 
 def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction) -> tuple[str, bool]:
     """Return the arm that carries what is moved, and whether it hangs there only from now on."""
     if is_arm(moved):
         return moved, False
-    machine.held(moved, begin, process)
+    machine.slot_value(moved, begin, process)
     if (arm := machine.carrier(moved)) is not None:
         return arm, False
     X_WM = machine.state.tree.world(moved)
     for name, hand in machine.state.hands.items():
-        if hand.holds == moved and np.allclose(machine.state.tree.world(name), X_WM, rtol=0, atol=_SAME_PLACE):
-            machine.grow(machine.state.tree.affix(moved, name), moved, begin.span)
+        if hand.held_frame == moved and np.allclose(machine.state.tree.world(name), X_WM, rtol=0, atol=_SAME_POSE):
+            machine.replace_tree(machine.state.tree.affix(moved, name), moved, begin.span)
             return name, True
-    spelled, likely = machine.spelled(moved), process.last_arm or min(machine.cell.arms, default="ARM_1")
+    spelled, likely = machine.spelling(moved), process.last_arm or min(machine.cell.arms, default="ARM_1")
     parent = next(iter(machine.state.tree.ancestors(moved)), None)
     raise machine.error(
         process,
         "E301",
         f"`{spelled}` cannot be moved: it is not affixed to an arm",
         begin.span,
-        "is the root of all frames" if parent is None else f"is attached to {machine.spelled(parent)}, not to an arm",
-        secondary=machine.origin(moved, f"{spelled} got its pose here"),
+        "is the root of all frames" if parent is None else f"is attached to {machine.spelling(parent)}, not to an arm",
+        secondary=machine.origin_labels(moved, f"{spelled} got its pose here"),
         helps=[f"grasp it and write `AFFIX {spelled} TO {likely}`"],
     )
 
 
-def _one_at_a_time(machine: Machine, process: Process, arm: str, span: Span) -> None:
+def _require_idle_arm(machine: Machine, process: Process, arm: str, span: Span) -> None:
     """See to it that no process around this one is in the middle of a MOVE of the same arm, with an action of that.
 
     Raises:
         RunError: one is.
     """
-    other = machine.mover(arm)
+    other = machine.moving_process(arm)
     if other is None or other.motion is None:
         return
     text = f"{arm} cannot begin a MOVE in {process.title} before that of {other.title} is over"
@@ -173,7 +184,7 @@ def _one_at_a_time(machine: Machine, process: Process, arm: str, span: Span) -> 
     raise machine.error(process, "E503", text, span, "begins before the other has ended", secondary=[on_its_way])
 
 
-def _plan(
+def _plan_stages(
     machine: Machine, process: Process, request: MoveRequest, arm: str, moved: str
 ) -> list[tuple[PlannedStage, tuple[str, ...]]]:
     """Return the stages of a MOVE with the names of where they lead.
@@ -189,7 +200,7 @@ def _plan(
     goals = [
         StageGoal(
             kind=legs.kind.value,
-            poses=np.stack([X_BW @ _pose(machine, process, request.goals[label]) @ X_MH for label in legs.frames]),
+            poses=np.stack([X_BW @ _goal_pose(machine, process, request.goals[label]) @ X_MH for label in legs.frames]),
             blend=request.blend,
             corner=corner if legs.kind is MotionKind.SPLINE else None,
         )
@@ -204,33 +215,33 @@ def _plan(
         text = f"{arm} cannot make this MOVE at any speed: {error}"
         raise machine.error(process, "E406", text, request.span, "asked for here") from None
     if request.duration is not None:
-        stages = _timed(machine, process, request, stages, request.duration)
+        stages = _slow_to_duration(machine, process, request, stages, request.duration)
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
 
 
-def _pose(machine: Machine, process: Process, goal: Goal) -> Array:
-    return machine.pose(process, goal.operand, goal.step)
+def _goal_pose(machine: Machine, process: Process, goal: Goal) -> Array:
+    return machine.read_pose(process, goal.operand, goal.instruction)
 
 
-def _timed(
-    machine: Machine, process: Process, request: MoveRequest, stages: Sequence[PlannedStage], asked_for: float
+def _slow_to_duration(
+    machine: Machine, process: Process, request: MoveRequest, stages: Sequence[PlannedStage], duration: float
 ) -> list[PlannedStage]:
     """Return the stages slowed so that the whole MOVE takes as long as was asked for."""
     least = sum(stage.trajectory.duration for stage in stages)
-    if asked_for < least - machine.cell.period:
-        text = f"this MOVE is infeasible in {asked_for:g} s"
+    if duration < least - machine.cell.period:
+        text = f"this MOVE is infeasible in {duration:g} s"
         raise machine.error(process, "E405", text, request.span, f"it takes {least:.3f} s or more")
     if not least:
         # Nothing is to be moved: the arm stands still for so long.
-        still = hold(stages[0].trajectory(0.0), asked_for)
+        still = hold(stages[0].trajectory(0.0), duration)
         return [attrs.evolve(stages[0], trajectory=whole_ticks(still, machine.cell.period)), *stages[1:]]
-    slow = slowed_together([stage.trajectory for stage in stages], asked_for, machine.cell.period)
+    slow = slowed_together([stage.trajectory for stage in stages], duration, machine.cell.period)
     # What kept a stage slow does so no more where it is to take longer.
-    longer = asked_for > least + machine.cell.period
-    return [_retimed(stage, trajectory, longer=longer) for stage, trajectory in zip(stages, slow, strict=True)]
+    longer = duration > least + machine.cell.period
+    return [_retime_stage(stage, trajectory, longer=longer) for stage, trajectory in zip(stages, slow, strict=True)]
 
 
-def _retimed(stage: PlannedStage, slow: Trajectory, *, longer: bool) -> PlannedStage:
+def _retime_stage(stage: PlannedStage, slow: Trajectory, *, longer: bool) -> PlannedStage:
     """Return a stage run as long as was asked for; no limit slows it where that is longer."""
     certificate = stage.certificate
     if certificate is not None and slow.duration:
@@ -246,24 +257,24 @@ def _fail_move(
     goal, kind = request.goals[label], stage.kind.value
     secondary = []
     if machine.names_variable(process, goal.operand):
-        secondary = machine.origin(machine.name(process, goal.operand), f"`{label}` got its pose here")
+        secondary = machine.origin_labels(machine.resolve_name(process, goal.operand), f"`{label}` got its pose here")
     raise machine.error(
         process,
         CODES[obstacle.cause],
-        stopped(obstacle, label, arm, machine.cell.arms[arm].arm),
-        goal.step.span,
+        obstacle_message(obstacle, label, arm, machine.cell.arms[arm].arm),
+        goal.instruction.span,
         "cannot be reached",
         secondary=secondary,
-        notes=(where_and_why(obstacle, kind, stage.frames, arm),),
-        helps=(*_other_unit(machine, process, goal, arm), *detour_advice(obstacle, kind, machine.cell.around)),
+        notes=(obstacle_location(obstacle, kind, stage.frames, arm),),
+        helps=(*_unit_advice(machine, process, goal, arm), *detour_advice(obstacle, kind, machine.cell.around)),
     )
 
 
-def _other_unit(machine: Machine, process: Process, goal: Goal, arm: str) -> tuple[str, ...]:
+def _unit_advice(machine: Machine, process: Process, goal: Goal, arm: str) -> tuple[str, ...]:
     """Say what lengths are counted in, where a pose so far off can only be meant in another unit."""
     X_BW = inverse(machine.state.tree.world(base_name(arm)))
-    away = np.linalg.norm((X_BW @ _pose(machine, process, goal))[:3, 3])
-    if away <= _OTHER_UNIT * machine.cell.arms[arm].arm.reach:
+    away = np.linalg.norm((X_BW @ _goal_pose(machine, process, goal))[:3, 3])
+    if away <= _WRONG_UNIT_FACTOR * machine.cell.arms[arm].arm.reach:
         return ()
     unit = {"M": "metres", "MM": "millimetres", "CM": "centimetres", "IN": "inches"}[machine.code.units.length]
     return (f"`{goal.label}` is {away:.4g} m away: lengths in this program are {unit}",)
@@ -272,7 +283,7 @@ def _other_unit(machine: Machine, process: Process, goal: Goal, arm: str) -> tup
 # ---- meanwhile ----------------------------------------------------------------------------------------------------
 
 
-def _start(machine: Machine, process: Process, motion: Motion) -> None:
+def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     """Begin the next stage of a motion."""
     stage, to = motion.stages.pop(0)
     arm, period = machine.cell.arms[motion.arm].arm, machine.cell.period
@@ -280,25 +291,25 @@ def _start(machine: Machine, process: Process, motion: Motion) -> None:
     ticks = round(trajectory.duration / period)
     # A run that lasts longer comes to its end before.
     counted = min(ticks, math.ceil(max(0.0, machine.limits.time - machine.now) / period))
-    if motion.record >= 0:
-        note_contact(machine, motion)
-    push = send(machine, motion, trajectory)
-    tau = efforts(arm, trajectory, period, push, counted)
-    look_out(machine, motion)
+    if motion.stage_index >= 0:
+        record_contact(machine, motion)
+    push = send_trajectory(machine, motion, trajectory)
+    tau = trajectory_efforts(arm, trajectory, period, push, counted)
+    update_depth_alarm(machine, motion)
     touch = machine.hardware.touches_at(motion.arm)
-    if not motion.guards and (touch is not None or motion.alarm is not None):
-        send(machine, motion, hold(trajectory(0.0), period))
-        motion.alarm = None
-        comes_down(machine, process, motion, to[-1])
+    if not motion.guards and (touch is not None or motion.alarm_tick is not None):
+        send_trajectory(machine, motion, hold(trajectory(0.0), period))
+        motion.alarm_tick = None
+        refuse_contact(machine, process, motion, to[-1])
     if touch is not None:
-        motion.touch = (trajectory, touch - machine.now)
-    motion.record, (peak, when) = len(machine.state.stages), peaks_of(tau, period)
+        motion.first_contact = (trajectory, touch - machine.now)
+    motion.stage_index, (peak, when) = len(machine.state.stages), peak_efforts(tau, period)
     machine.state.stages.append(
         RunStage(
             t0=machine.now,
             arm=motion.arm,
             span=motion.span,
-            to=to,
+            goal_names=to,
             speed=motion.speed,
             stage=stage,
             motion=trajectory,
@@ -307,48 +318,54 @@ def _start(machine: Machine, process: Process, motion: Motion) -> None:
             peak_time=when,
         )
     )
-    run = Run(t0=machine.now, trajectory=trajectory, duration=trajectory.duration, tau=tau)
-    machine.state.runs[motion.arm].append(run)
-    motion.since, motion.until = machine.state.ticks, machine.state.ticks + ticks
-    if any(guard.looks for guard in motion.guards):
+    run = TrajectorySegment(t0=machine.now, trajectory=trajectory, duration=trajectory.duration, tau=tau)
+    machine.state.segments[motion.arm].append(run)
+    motion.stage_start_tick, motion.stage_end_tick = machine.state.ticks, machine.state.ticks + ticks
+    if any(guard.reads_pose for guard in motion.guards):
         times = np.arange(counted + 1) * period
         X_WB = machine.state.tree.world(base_name(motion.arm))
-        motion.hands = X_WB @ forward(arm, trajectory(times))
-    process.wake = machine.state.ticks if motion.guards else motion.until
+        motion.hand_poses = X_WB @ forward(arm, trajectory(times))
+    process.wake_tick = machine.state.ticks if motion.guards else motion.stage_end_tick
 
 
 def _condition_holds(machine: Machine, process: Process, motion: Motion, guard: Guard) -> bool:
     """Whether the condition of a guard holds now, with the arm where it is now."""
-    tree, now = machine.state.tree, process.now
-    if guard.looks and len(motion.hands):
-        index = min(machine.state.ticks - motion.since, len(motion.hands) - 1)
-        machine.state.tree = tree.place(motion.arm, motion.hands[index])
-    process.stack.append(now.inner("condition"))
+    tree, now = machine.state.tree, process.activation
+    if guard.reads_pose and len(motion.hand_poses):
+        index = min(machine.state.ticks - motion.stage_start_tick, len(motion.hand_poses) - 1)
+        machine.state.tree = tree.place(motion.arm, motion.hand_poses[index])
+    process.stack.append(now.create_nested("condition"))
     evaluate_instructions(machine, process, machine.code.instructions, guard.condition)
     process.stack.pop()
     machine.state.tree = tree
-    return bool(now.passing[guard.truth])
+    return bool(now.temporaries[guard.result])
 
 
-def _finish(machine: Machine, process: Process, motion: Motion) -> None:
+def _finish_move(machine: Machine, process: Process, motion: Motion) -> None:
     """The MOVE is over: the frame table and the trace know where the arm is."""
     arm = motion.arm
-    machine.set_hand(arm, motion.span)
+    machine.update_hand_pose(arm, motion.span)
     hand = machine.state.hands[arm]
-    reached = motion.ended is not EarlyEnd.HALTED and machine.has_place(motion.goal)
-    hand.at = motion.moved if motion.moved != arm else motion.goal if reached else None
-    if hand.holds and hand.holds != hand.at and arm not in machine.state.tree.ancestors(hand.holds):
-        hand.holds = None
-    note_contact(machine, motion)
-    words, contact = contact_of(motion)
-    data = {**motion.data, **contact}
-    machine.effect(process, "MOVE", motion.trace + words, motion.span, since=motion.begun, arm=arm, data=data)
+    reached = motion.early_end is not EarlyEnd.HALTED and machine.has_pose(motion.goal)
+    hand.reached_frame = motion.moved if motion.moved != arm else motion.goal if reached else None
+    if (
+        hand.held_frame
+        and hand.held_frame != hand.reached_frame
+        and arm not in machine.state.tree.ancestors(hand.held_frame)
+    ):
+        hand.held_frame = None
+    record_contact(machine, motion)
+    words, contact = contact_report(motion)
+    data = {**motion.event_data, **contact}
+    machine.record_effect(
+        process, "MOVE", motion.trace_text + words, motion.span, since=motion.start, arm=arm, data=data
+    )
     process.motion = None
 
 
 HANDLERS: Mapping[Op, Handler] = {
     Op.MVEND: move,
-    Op.MVHLT: halt,
+    Op.MVHLT: halt_motion,
     # The parts of a MOVE are gathered by its end.
     **dict.fromkeys(
         (Op.MVBEG, Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON),

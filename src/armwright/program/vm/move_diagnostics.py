@@ -10,36 +10,36 @@ from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm.recording import RunStage
 
 CODES = {"reach": "E401", "limits": "E402", "singular": "E403"}
-_ITSELF = {
+_GOAL_MESSAGES = {
     "reach": "`{goal}` is out of reach of {arm}",
     "limits": "`{goal}` cannot be reached by {arm} inside its joint limits",
     "singular": "`{goal}` cannot be reached by {arm} on this path: the arm is singular there",
 }
-_ON_THE_PATH = {
+_PATH_MESSAGES = {
     "reach": "the path to `{goal}` leads out of the reach of {arm}",
     "limits": "the path to `{goal}` leads {joint} of {arm} beyond its limits",
     "singular": "`{goal}` cannot be reached by {arm} on this path: the arm is singular on the path",
 }
 # Farther away nobody counts tenths [mm].
-_FAR = 1e6
+_LARGE_COORDINATE = 1e6
 _THROUGH_FRAMES = ("SPLINE", "BLEND")
 _METHODS = {"via": "by a via pose", "damped": "by damped least squares"}
 
 
-def stopped(obstacle: Obstacle, goal: str, name: str, arm: Arm) -> str:
+def obstacle_message(obstacle: Obstacle, goal: str, name: str, arm: Arm) -> str:
     """Return the message of an error: the obstacle of an arm, of that name, on its path to a frame."""
-    texts = _ITSELF if obstacle.certain else _ON_THE_PATH
+    texts = _GOAL_MESSAGES if obstacle.certain else _PATH_MESSAGES
     joint = "a joint" if obstacle.joint is None else arm.called(obstacle.joint - 1)
     return texts[obstacle.cause].format(goal=goal, arm=name, joint=joint)
 
 
-def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) -> str:
+def obstacle_location(obstacle: Obstacle, kind: str, goal_names: Sequence[str], arm: str) -> str:
     """Return the location on the path, in space, and the reason.
 
     Args:
         obstacle: what stops the stage.
         kind: of the stage: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND``.
-        to: the frames it goes to, as the program spells them.
+        goal_names: the frames it goes to, as the program spells them.
         arm: name of the arm.
     """
     position = f"{_position(obstacle.place)} mm from the base of {arm}"
@@ -47,8 +47,8 @@ def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) ->
         return f"at {position}: {obstacle.reason}"
     part = f"{obstacle.fraction * 100:.0f} % of the path"
     if kind in _THROUGH_FRAMES:
-        before = "the start" if obstacle.pose == 0 else f"`{to[obstacle.pose - 1]}`"
-        part += f" from {before} (segment {obstacle.pose + 1} of {len(to)})"
+        before = "the start" if obstacle.pose == 0 else f"`{goal_names[obstacle.pose - 1]}`"
+        part += f" from {before} (segment {obstacle.pose + 1} of {len(goal_names)})"
     return f"{part}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, at {position}: {obstacle.reason}"
 
 
@@ -71,71 +71,66 @@ def detour_advice(obstacle: Obstacle, kind: str, around: str | None) -> tuple[st
     return (f"no detour {_METHODS[around]} was found on which the whole MOVE is feasible; {other}",)
 
 
-def _lead(detour: Detour, arm: str) -> str:
+def _detour_course(detour: Detour, arm: str) -> str:
     """Return the course of a detour."""
     if detour.via is None:
         return "the tool follows the line by damped least squares, and deviates where the arm is nearly singular"
     return f"the tool stops at a via pose at {_position(detour.via[:3, 3])} mm from the base of {arm}"
 
 
-def note_of(run: RunStage) -> str:
+def stage_note(run: RunStage) -> str:
     """Return what a report has to say beside a stage: where it was stopped, its detour, why it is slow."""
-    stage = run.stage
+    stage, where = run.stage, _stage_obstacle(run)
     notes = [stage.slowed] if stage.slowed else []
     if run.stopped:
         notes.append(
             f"stopped on its path, after {run.duration:.3f} s and {run.length * 1e3:.1f} mm "
             f"of {stage.trajectory.duration:.3f} s and {stage.length * 1e3:.1f} mm"
         )
-    if stage.obstacle is not None and stage.detour is not None:
-        why = where_and_why(stage.obstacle, stage.kind, run.to, run.arm)
-        notes = [
-            f"the straight line is infeasible at {why}",
-            f"{_lead(stage.detour, run.arm)}: {stage.detour.price}",
-            *notes,
-        ]
-    elif stage.obstacle is not None:
-        notes.append(
-            f"without stops the path is infeasible at {where_and_why(stage.obstacle, stage.kind, run.to, run.arm)}"
-        )
+    if where and stage.detour is not None:
+        course = f"{_detour_course(stage.detour, run.arm)}: {stage.detour.price}"
+        notes = [f"the straight line is infeasible at {where}", course, *notes]
+    elif where:
+        notes.append(f"without stops the path is infeasible at {where}")
     if stage.certificate is not None:
         notes.append(stage.certificate.summary)
     return "; ".join(notes)
 
 
-def detour_warning(run: RunStage) -> Diagnostic | None:
-    """Return the warning that a stage leaves its straight line; None where it does not."""
+def _stage_obstacle(run: RunStage) -> str:
+    """Return where a stage could not follow the path that was requested, and why; empty where it did."""
+    obstacle = run.stage.obstacle
+    return "" if obstacle is None else obstacle_location(obstacle, run.stage.kind, run.goal_names, run.arm)
+
+
+def obstacle_warning(run: RunStage) -> Diagnostic | None:
+    """Return the warning about a stage that could not follow the path that was requested; None where it did.
+
+    Either it leaves its straight line by a detour, or it stops at all of its frames, because it cannot go past them.
+    """
     obstacle, detour = run.stage.obstacle, run.stage.detour
-    if obstacle is None or detour is None:
+    if obstacle is None:
         return None
+    goal, where, begun = run.goal_names[-1], _stage_obstacle(run), f"begun at {run.t0:.3f} s"
+    if detour is None:
+        return Diagnostic(
+            code="W403",
+            severity=Severity.WARNING,
+            message=f"{run.arm} stops at every frame on its path to `{goal}`: it cannot follow rounded corners",
+            span=run.span,
+            label=begun,
+            notes=(f"without stops the path is infeasible at {where}",),
+            helps=("a frame farther from that position, or another initial configuration, may need no stops",),
+        )
     return Diagnostic(
         code="W402",
         severity=Severity.WARNING,
-        message=f"{run.arm} leaves the straight line to `{run.to[-1]}`, {_METHODS[detour.method]}: {detour.price}",
+        message=f"{run.arm} leaves the straight line to `{goal}`, {_METHODS[detour.method]}: {detour.price}",
         span=run.span,
-        label=f"infeasible at {obstacle.fraction * 100:.0f} % of the path; begun at {run.t0:.3f} s",
-        notes=(
-            f"the line is infeasible at {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",
-            _lead(detour, run.arm),
-        ),
-    )
-
-
-def stops_warning(run: RunStage) -> Diagnostic | None:
-    """Return the warning that a stage stops at all of its frames, where it cannot go past them; None where it can."""
-    obstacle = run.stage.obstacle
-    if obstacle is None or run.stage.detour is not None:
-        return None
-    return Diagnostic(
-        code="W403",
-        severity=Severity.WARNING,
-        message=f"{run.arm} stops at every frame on its path to `{run.to[-1]}`: it cannot follow rounded corners",
-        span=run.span,
-        label=f"begun at {run.t0:.3f} s",
-        notes=(f"without stops the path is infeasible at {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",),
-        helps=("a frame farther from that position, or another initial configuration, may need no stops",),
+        label=f"infeasible at {obstacle.fraction * 100:.0f} % of the path; {begun}",
+        notes=(f"the line is infeasible at {where}", _detour_course(detour, run.arm)),
     )
 
 
 def _position(p: Array) -> str:
-    return f"({', '.join(f'{x:.1f}' if abs(x) < _FAR else f'{x:.4g}' for x in (p * 1e3).tolist())})"
+    return f"({', '.join(f'{x:.1f}' if abs(x) < _LARGE_COORDINATE else f'{x:.4g}' for x in (p * 1e3).tolist())})"

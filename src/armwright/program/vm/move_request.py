@@ -10,7 +10,7 @@ from armwright.program.vm.machine import Machine, jump_target
 from armwright.program.vm.process import Guard, Process
 
 # The longest MOVE; more is a slip of units [s].
-_MAX_LENGTH = 1e6
+_MAX_DURATION = 1e6
 
 
 class Goal(NamedTuple):
@@ -18,7 +18,7 @@ class Goal(NamedTuple):
 
     label: str
     operand: Operand
-    step: Instruction
+    instruction: Instruction
 
 
 class MoveRequest(NamedTuple):
@@ -36,7 +36,7 @@ class MoveRequest(NamedTuple):
 
 def move_request(machine: Machine, process: Process, step: Instruction) -> MoveRequest:
     """Gather the instructions of a MOVE, from MVBEG to MVEND."""
-    instructions, index = machine.code.instructions, process.at - 1
+    instructions, index = machine.code.instructions, process.pc - 1
     first = index
     while instructions[first].op is not Op.MVBEG:
         first -= 1
@@ -48,10 +48,10 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
         if part.op in (Op.MVVIA, Op.MVAPP, Op.MVDEP):
             goals[part.op] = [_goal(machine, process, operand, part) for operand in part.operands]
         elif part.op in (Op.MVSPD, Op.MVBLD, Op.MVDUR):
-            numbers[part.op] = _quantity(machine, process, part)
+            numbers[part.op] = _clause_value(machine, process, part)
         elif part.op is Op.MVON:
             guards.append(_guard(machine, part))
-    goals = _told_apart(goals)
+    goals = _make_labels_unique(goals)
     form = Form(
         goal=goals["goal"][0].label,
         via=tuple(goal.label for goal in goals.get(Op.MVVIA, ())),
@@ -76,12 +76,12 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
 def _goal(machine: Machine, process: Process, operand: Operand, step: Instruction) -> Goal:
     span = step.span
     if isinstance(operand, str) and operand.startswith("%"):
-        span = process.now.wrote[operand]
+        span = process.activation.temporary_spans[operand]
     where = Instruction(op=step.op, operands=step.operands, span=span)
-    return Goal(machine.label(process, operand), operand, where if step.op is not Op.MVBEG else step)
+    return Goal(machine.operand_text(process, operand), operand, where if step.op is not Op.MVBEG else step)
 
 
-def _told_apart(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
+def _make_labels_unique(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
     """Return the goals with a label of its own for each, also where a program names two poses alike."""
     operands: dict[str, Operand] = {}
     for several in goals.values():
@@ -93,20 +93,20 @@ def _told_apart(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
     return goals
 
 
-def _quantity(machine: Machine, process: Process, part: Instruction) -> float:
+def _clause_value(machine: Machine, process: Process, part: Instruction) -> float:
     """Return speed, blend [m] or duration [s], checked."""
     operand = part.operands[0]
-    value = machine.number(process, operand, part)
-    name = f"{machine.label(process, operand)} = {value:g}" if isinstance(operand, str) else f"{value:g}"
+    value = machine.read_number(process, operand, part)
+    name = f"{machine.operand_text(process, operand)} = {value:g}" if isinstance(operand, str) else f"{value:g}"
     if part.op is Op.MVSPD:
         if not LOWEST_SPEED <= value <= HIGHEST_SPEED:
             message = f"speed {name} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
             raise machine.error(process, "E207", message, part.span, "out of range")
         return value
     what = "the blend" if part.op is Op.MVBLD else "the duration"
-    if part.op is Op.MVDUR and value > _MAX_LENGTH:
+    if part.op is Op.MVDUR and value > _MAX_DURATION:
         text = f"{what} {name} s is not possible"
-        raise machine.error(process, "E231", text, part.span, f"expected {_MAX_LENGTH:g} s or less")
+        raise machine.error(process, "E231", text, part.span, f"expected {_MAX_DURATION:g} s or less")
     if value <= 0:
         raise machine.error(process, "E231", f"{what} {name} is not above 0", part.span, "expected more than 0")
     return value * machine.code.units.metres if part.op is Op.MVBLD else value
@@ -116,4 +116,4 @@ def _guard(machine: Machine, part: Instruction) -> Guard:
     condition, action = jump_target(part, 0), jump_target(part, 2)
     steps = takewhile(lambda step: step.op is not Op.RET, machine.code.instructions[condition:])
     reads_pose = any(step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV) for step in steps)
-    return Guard(condition=condition, truth=str(part.operands[1]), action=action, looks=reads_pose)
+    return Guard(condition=condition, result=str(part.operands[1]), action=action, reads_pose=reads_pose)

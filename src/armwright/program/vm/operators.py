@@ -15,12 +15,12 @@ from armwright.spatial.poses import from_noap, homogeneous, inverse
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 # Numbers beyond this are a slip, and squares of them would overflow.
-LARGEST = 1e100
+MAX_NUMBER = 1e100
 # Points nearer than this part of their distance from the origin, or of a metre, are the same point.
 _ROUNDING = 1e-12
 
 
-class ValueFault(Exception):  # noqa: N818 - it never leaves the interpreter
+class EvaluationError(Exception):
     """An operation has no value; the code of the diagnostic, its message and the word at the location."""
 
     def __init__(self, code: str, message: str, label: str) -> None:
@@ -30,31 +30,31 @@ class ValueFault(Exception):  # noqa: N818 - it never leaves the interpreter
 
 
 def _multiply(a: Any, b: Any) -> Any:
-    return _number(a * b) if isinstance(a, float) else _near(a @ b)
+    return _checked_number(a * b) if isinstance(a, float) else _checked_pose(a @ b)
 
 
 def _divide(a: float, b: float) -> float:
     if b == 0:
-        raise ValueFault("E240", f"{a:g} cannot be divided by 0", "divided by 0 here")
-    return _number(a / b)
+        raise EvaluationError("E240", f"{a:g} cannot be divided by 0", "divided by 0 here")
+    return _checked_number(a / b)
 
 
-def _number(value: float) -> float:
-    if not abs(value) <= LARGEST:
-        raise ValueFault("E240", f"the result exceeds {LARGEST:g}, the largest number", "too large")
+def _checked_number(value: float) -> float:
+    if not abs(value) <= MAX_NUMBER:
+        raise EvaluationError("E240", f"the result exceeds {MAX_NUMBER:g}, the largest number", "too large")
     return value
 
 
-def _near(X: Array) -> Array:
+def _checked_pose(X: Array) -> Array:
     """Return a pose or a step whose lengths are numbers of a robot."""
-    _number(float(np.abs(X[:3, 3]).max()))
+    _checked_number(float(np.abs(X[:3, 3]).max()))
     return X
 
 
-def _turn(axis: int) -> Callable[[float, UnitSystem], Array]:
+def _rotation_about(axis: int) -> Callable[[float, UnitSystem], Array]:
     first, second = (axis + 1) % 3, (axis + 2) % 3
 
-    def turn(angle: float, units: UnitSystem) -> Array:
+    def rotation(angle: float, units: UnitSystem) -> Array:
         # Whole quarter turns are exact: 90 degrees leave no 6e-17 in a program's poses.
         quarters = angle / (math.pi / 2 / units.radians)
         exact = {0: (1.0, 0.0), 1: (0.0, 1.0), 2: (-1.0, 0.0), 3: (0.0, -1.0)}
@@ -65,7 +65,7 @@ def _turn(axis: int) -> Callable[[float, UnitSystem], Array]:
         X[first, first], X[first, second], X[second, first], X[second, second] = c, -s, s, c
         return X
 
-    return turn
+    return rotation
 
 
 def _translation(x: float, y: float, z: float, units: UnitSystem) -> Array:
@@ -84,7 +84,7 @@ def _distance(p: Array, q: Array) -> float:
     return apart if apart > _ROUNDING * scale else 0.0
 
 
-def matrix(numbers: Sequence[float], units: UnitSystem) -> Array:
+def pose_from_numbers(numbers: Sequence[float], units: UnitSystem) -> Array:
     """Return twelve numbers as a pose, the rotation made exact where it nearly is one.
 
     Raises:
@@ -93,16 +93,16 @@ def matrix(numbers: Sequence[float], units: UnitSystem) -> Array:
     X = from_noap([*numbers[:9], *(length * units.metres for length in numbers[9:])])
     error = float(orthonormality_error(X[:3, :3]))
     if error > REPAIRABLE:
-        raise ValueFault("E206", "the first nine numbers are not a rotation", f"off by {error:.2g}")
+        raise EvaluationError("E206", "the first nine numbers are not a rotation", f"off by {error:.2g}")
     return X if error <= EXACT else homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
 
 
 # Operations on values alone.
-PLAIN: Mapping[Op, Callable[..., Any]] = {
+UNITLESS_OPERATIONS: Mapping[Op, Callable[..., Any]] = {
     Op.MUL: _multiply,
     Op.DIV: _divide,
-    Op.ADD: lambda a, b: _number(a + b),
-    Op.SUB: lambda a, b: _number(a - b),
+    Op.ADD: lambda a, b: _checked_number(a + b),
+    Op.SUB: lambda a, b: _checked_number(a - b),
     Op.NEG: operator.neg,
     Op.INV: inverse,
     Op.LT: operator.lt,
@@ -114,11 +114,11 @@ PLAIN: Mapping[Op, Callable[..., Any]] = {
     Op.NOT: operator.not_,
 }
 # Operations that count in the program's units, given as the last argument.
-IN_UNITS: Mapping[Op, Callable[..., Any]] = {
+OPERATIONS_WITH_UNITS: Mapping[Op, Callable[..., Any]] = {
     Op.XYZ: _translation,
-    Op.ROTX: _turn(0),
-    Op.ROTY: _turn(1),
-    Op.ROTZ: _turn(2),
+    Op.ROTX: _rotation_about(0),
+    Op.ROTY: _rotation_about(1),
+    Op.ROTZ: _rotation_about(2),
     Op.DIST: lambda f, g, units: _distance(f[:3, 3], g[:3, 3]) / units.metres,
-    Op.MATX: lambda *values: matrix(values[:-1], values[-1]),
+    Op.MATX: lambda *values: pose_from_numbers(values[:-1], values[-1]),
 }

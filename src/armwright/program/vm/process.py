@@ -16,7 +16,7 @@ from armwright.program.vm.recording import TimedKind
 
 
 @attrs.frozen
-class Start:
+class StartTime:
     """When something began.
 
     Attributes:
@@ -29,31 +29,31 @@ class Start:
 
 
 @attrs.frozen
-class Element:
+class ElementReference:
     """An element of an array, or a variable, as a value in passing: what it names is read and written."""
 
     name: str
 
 
 # Numbers, truth values, poses and steps (4, 4), elements.
-Value: TypeAlias = float | bool | Array | Element
+Value: TypeAlias = float | bool | Array | ElementReference
 
 
 @attrs.frozen
-class Attempt:
+class TryBlock:
     """A TRY that a process is in.
 
     Attributes:
         start: its first instruction.
         recovery: of its RECOVER part.
         recovering: whether that part is running.
-        locks: how many locks the process held when it began.
+        lock_count: how many locks the process held when it began.
     """
 
     start: int
     recovery: int
     recovering: bool
-    locks: int
+    lock_count: int
 
 
 @attrs.define
@@ -64,38 +64,44 @@ class Activation:
         kind: what it is.
         name: of the procedure; empty for others.
         bindings: where the procedure's own names are kept.
-        passing: values in passing, by name.
-        wrote: the part of the program that gave each of them.
-        back: the instruction to go on with afterwards.
-        attempts: the TRYs it is in, innermost last.
-        called: the statement that called it; of an action, its MOVE.
-        own: where its own variables are kept, gone with it.
-        locks: how many locks the process held when it began.
+        temporaries: values in passing, by name.
+        temporary_spans: the part of the program that gave each of them.
+        return_address: the instruction to go on with afterwards.
+        try_blocks: the TRYs it is in, innermost last.
+        call_span: the statement that called it; of an action, its MOVE.
+        local_slots: where its own variables are kept, gone with it.
+        lock_count: how many locks the process held when it began.
     """
 
     kind: Literal["main", "procedure", "condition", "action"]
     name: str = ""
     bindings: dict[str, str] = attrs.field(factory=dict)
-    passing: dict[str, Value] = attrs.field(factory=dict)
-    wrote: dict[str, Span] = attrs.field(factory=dict)
-    back: int = -1
-    attempts: list[Attempt] = attrs.field(factory=list)
-    called: Span | None = None
-    own: tuple[str, ...] = ()
-    locks: int = 0
+    temporaries: dict[str, Value] = attrs.field(factory=dict)
+    temporary_spans: dict[str, Span] = attrs.field(factory=dict)
+    return_address: int = -1
+    try_blocks: list[TryBlock] = attrs.field(factory=list)
+    call_span: Span | None = None
+    local_slots: tuple[str, ...] = ()
+    lock_count: int = 0
 
-    def inner(self, kind: Literal["condition", "action"], **own: Any) -> "Activation":
+    def create_nested(self, kind: Literal["condition", "action"], **fields: Any) -> "Activation":
         """Return the activation of a condition or an action, which has the names of this one."""
-        return Activation(kind=kind, bindings=self.bindings, passing=self.passing, wrote=self.wrote, **own)
+        return Activation(
+            kind=kind,
+            bindings=self.bindings,
+            temporaries=self.temporaries,
+            temporary_spans=self.temporary_spans,
+            **fields,
+        )
 
-    def copy(self, shared: Callable[[dict[str, Any]], dict[str, Any]]) -> "Activation":
-        """Return a copy; ``shared`` copies names, and the same names once."""
+    def copy(self, copy_names: Callable[[dict[str, Any]], dict[str, Any]]) -> "Activation":
+        """Return a copy; ``copy_names`` copies names, and the same names once."""
         return attrs.evolve(
             self,
-            bindings=shared(self.bindings),
-            passing=shared(self.passing),
-            wrote=shared(self.wrote),
-            attempts=list(self.attempts),
+            bindings=copy_names(self.bindings),
+            temporaries=copy_names(self.temporaries),
+            temporary_spans=copy_names(self.temporary_spans),
+            try_blocks=list(self.try_blocks),
         )
 
 
@@ -105,17 +111,17 @@ class Guard:
 
     Attributes:
         condition: first instruction of the condition.
-        truth: the value in passing that it leaves.
+        result: the value in passing that it leaves.
         action: first instruction of the action.
-        looks: whether the condition checks poses, and not only at forces and numbers.
-        done: whether the action has been begun.
+        reads_pose: whether the condition checks poses, and not only at forces and numbers.
+        triggered: whether the action has been begun.
     """
 
     condition: int
-    truth: str
+    result: str
     action: int
-    looks: bool
-    done: bool = False
+    reads_pose: bool
+    triggered: bool = False
 
 
 class EarlyEnd(enum.StrEnum):
@@ -132,59 +138,65 @@ class Motion:
     Attributes:
         arm: the arm that moves.
         moved: the frame that shall come to the goal; the arm itself or what hangs on it.
-        tip: (4, 4) that frame seen from the gripper.
+        X_HM: (4, 4) that frame seen from the gripper.
         span: the statement.
         goal: the frame to come to, or the expression of it.
-        implied: whether what is moved hangs on the arm only since this MOVE.
+        implied_affix: whether what is moved hangs on the arm only since this MOVE.
         text: what the trace says of it.
         stages: what is still to do after the present stage, with the names of where they lead.
         speed: as asked for.
-        depth: how many activations its process had when it began; those after them belong to its actions.
-        begun: when the MOVE began.
-        since: when the present stage began [ticks].
-        until: when it will end [ticks].
+        stack_depth: how many activations its process had when it began; those after them belong to its actions.
+        start: when the MOVE began.
+        stage_start_tick: when the present stage began [ticks].
+        stage_end_tick: when it will end [ticks].
         guards: to be looked at on every tick.
-        hands: (k, 4, 4) poses of the gripper in the world on the ticks of the present stage, for guards that look.
-        record: number of the present stage among those recorded.
-        rest: when the arm is at rest [ticks], once it is being stopped; None before.
-        alarm: when the arm presses deeper than the cell allows [ticks], if it goes on as it does; None if it does not.
-        touch: the trajectory of a stage that comes into contact, and when on it [s]; None before.
-        pressed: the deepest contact so far.
-        ended: what ended it before its goal; None where nothing did.
+        hand_poses: (k, 4, 4) poses of the gripper in the world on the ticks of the present stage, for guards that look.
+        stage_index: number of the present stage among those recorded.
+        rest_tick: when the arm is at rest [ticks], once it is being stopped; None before.
+        alarm_tick: when the arm presses deeper than the cell allows [ticks] if it continues; None if it never does.
+        first_contact: the trajectory of a stage that comes into contact, and when on it [s]; None before.
+        deepest_contact: the deepest contact so far.
+        early_end: what ended it before its goal; None where nothing did.
     """
 
     arm: str
     moved: str
-    tip: Array
+    X_HM: Array
     span: Span
     goal: str
-    implied: bool
+    implied_affix: bool
     text: str
     stages: list[tuple[PlannedStage, tuple[str, ...]]]
     speed: float
-    depth: int
-    begun: Start
+    stack_depth: int
+    start: StartTime
     guards: list[Guard]
-    since: int = 0
-    until: int = 0
-    hands: Array = attrs.field(factory=lambda: np.empty((0, 4, 4)))
-    record: int = -1
-    rest: int | None = None
-    alarm: int | None = None
-    touch: tuple[Trajectory, float] | None = None
-    pressed: Press = attrs.field(factory=lambda: Press(0.0, 0.0))
-    ended: "EarlyEnd | None" = None
+    stage_start_tick: int = 0
+    stage_end_tick: int = 0
+    hand_poses: Array = attrs.field(factory=lambda: np.empty((0, 4, 4)))
+    stage_index: int = -1
+    rest_tick: int | None = None
+    alarm_tick: int | None = None
+    first_contact: tuple[Trajectory, float] | None = None
+    deepest_contact: Press = attrs.field(factory=lambda: Press(0.0, 0.0))
+    early_end: "EarlyEnd | None" = None
 
     @property
-    def trace(self) -> str:
+    def trace_text(self) -> str:
         """What the trace says of it, with what ended it early."""
-        return self.text if self.ended is None else f"{self.text}; {self.ended}"
+        return self.text if self.early_end is None else f"{self.text}; {self.early_end}"
 
     @property
-    def data(self) -> dict[str, object]:
+    def event_data(self) -> dict[str, object]:
         """Further facts for the events."""
-        ended = {} if self.ended is None else {self.ended.value: True}
-        return {"moved": self.moved, "goal": self.goal, "speed": self.speed, "implied_affix": self.implied, **ended}
+        ended = {} if self.early_end is None else {self.early_end.value: True}
+        return {
+            "moved": self.moved,
+            "goal": self.goal,
+            "speed": self.speed,
+            "implied_affix": self.implied_affix,
+            **ended,
+        }
 
     def copy(self) -> "Motion":
         """Return a copy; what never changes is shared."""
@@ -192,42 +204,42 @@ class Motion:
 
 
 @attrs.frozen
-class Waiting:
+class WaitReason:
     """Why a process does not go on.
 
     Attributes:
-        what: for an event, for locks, or for the processes that it has begun.
+        kind: for an event, for locks, or for the processes that it has begun.
         names: of the event or the locked variables.
         span: the statement.
-        since: when it began to wait.
+        start: when it began to wait.
     """
 
-    what: Literal["event", "locks", "branches"]
+    kind: Literal["event", "locks", "branches"]
     names: tuple[str, ...]
     span: Span
-    since: Start
+    start: StartTime
 
 
 @attrs.frozen(kw_only=True)
-class Pending:
+class PendingEffect:
     """What takes effect when the time of a statement is over.
 
     Attributes:
         kind: of the effect.
         text: of the trace.
-        since: when it began.
+        start: when it began.
         span: the statement.
         arm: the arm that does it, or None.
-        place: a frame that gets a pose then, and the pose.
+        frame_pose: a frame that gets a pose then, and the pose.
         data: further facts for the events.
     """
 
     kind: TimedKind
     text: str
-    since: Start
+    start: StartTime
     span: Span
     arm: str | None = None
-    place: tuple[str, Array] | None = None
+    frame_pose: tuple[str, Array] | None = None
     data: dict[str, object] = attrs.field(factory=dict)
 
 
@@ -238,14 +250,14 @@ class Process:
     Attributes:
         path: its position among the branches of the text: ``()`` for the program, ``(1,)`` for the second branch.
         priority: served first when larger.
-        at: the next instruction.
-        wake: when it goes on [ticks].
+        pc: the next instruction.
+        wake_tick: when it goes on [ticks].
         stack: activations, the present one last.
         parent: the process that began it.
         waiting: why it does not go on; None when only the clock holds it.
-        unmet: the event or the locks that it has not got yet, also while it is about to look again.
+        unfulfilled_wait: the event or the locks that it has not got yet, also while it is about to look again.
         motion: the MOVE running.
-        pending: what takes effect at ``wake``.
+        pending_effect: what takes effect at ``wake_tick``.
         last_arm: named or moved last.
         locks: the variables it has locked, in the order of taking.
         branches: processes begun and not yet joined.
@@ -254,29 +266,29 @@ class Process:
 
     path: tuple[int, ...] = ()
     priority: float = 0.0
-    at: int = 0
-    wake: int = 0
+    pc: int = 0
+    wake_tick: int = 0
     stack: list[Activation] = attrs.field(factory=lambda: [Activation(kind="main")])
     parent: "Process | None" = None
-    waiting: Waiting | None = None
-    unmet: Waiting | None = None
+    waiting: WaitReason | None = None
+    unfulfilled_wait: WaitReason | None = None
     motion: Motion | None = None
-    pending: Pending | None = None
+    pending_effect: PendingEffect | None = None
     last_arm: str | None = None
     locks: list[str] = attrs.field(factory=list)
     branches: list["Process"] = attrs.field(factory=list)
     done: bool = False
 
     @property
-    def now(self) -> Activation:
+    def activation(self) -> Activation:
         """The present activation."""
         return self.stack[-1]
 
     @property
-    def due(self) -> int | None:
+    def due_tick(self) -> int | None:
         """When it is served next [ticks], or its arm has to be stopped; None where it waits for others."""
-        alarm = None if self.motion is None else self.motion.alarm
-        wake = None if self.waiting is not None else self.wake
+        alarm = None if self.motion is None else self.motion.alarm_tick
+        wake = None if self.waiting is not None else self.wake_tick
         return min((tick for tick in (alarm, wake) if tick is not None), default=None)
 
     @property
@@ -285,22 +297,22 @@ class Process:
         return f"branch {'.'.join(str(number + 1) for number in self.path)}" if self.path else "program"
 
     @property
-    def follows(self) -> Motion | None:
+    def followed_motion(self) -> Motion | None:
         """The MOVE that is followed now; None in an action of it, or in a procedure that an action calls."""
         motion = self.motion
-        if motion is None or any(activation.kind == "action" for activation in self.stack[motion.depth :]):
+        if motion is None or any(activation.kind == "action" for activation in self.stack[motion.stack_depth :]):
             return None
         return motion
 
-    def copy(self, shared: Callable[[dict[str, Any]], dict[str, Any]]) -> "Process":
+    def copy(self, copy_names: Callable[[dict[str, Any]], dict[str, Any]]) -> "Process":
         """Return a copy that still has the parent and the branches of this one.
 
         Args:
-            shared: copies names, and the same names once.
+            copy_names: copies names, and the same names once.
         """
         return attrs.evolve(
             self,
-            stack=[activation.copy(shared) for activation in self.stack],
+            stack=[activation.copy(copy_names) for activation in self.stack],
             motion=None if self.motion is None else self.motion.copy(),
             locks=list(self.locks),
         )

@@ -20,9 +20,9 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Span
 
 # Rows that are computed and written together.
-_ROWS_AT_ONCE = 16384
+_CHUNK_ROWS = 16384
 # A time this part of a period behind a tick is on it.
-_ON_A_TICK = 1e-6
+_TICK_TOLERANCE = 1e-6
 
 # Of statements that take time, and take effect at its end.
 TimedKind: TypeAlias = Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
@@ -67,7 +67,7 @@ class RunStage:
         t0: when it began [s].
         arm: the arm that made it.
         span: the MOVE in the program.
-        to: the frames it went to, as the program spells them.
+        goal_names: the frames it went to, as the program spells them.
         speed: that was asked for, 100 being normal.
         stage: as it was planned, with what was found about its path.
         motion: of the joints as it was run: all of the plan, or as far as it came before it was stopped, and its stop.
@@ -82,7 +82,7 @@ class RunStage:
     t0: float
     arm: str
     span: Span
-    to: tuple[str, ...]
+    goal_names: tuple[str, ...]
     speed: float
     stage: PlannedStage
     motion: Trajectory
@@ -103,7 +103,7 @@ class RunStage:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Run:
+class TrajectorySegment:
     """What one arm did for a while: a trajectory, as far as it came.
 
     Attributes:
@@ -119,7 +119,7 @@ class Run:
     tau: Array | None = None
 
 
-class Push(NamedTuple):
+class ToolWrenches(NamedTuple):
     """What pushes on the tool of an arm from some time on.
 
     Attributes:
@@ -131,7 +131,7 @@ class Push(NamedTuple):
     t0: float
     wrenches: Array
 
-    def on(self, ticks: int) -> Array:
+    def sample(self, ticks: int) -> Array:
         """Return the wrenches (ticks, 6) on so many servo ticks from then on."""
         return self.wrenches[np.minimum(np.arange(ticks), len(self.wrenches) - 1)]
 
@@ -221,12 +221,12 @@ class Recording:
         return html_table(f"{self.duration:.6g} s in {self.cell.name}", ("from s", "to s", "process", "effect"), rows)
 
 
-def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+def sort_effects(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     """Return effects in the order in which they began."""
     return tuple(sorted(effects, key=lambda effect: (effect.t0, effect.order)))
 
 
-def thinned(trees: Sequence[tuple[float, FrameTree]], gap: float) -> list[tuple[float, FrameTree]]:
+def thin_trees(trees: Sequence[tuple[float, FrameTree]], gap: float) -> list[tuple[float, FrameTree]]:
     """Return the frame tree at the start, and the last of those that began within the same gap.
 
     Args:
@@ -237,16 +237,22 @@ def thinned(trees: Sequence[tuple[float, FrameTree]], gap: float) -> list[tuple[
     return [trees[0], *sampled.values()]
 
 
-def stream(
-    name: str, cell_arm: CellArm, runs: Sequence[Run], pushes: Sequence[Push], *, duration: float, period: float
+def sample_stream(
+    name: str,
+    cell_arm: CellArm,
+    segments: Sequence[TrajectorySegment],
+    tool_wrenches: Sequence[ToolWrenches],
+    *,
+    duration: float,
+    period: float,
 ) -> Stream:
     """Sample what an arm does at every servo tick.
 
     Args:
         name: of the arm in the cell.
         cell_arm: its model, and its configuration at the start.
-        runs: in order; the arm rests between.
-        pushes: in order; each counts until the next.
+        segments: in order; the arm rests between.
+        tool_wrenches: in order; each counts until the next.
         duration: of the whole run [s].
         period: of the servo [s].
     """
@@ -255,9 +261,9 @@ def stream(
     qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
     tau, known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
     first, configuration = 0, cell_arm.start
-    for run in runs:
+    for run in segments:
         # A run that was stopped by an obstacle ends between two ticks.
-        begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _ON_A_TICK)
+        begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _TICK_TOLERANCE)
         q[first:begin] = configuration
         local = np.arange(end - begin) * period
         q[begin:end], qd[begin:end], qdd[begin:end] = (run.trajectory(local, order) for order in range(3))
@@ -268,30 +274,32 @@ def stream(
     q[first:] = configuration
     t: Array = np.arange(ticks, dtype=np.float64) * period
     wrench = np.zeros((ticks, 6))
-    for push in pushes:
+    for push in tool_wrenches:
         begin = round(push.t0 / period)
-        wrench[begin:] = push.on(max(ticks - begin, 0))
+        wrench[begin:] = push.sample(max(ticks - begin, 0))
     unknown = np.flatnonzero(~known)
-    tau[unknown] = _tau(arm, (q[unknown], qd[unknown], qdd[unknown]), wrench[unknown])
+    tau[unknown] = _efforts(arm, (q[unknown], qd[unknown], qdd[unknown]), wrench[unknown])
     return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
 
 
-def efforts(arm: Arm, trajectory: Trajectory, period: float, push: Push, ticks: int | None = None) -> Array:
+def trajectory_efforts(
+    arm: Arm, trajectory: Trajectory, period: float, tool_wrenches: ToolWrenches, ticks: int | None = None
+) -> Array:
     """Return the efforts (k, n) on the servo ticks of a trajectory, the last tick included.
 
     Args:
         arm: that follows it.
         trajectory: on whole servo periods.
         period: of the servo [s].
-        push: what pushes on the gripper from the start of it on.
+        tool_wrenches: what pushes on the gripper from the start of it on.
         ticks: how far; to its end when left out.
     """
     ticks = round(trajectory.duration / period) if ticks is None else ticks
     t: Array = np.arange(ticks + 1, dtype=np.float64) * period
-    return _tau(arm, (trajectory(t), trajectory(t, 1), trajectory(t, 2)), push.on(len(t)))
+    return _efforts(arm, (trajectory(t), trajectory(t, 1), trajectory(t, 2)), tool_wrenches.sample(len(t)))
 
 
-def _tau(arm: Arm, states: tuple[Array, Array, Array], wrench: Array) -> Array:
+def _efforts(arm: Arm, states: tuple[Array, Array, Array], wrench: Array) -> Array:
     """Return the efforts (k, n) of positions, speeds and accelerations (k, n), with wrenches (k, 6) on the tool."""
     tau = np.empty_like(states[0])
     for rows in _chunks(len(tau)):
@@ -300,13 +308,13 @@ def _tau(arm: Arm, states: tuple[Array, Array, Array], wrench: Array) -> Array:
     return tau
 
 
-def peaks_of(tau: Array, period: float) -> tuple[Array, Array]:
+def peak_efforts(tau: Array, period: float) -> tuple[Array, Array]:
     """Return the largest efforts (n,) on servo ticks (k, n), and when, since the first [s]."""
     sizes = np.abs(tau)
     return sizes.max(axis=0), sizes.argmax(axis=0) * period
 
 
-def motion_rows(streams: Iterable[Stream], sampled: slice = slice(None)) -> Iterable[str]:
+def motion_csv_lines(streams: Iterable[Stream], sampled: slice = slice(None)) -> Iterable[str]:
     """Give the lines of motion.csv: time, arm, and per joint position, speed, acceleration and effort, in SI.
 
     Args:
@@ -333,4 +341,4 @@ def motion_rows(streams: Iterable[Stream], sampled: slice = slice(None)) -> Iter
 
 def _chunks(count: int) -> Iterator[slice]:
     """Cut so many rows into pieces that a long run needs no more memory than its own arrays."""
-    return (slice(first, first + _ROWS_AT_ONCE) for first in range(0, count, _ROWS_AT_ONCE))
+    return (slice(first, first + _CHUNK_ROWS) for first in range(0, count, _CHUNK_ROWS))

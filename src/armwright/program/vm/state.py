@@ -11,20 +11,20 @@ from armwright.program.bytecode.instructions import Code
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
 from armwright.program.vm.process import Process
-from armwright.program.vm.recording import Effect, Push, Run, RunStage
+from armwright.program.vm.recording import Effect, RunStage, ToolWrenches, TrajectorySegment
 
 
 @attrs.define
 class Hand:
     """The fingers of an arm: at which frame the gripper arrived last, and what they closed on."""
 
-    at: str | None = None
-    holds: str | None = None
+    reached_frame: str | None = None
+    held_frame: str | None = None
 
-    def forget(self, name: str) -> None:
+    def forget_frame(self, name: str) -> None:
         """Know nothing any more of a frame that there is no more."""
-        self.at = None if self.at == name else self.at
-        self.holds = None if self.holds == name else self.holds
+        self.reached_frame = None if self.reached_frame == name else self.reached_frame
+        self.held_frame = None if self.held_frame == name else self.held_frame
 
 
 @attrs.define(eq=False, kw_only=True)
@@ -40,15 +40,15 @@ class MachineState:
         owners: the processes that use each arm.
         hands: the gripper of each arm.
         ticks: the time, in servo periods.
-        idle: instructions since time went by.
-        activations: procedures called so far.
-        begun: what takes time and was begun so far.
-        over: whether the program has ended.
-        written: where each frame last got its pose or its parent.
+        idle_steps: instructions since time went by.
+        activation_count: procedures called so far.
+        start_count: what takes time and was begun so far.
+        has_ended: whether the program has ended.
+        pose_origins: where each frame last got its pose or its parent.
         effects: what happened.
         stages: of motions begun so far.
-        runs: trajectories of each arm.
-        pushes: what pushed on the tool of each arm.
+        segments: trajectories of each arm.
+        tool_wrenches: what pushed on the tool of each arm.
         trees: frame trees, each from a time [s] on.
         program: the process that is the program itself.
         processes: all that run.
@@ -57,8 +57,8 @@ class MachineState:
     types: dict[str, VariableType]
     tree: FrameTree
     hands: dict[str, Hand]
-    runs: dict[str, list[Run]]
-    pushes: dict[str, list[Push]]
+    segments: dict[str, list[TrajectorySegment]]
+    tool_wrenches: dict[str, list[ToolWrenches]]
     trees: list[tuple[float, FrameTree]]
     program: Process
     processes: list[Process]
@@ -66,14 +66,14 @@ class MachineState:
     events: dict[str, int] = attrs.field(factory=dict)
     locks: dict[str, Process] = attrs.field(factory=dict)
     owners: dict[str, list[Process]] = attrs.field(factory=dict)
-    written: dict[str, Span] = attrs.field(factory=dict)
+    pose_origins: dict[str, Span] = attrs.field(factory=dict)
     effects: list[Effect] = attrs.field(factory=list)
     stages: list[RunStage] = attrs.field(factory=list)
     ticks: int = 0
-    idle: int = 0
-    activations: int = 0
-    begun: int = 0
-    over: bool = False
+    idle_steps: int = 0
+    activation_count: int = 0
+    start_count: int = 0
+    has_ended: bool = False
 
     @classmethod
     def initial(cls, code: Code, cell: Cell) -> "MachineState":
@@ -87,17 +87,17 @@ class MachineState:
             types=dict(code.types),
             tree=tree,
             hands={name: Hand() for name in cell.arms},
-            runs={name: [] for name in cell.arms},
-            pushes={name: [] for name in cell.arms},
+            segments={name: [] for name in cell.arms},
+            tool_wrenches={name: [] for name in cell.arms},
             trees=[(0.0, tree)],
             program=program,
             processes=[program],
         )
 
     @property
-    def stuck(self) -> list[Process]:
+    def blocked_processes(self) -> list[Process]:
         """The processes that wait for an event or for locks, in the order of the text."""
-        waiting = (process for process in self.processes if process.waiting and process.waiting.what != "branches")
+        waiting = (process for process in self.processes if process.waiting and process.waiting.kind != "branches")
         return sorted(waiting, key=lambda process: process.path)
 
     def copy(self) -> "MachineState":
@@ -106,34 +106,34 @@ class MachineState:
         What never changes is shared: frame trees, trajectories, effects, spans, poses.
         """
         names: dict[int, dict[str, Any]] = {}
-        twins: dict[int, Process] = {}
+        copies: dict[int, Process] = {}
 
-        def shared(own: dict[str, Any]) -> dict[str, Any]:
+        def copy_names(bindings: dict[str, Any]) -> dict[str, Any]:
             """An action has the names of the activation that it interrupts: both have the same copy."""
-            return names.setdefault(id(own), dict(own))
+            return names.setdefault(id(bindings), dict(bindings))
 
-        def twin(process: Process) -> Process:
+        def copy_process(process: Process) -> Process:
             """Processes know one another, so the copy of each is made once."""
-            if id(process) not in twins:
-                copied = twins[id(process)] = process.copy(shared)
-                copied.parent = None if process.parent is None else twin(process.parent)
-                copied.branches = [twin(branch) for branch in process.branches]
-            return twins[id(process)]
+            if id(process) not in copies:
+                copied = copies[id(process)] = process.copy(copy_names)
+                copied.parent = None if process.parent is None else copy_process(process.parent)
+                copied.branches = [copy_process(branch) for branch in process.branches]
+            return copies[id(process)]
 
         return attrs.evolve(
             self,
             types=dict(self.types),
             hands={name: attrs.evolve(hand) for name, hand in self.hands.items()},
-            runs={name: list(runs) for name, runs in self.runs.items()},
-            pushes={name: list(pushes) for name, pushes in self.pushes.items()},
+            segments={name: list(segments) for name, segments in self.segments.items()},
+            tool_wrenches={name: list(wrenches) for name, wrenches in self.tool_wrenches.items()},
             trees=list(self.trees),
-            program=twin(self.program),
-            processes=[twin(process) for process in self.processes],
+            program=copy_process(self.program),
+            processes=[copy_process(process) for process in self.processes],
             values=dict(self.values),
             events=dict(self.events),
-            locks={name: twin(process) for name, process in self.locks.items()},
-            owners={arm: [twin(process) for process in owners] for arm, owners in self.owners.items()},
-            written=dict(self.written),
+            locks={name: copy_process(process) for name, process in self.locks.items()},
+            owners={arm: [copy_process(process) for process in owners] for arm, owners in self.owners.items()},
+            pose_origins=dict(self.pose_origins),
             effects=list(self.effects),
             stages=list(self.stages),
         )

@@ -3,78 +3,78 @@
 from armwright.program.bytecode.instructions import Instruction
 from armwright.program.language.diagnostic import Label
 from armwright.program.vm.machine import Machine, RunError
-from armwright.program.vm.move import release
-from armwright.program.vm.process import Process, Waiting
+from armwright.program.vm.move import release_locks
+from armwright.program.vm.process import Process, WaitReason
 from armwright.program.vm.recording import EffectKind
 
 
 def signal(machine: Machine, process: Process, step: Instruction) -> None:
     """Raise an event, and let those go on that wait for it."""
-    name = machine.name(process, step.operands[0])
+    name = machine.resolve_name(process, step.operands[0])
     machine.state.events[name] = machine.state.events.get(name, 0) + 1
     for other in machine.state.processes:
-        if other.waiting and other.waiting.what == "event" and name in other.waiting.names:
-            other.waiting, other.wake = None, machine.state.ticks
-    machine.effect(process, "SIGNAL", f"SIGNAL {machine.spelled(name)}", step.span, data={"event": name})
+        if other.waiting and other.waiting.kind == "event" and name in other.waiting.names:
+            other.waiting, other.wake_tick = None, machine.state.ticks
+    machine.record_effect(process, "SIGNAL", f"SIGNAL {machine.spelling(name)}", step.span, data={"event": name})
 
 
 def wait(machine: Machine, process: Process, step: Instruction) -> None:
     """Take an event, or wait until there is one."""
-    name = machine.name(process, step.operands[0])
-    waiting = process.unmet or Waiting("event", (name,), step.span, machine.starts())
+    name = machine.resolve_name(process, step.operands[0])
+    waiting = process.unfulfilled_wait or WaitReason("event", (name,), step.span, machine.next_start())
     if machine.state.events.get(name, 0) == 0:
-        _hold(process, waiting)
+        _suspend(process, waiting)
         return
     machine.state.events[name] -= 1
-    _description(machine, process, waiting)
+    _record_wait(machine, process, waiting)
 
 
 def lock(machine: Machine, process: Process, step: Instruction) -> None:
     """Take the locks of several variables together, or wait until all of them can be had."""
-    names = sorted({machine.name(process, operand) for operand in step.operands})
-    waiting = process.unmet or Waiting("locks", tuple(names), step.span, machine.starts())
-    if any(_locked_by(machine, name) - {process} for name in names):
-        _hold(process, waiting)
+    names = sorted({machine.resolve_name(process, operand) for operand in step.operands})
+    waiting = process.unfulfilled_wait or WaitReason("locks", tuple(names), step.span, machine.next_start())
+    if any(_lock_holders(machine, name) - {process} for name in names):
+        _suspend(process, waiting)
         return
     for name in names:
         machine.state.locks[name] = process
     process.locks += names
-    _description(machine, process, waiting)
+    _record_wait(machine, process, waiting)
 
 
 def unlock(machine: Machine, process: Process, step: Instruction) -> None:
     """Give locks back."""
-    names = {machine.name(process, operand) for operand in step.operands}
-    release(machine, process, len(process.locks) - len(names))
+    names = {machine.resolve_name(process, operand) for operand in step.operands}
+    release_locks(machine, process, len(process.locks) - len(names))
 
 
-def give_up(machine: Machine, process: Process) -> None:
+def abandon_wait(machine: Machine, process: Process) -> None:
     """Take note of an event or a lock that a process has waited for in vain, when it is ended."""
-    if process.unmet is not None:
-        _description(machine, process, process.unmet, in_vain=True)
+    if process.unfulfilled_wait is not None:
+        _record_wait(machine, process, process.unfulfilled_wait, in_vain=True)
     process.waiting = None
 
 
-def _hold(process: Process, waiting: Waiting) -> None:
+def _suspend(process: Process, waiting: WaitReason) -> None:
     """Let a process wait; when what it waits for comes, the same instruction is looked at again."""
-    process.at -= 1
-    process.waiting = process.unmet = waiting
+    process.pc -= 1
+    process.waiting = process.unfulfilled_wait = waiting
 
 
-def _description(machine: Machine, process: Process, waiting: Waiting, *, in_vain: bool = False) -> None:
+def _record_wait(machine: Machine, process: Process, waiting: WaitReason, *, in_vain: bool = False) -> None:
     """Record what a process has waited for, from the time at which it began to wait."""
     names = waiting.names
-    is_event = waiting.what == "event"
+    is_event = waiting.kind == "event"
     kind: EffectKind = "WAIT" if is_event else "LOCK"
-    text = f"{kind} {', '.join(map(machine.spelled, names))}{', in vain' if in_vain else ''}"
+    text = f"{kind} {', '.join(map(machine.spelling, names))}{', in vain' if in_vain else ''}"
     data: dict[str, object] = {"event": names[0]} if is_event else {"variables": list(names)}
     if in_vain:
         data["in_vain"] = True
-    machine.effect(process, kind, text, waiting.span, since=waiting.since, data=data)
-    process.unmet = None
+    machine.record_effect(process, kind, text, waiting.span, since=waiting.start, data=data)
+    process.unfulfilled_wait = None
 
 
-def _locked_by(machine: Machine, name: str) -> set[Process]:
+def _lock_holders(machine: Machine, name: str) -> set[Process]:
     """Return the processes that hold a variable; a whole array and its elements keep one another waiting."""
     array, bracket, _ = name.partition("[")
     return {
@@ -84,14 +84,14 @@ def _locked_by(machine: Machine, name: str) -> set[Process]:
     }
 
 
-def deadlock(machine: Machine) -> RunError:
+def deadlock_error(machine: Machine) -> RunError:
     """Return the error of processes that all wait for one another."""
     texts = []
-    for process in (stuck := machine.state.stuck):
+    for process in (stuck := machine.state.blocked_processes):
         assert process.waiting is not None  # noqa: S101 - chosen so
-        names = ", ".join(map(machine.spelled, process.waiting.names))
-        locks = process.waiting.what == "locks"
-        holders = {holder for name in process.waiting.names if locks for holder in _locked_by(machine, name)}
+        names = ", ".join(map(machine.spelling, process.waiting.names))
+        locks = process.waiting.kind == "locks"
+        holders = {holder for name in process.waiting.names if locks for holder in _lock_holders(machine, name)}
         locked = ", ".join(holder.title for holder in sorted(holders - {process}, key=lambda holder: holder.path))
         text = f"{process.title} waits for {'the lock of ' if locks else ''}{names}"
         texts.append(Label(process.waiting.span, f"{text}, held by {locked}" if locked else text))

@@ -14,7 +14,7 @@ from armwright.spatial.poses import to_noap
 _ROUNDING = 1e-12
 
 
-def shown(value: Value, units: UnitSystem) -> str:
+def value_text(value: Value, units: UnitSystem) -> str:
     """Return a value for people: numbers to six digits, poses with lengths in the units of the program.
 
     Args:
@@ -48,20 +48,20 @@ def matrix_text(texts: Sequence[str]) -> str:
     return "(" + ", ".join(",".join(texts[i : i + 3]) for i in range(0, 12, 3)) + ")"
 
 
-def hierarchy(tree: FrameTree, order: Callable[[Iterable[str]], list[str]] = list) -> Iterator[tuple[str, int]]:
+def frames_with_depth(tree: FrameTree, sort: Callable[[Iterable[str]], list[str]] = list) -> Iterator[tuple[str, int]]:
     """Give each frame with its depth in the tree, each behind its parent; an arm is shown in place of its base.
 
     Args:
         tree: the frames.
-        order: puts the frames on one parent in order.
+        sort: puts the frames on one parent in order.
     """
-    below: dict[str, list[str]] = {}
+    children: dict[str, list[str]] = {}
     for name, node in tree.nodes.items():
         if not name.endswith(".BASE"):
-            above = node.parent
-            below.setdefault(tree.parent(above) or WORLD if above.endswith(".BASE") else above, []).append(name)
+            parent = node.parent
+            children.setdefault(tree.parent(parent) or WORLD if parent.endswith(".BASE") else parent, []).append(name)
     waiting = [(WORLD, 0)]
     while waiting:
         name, depth = waiting.pop()
         yield name, depth
-        waiting += [(child, depth + 1) for child in reversed(order(below.get(name, ())))]
+        waiting += [(child, depth + 1) for child in reversed(sort(children.get(name, ())))]
