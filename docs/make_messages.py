@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from armwright.program.diagnostics.index import explanation, ranges
+from armwright.program.diagnostics.index import codes_by_range, find_page
 
 PAGE = Path(__file__).parent / "messages.md"
 HEAD = """\
@@ -39,15 +39,15 @@ cells: a Stanford arm (`one_arm`), the same above a plane of contact (`plane`), 
 def lines() -> Iterator[str]:
     """Give the lines of the page."""
     yield HEAD
-    for name, codes in ranges().items():
+    for name, codes in codes_by_range().items():
         yield f"**{name}**\n"
         yield "| Code | Title |\n|---|---|"
         for code in codes:
-            yield f"| [{code}](#{code.lower()}) | {explanation(code).title} |"
+            yield f"| [{code}](#{code.lower()}) | {find_page(code).title} |"
         yield ""
-    for name, codes in ranges().items():
+    for name, codes in codes_by_range().items():
         yield f"## {name}\n"
-        for page in map(explanation, codes):
+        for page in map(find_page, codes):
             title = page.title[0].upper() + page.title[1:]
             yield f"### {page.code}\n\n**{title}.** {page.text}\n"
             yield f"Wrong:\n\n```\n{page.wrong}```\n\nRight:\n\n```\n{page.right}```\n"

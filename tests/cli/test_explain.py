@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from armwright.program.diagnostics.index import codes, explanation
+from armwright.program.diagnostics.index import codes, find_page
 
 ENVIRONMENT = {**os.environ, "COLUMNS": "100", "PYTHONUTF8": "1", "TERM": "xterm-256color"}
 
@@ -51,7 +51,7 @@ def test_a_page() -> None:
     """A page is the title, the text, the wrong program with its message, and the right one."""
     result = explain("e0206")
 
-    page = explanation("E206")
+    page = find_page("E206")
     assert result.returncode == 0
     assert result.stdout.startswith(f"E206: {page.title}\n\n")
     assert " ".join(page.text.split()) in " ".join(result.stdout.split())
@@ -87,7 +87,7 @@ def test_all_codes() -> None:
 
     assert result.returncode == 0
     rows = [line.strip().split(None, 1) for line in result.stdout.splitlines() if line.startswith("  ")]
-    assert rows == [[code, explanation(code).title] for code in codes()]
+    assert rows == [[code, find_page(code).title] for code in codes()]
 
 
 def test_json() -> None:
@@ -97,8 +97,8 @@ def test_json() -> None:
 
     assert {key: page[key] for key in ("code", "wrong", "right")} == {
         "code": "E206",
-        "wrong": explanation("E206").wrong,
-        "right": explanation("E206").right,
+        "wrong": find_page("E206").wrong,
+        "right": find_page("E206").right,
     }
     assert [(one["code"], one["line"]) for one in page["diagnostics"]] == [("E206", 3)]
     assert [row["code"] for row in rows] == list(codes())

@@ -8,8 +8,8 @@ import pytest
 
 import armwright.program
 from armwright.errors import UnknownNameError
-from armwright.program.diagnostics.examples import answer
-from armwright.program.diagnostics.index import codes, explanation, ranges
+from armwright.program.diagnostics.examples import diagnose_example
+from armwright.program.diagnostics.index import codes, codes_by_range, find_page
 from armwright.program.language.source import Source
 from armwright.program.language.words import VOCABULARIES, Standard
 
@@ -30,7 +30,7 @@ def test_every_code_has_a_page() -> None:
 @pytest.mark.parametrize("code", codes())
 def test_wrong_program(code: str) -> None:
     """The wrong program of a page gets this message and no other."""
-    said = answer(Source("wrong.rlo", explanation(code).wrong))
+    said = diagnose_example(Source("wrong.rlo", find_page(code).wrong))
 
     assert {one.code for one in said} == {code}
 
@@ -38,13 +38,13 @@ def test_wrong_program(code: str) -> None:
 @pytest.mark.parametrize("code", codes())
 def test_right_program(code: str) -> None:
     """Of the right program of a page nothing is said at all, not even while it runs."""
-    assert answer(Source("right.rlo", explanation(code).right)) == ()
+    assert diagnose_example(Source("right.rlo", find_page(code).right)) == ()
 
 
 @pytest.mark.parametrize("code", codes())
 def test_form(code: str) -> None:
     """A title is short and no sentence; the text under it is two to six sentences in plain words."""
-    page = explanation(code)
+    page = find_page(code)
 
     assert (page.code, len(page.title) <= 60, page.title[-1].isalnum()) == (code, True, True)
     first = page.title.split()[0].rstrip(",")
@@ -57,7 +57,7 @@ def test_form(code: str) -> None:
 
 def test_no_title_twice() -> None:
     """Two codes that mean the same would be one."""
-    titles = [explanation(code).title for code in codes()]
+    titles = [find_page(code).title for code in codes()]
 
     assert len(set(titles)) == len(titles)
 
@@ -79,7 +79,7 @@ def test_run_time_pages_run() -> None:
         "W402",
         "W403",
     ):
-        assert "// run in " in explanation(code).wrong, code
+        assert "// run in " in find_page(code).wrong, code
 
 
 @pytest.mark.parametrize(
@@ -99,13 +99,13 @@ def test_run_time_pages_run() -> None:
 )
 def test_ways_to_ask(asked: str, meant: str) -> None:
     """A code is found in any case, with zeros in front of its number, and by its number alone."""
-    assert explanation(asked).code == meant
+    assert find_page(asked).code == meant
 
 
 def test_unknown_code() -> None:
     """Who asks for a code that does not exist is told the nearest, and those of its range."""
     with pytest.raises(UnknownNameError, match=r"no code 'E209x'. Did you mean 'E209'\? Known: E201, ") as caught:
-        explanation("E209x")
+        find_page("E209x")
     assert "E301" not in str(caught.value)
 
 
@@ -113,12 +113,12 @@ def test_unknown_code() -> None:
 def test_no_code(asked: str) -> None:
     """What is no code is told so, with a list of what there is."""
     with pytest.raises(UnknownNameError, match=rf"no code '{asked}'.*Known: E"):
-        explanation(asked)
+        find_page(asked)
 
 
 def test_ranges() -> None:
     """Every code belongs to one range, in the order in which all are listed."""
-    assert tuple(code for several in ranges().values() for code in several) == codes()
+    assert tuple(code for several in codes_by_range().values() for code in several) == codes()
 
 
 def test_the_page_of_messages_is_up_to_date() -> None:
@@ -137,6 +137,6 @@ def test_every_row_of_the_page_leads_somewhere() -> None:
 def test_every_cell_of_a_page_is_told() -> None:
     """The page of messages says what the cells are in which its programs run."""
     cells = {path.stem for path in (SOURCES / "diagnostics" / "pages" / "cells").glob("*.toml")}
-    used = {name for code in codes() for name in re.findall(r"// run in (\w+)", explanation(code).wrong)}
+    used = {name for code in codes() for name in re.findall(r"// run in (\w+)", find_page(code).wrong)}
 
     assert used == cells == set(re.findall(r"\(`(\w+)`\)", MESSAGES))

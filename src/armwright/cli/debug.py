@@ -80,7 +80,7 @@ def load(launch: "LaunchRequest") -> "LoadedProgram":
     from armwright.program.debugger.dap_session import LoadedProgram, LoadError
     from armwright.program.diagnostics.render import render
     from armwright.program.language.diagnostic import count_line
-    from armwright.program.language_server.cell_lookup import Cells
+    from armwright.program.language_server.cell_lookup import CellCache
 
     cell = read_cell_option(launch.cell)
     if launch.program.suffix == CODE_SUFFIX:
@@ -91,7 +91,7 @@ def load(launch: "LaunchRequest") -> "LoadedProgram":
             code=assemble(read_program(launch.program), str(launch.program)), cell=cell, is_code_file=True
         )
     if cell is None:
-        nearby = Cells().around(launch.program.parent, read_program(launch.program), None)
+        nearby = CellCache().find_cell(launch.program.parent, read_program(launch.program), None)
         cell = None if nearby is None else nearby.cell
     compiled = compile_program(launch.program, cell, strict=launch.strict, std=launch.std)
     if compiled.code is None:

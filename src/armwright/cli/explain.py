@@ -43,13 +43,13 @@ def explain(
         _list(as_json=as_json)
         return
     from armwright.cli.terminal import console as clean_console
-    from armwright.program.diagnostics.examples import answer
-    from armwright.program.diagnostics.index import explanation
+    from armwright.program.diagnostics.examples import diagnose_example
+    from armwright.program.diagnostics.index import find_page
     from armwright.program.language.source import Source
 
-    page = explanation(code)
+    page = find_page(code)
     source = Source("wrong.rlo", page.wrong)
-    diagnostics = answer(source)
+    diagnostics = diagnose_example(source)
     if as_json:
         _print_json(page, diagnostics, source)
         return
@@ -62,20 +62,20 @@ def explain(
 
 def _list(*, as_json: bool) -> None:
     """Print all codes with their titles."""
-    from armwright.program.diagnostics.index import explanation, ranges
+    from armwright.program.diagnostics.index import codes_by_range, find_page
 
     if as_json:
         rows = [
-            {"code": code, "title": explanation(code).title, "range": name}
-            for name, codes in ranges().items()
+            {"code": code, "title": find_page(code).title, "range": name}
+            for name, codes in codes_by_range().items()
             for code in codes
         ]
         print_json(rows)
         return
-    for index, (name, codes_of_range) in enumerate(ranges().items()):
+    for index, (name, codes_of_range) in enumerate(codes_by_range().items()):
         print(f"{chr(10) if index else ''}{name}")
         for code in codes_of_range:
-            print(f"  {code}  {explanation(code).title}")
+            print(f"  {code}  {find_page(code).title}")
 
 
 def _print_json(page: "Page", diagnostics: "Sequence[Diagnostic]", source: "Source") -> None:

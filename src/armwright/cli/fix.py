@@ -15,7 +15,7 @@ from armwright.errors import ArmwrightError, ExitStatus, counted
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.program.diagnostics.fixes import Fixed
+    from armwright.program.diagnostics.fixes import FixResult
 
 
 def fix(
@@ -44,7 +44,7 @@ def fix(
     from armwright.cli.terminal import print_verbatim
     from armwright.program import compile as compile_program
     from armwright.program.api import import_reader
-    from armwright.program.diagnostics.fixes import fixed
+    from armwright.program.diagnostics.fixes import apply_fixes
 
     option_cell = read_cell_option(cell)
     rows: list[dict[str, Any]] = []
@@ -53,8 +53,8 @@ def fix(
         try:
             source = read_source(path)
             read = import_reader(path.parent)
-            result = fixed(source, partial(compile_program, cell=option_cell, std=std, read_import=read))
-            if result.cures and not (diff or printed):
+            result = apply_fixes(source, partial(compile_program, cell=option_cell, std=std, read_import=read))
+            if result.applied and not (diff or printed):
                 write_back(source, path, result.text)
         except ArmwrightError as error:
             rows.append({"program": str(path), "errors": 1, **failure_data(error.exit_status, error, str(error))})
@@ -64,7 +64,7 @@ def fix(
         rows.append(_as_data(result) | ({"text": result.text} if printed else {}))
         if as_json:
             continue
-        if diff and result.cures:
+        if diff and result.applied:
             print_difference(source, result.text)
         elif printed and not diff:
             print_verbatim(result.text)
@@ -75,26 +75,26 @@ def fix(
         raise typer.Exit(max(row["exit_status"] for row in rows))
 
 
-def _print(result: "Fixed", *, done: str, to_errors: bool) -> None:
+def _print(result: "FixResult", *, done: str, to_errors: bool) -> None:
     from armwright.cli.programs import print_diagnostics
 
     out = sys.stderr if to_errors else sys.stdout
-    for cure in result.cures:
+    for cure in result.applied:
         source, start = cure.source, cure.diagnostic.span.start
         location = f"{source.name}:{source.line(start)}:{source.column(start)}"
-        print(f"{location}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.what}", file=out)
-    count = len(result.cures)
+        print(f"{location}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.description}", file=out)
+    count = len(result.applied)
     mistakes = f"{counted(count, 'mistake')} {done}" if count else "nothing to correct"
     print(f"{result.compilation.source.name}: {mistakes}", file=out)
     if result.compilation.diagnostics:
         print_diagnostics(result.compilation.diagnostics, result.compilation.source, to_errors=to_errors)
 
 
-def _as_data(result: "Fixed") -> dict[str, Any]:
+def _as_data(result: "FixResult") -> dict[str, Any]:
     from armwright.cli.programs import diagnostics_data
     from armwright.program.language.diagnostic import to_json
 
-    cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.what} for cure in result.cures]
+    cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.description} for cure in result.applied]
     data = diagnostics_data(result.compilation)
     status = ExitStatus.PROGRAM_ERRORS if data["errors"] else ExitStatus.DONE
     return {**data, "exit_status": status, "cures": cures}

@@ -20,7 +20,7 @@ from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from armwright.cli.repl_commands import Commands
-    from armwright.program.repl.session import Answer, Session
+    from armwright.program.repl.session import InputResult, Session
     from armwright.program.vm.recording import Effect
 
 _DIM = "dim"
@@ -105,7 +105,7 @@ def _converse(
         except KeyboardInterrupt:
             print()
             # Abandoned lines keep their numbers.
-            session.pass_over(begun)
+            session.skip_lines(begun)
             begun = ""
             continue
         if line is None:
@@ -124,12 +124,12 @@ def _converse(
 def _execute_line(session: "Session", commands: "Commands", begun: str, line: str, printer: "_Printer") -> str:
     """Execute a line; return the text of a statement that is not complete yet."""
     if not begun and line.lstrip().startswith(":"):
-        session.pass_over(line)
+        session.skip_lines(line)
         printer.command(commands, line)
         return ""
     text = f"{begun}{line}\n"
     answer = session.enter(text)
-    if not answer.complete:
+    if not answer.is_complete:
         return text
     printer.answer(answer)
     return ""
@@ -148,14 +148,14 @@ class _Printer:
         self.status = ExitStatus.DONE
         self._console = console(highlight=False, soft_wrap=True)
 
-    def answer(self, answer: "Answer") -> None:
+    def answer(self, answer: "InputResult") -> None:
         """Print the effects of an input in order, and then its diagnostics."""
         from armwright.cli.programs import print_diagnostics
-        from armwright.program.repl.undo_report import SILENT
+        from armwright.program.repl.undo_report import SILENT_EFFECTS
         from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, excerpt, omission_text
 
         self.status = max(self.status, answer.status)
-        effects = [effect for effect in answer.effects if effect.kind not in SILENT]
+        effects = [effect for effect in answer.effects if effect.kind not in SILENT_EFFECTS]
         shown = excerpt(effects, MAX_TERMINAL_LINES).map(_shown)
         for text, style in shown.join((omission_text(shown.omitted, _EVENT_LOG_HINT), _DIM)):
             self._console.print(text, style=style)
@@ -198,7 +198,7 @@ class _JsonPrinter(_Printer):
         super().__init__()
         self._session = session
 
-    def answer(self, answer: "Answer") -> None:
+    def answer(self, answer: "InputResult") -> None:
         """Print the result of an input as plain data."""
         self.status = max(self.status, answer.status)
         self._print(_as_data(answer))
@@ -221,7 +221,7 @@ class _JsonPrinter(_Printer):
         print(json.dumps({**data, "time": self._session.state.machine.now}, ensure_ascii=False))
 
 
-def _as_data(answer: "Answer") -> dict[str, Any]:
+def _as_data(answer: "InputResult") -> dict[str, Any]:
     from armwright.cli.programs import error_data
     from armwright.program.language.diagnostic import to_json
 
@@ -229,7 +229,7 @@ def _as_data(answer: "Answer") -> dict[str, Any]:
         "ok": not answer.is_wrong,
         **error_data(answer.diagnostics, answer.source),
         "exit_status": answer.status,
-        "printed": list(answer.printed),
+        "printed": list(answer.printed_lines),
         "effects": [
             {**{name: getattr(effect, name) for name in ("t0", "t1", "kind", "arm", "text")}, **effect.data}
             for effect in answer.effects

@@ -12,7 +12,7 @@ import attrs
 from armwright.errors import InvalidValueError, OutputError, UnknownNameError, shortened
 
 if TYPE_CHECKING:
-    from armwright.program.repl.session import Answer, Session
+    from armwright.program.repl.session import InputResult, Session
 
 _PROGRAM = "session.rlo"
 
@@ -31,7 +31,7 @@ class Reply:
     """
 
     lines: tuple[str, ...] = ()
-    answer: "Answer | None" = None
+    answer: "InputResult | None" = None
 
 
 class Commands:
@@ -68,15 +68,15 @@ class Commands:
 
     def frames(self, _: str) -> Reply:
         """Show the frame tree: positions in the unit of the program, rotations about z, y, x in degrees."""
-        from armwright.program.repl.frame_view import frames
+        from armwright.program.repl.frame_view import frame_table_lines
 
-        return Reply(lines=tuple(frames(self._session)))
+        return Reply(lines=tuple(frame_table_lines(self._session)))
 
     def arms(self, _: str) -> Reply:
         """Show the joints of the arms and the objects that they grasp."""
-        from armwright.program.repl.frame_view import arms
+        from armwright.program.repl.frame_view import arm_lines
 
-        return Reply(lines=tuple(arms(self._session)))
+        return Reply(lines=tuple(arm_lines(self._session)))
 
     def time(self, _: str) -> Reply:
         """Show the clock of the cell."""
@@ -124,7 +124,7 @@ class Commands:
         """Enter the statements of a file, such as a program."""
         return Reply(answer=self.load_file(_path(argument)))
 
-    def load_file(self, path: Path) -> "Answer":
+    def load_file(self, path: Path) -> "InputResult":
         """Enter the statements of a file.
 
         Raises:

@@ -108,7 +108,7 @@ def completions(session: "Session", commands: tuple[str, ...], before: str, word
         word: beginning of the word; it may be empty.
     """
     from armwright.program.language.words import SENSORS, VOCABULARIES, Standard
-    from armwright.program.repl.frame_view import names
+    from armwright.program.repl.frame_view import visible_names
     from armwright.program.semantics.builtins import FUNCTIONS
 
     start = before.lstrip()
@@ -120,7 +120,7 @@ def completions(session: "Session", commands: tuple[str, ...], before: str, word
     words = {*VOCABULARIES[session.std].reserved, *SENSORS}
     if session.std is Standard.RLO_2:
         words |= FUNCTIONS.keys()
-    own = names(session)
+    own = visible_names(session)
     known = {name.upper() for name in own}
     # Keywords in the case of the word; names as they are spelled.
     shown = (str.lower if word.islower() else str.upper)(" ".join(words - known)).split()

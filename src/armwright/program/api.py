@@ -121,9 +121,9 @@ def compile(  # noqa: A001 - what a translator does
         path = Path(program)
         source, read_import = Source(path.name, read_program(path)), read_import or import_reader(path.parent)
     model = read_cell(Path(cell)) if isinstance(cell, str | Path) else cell
-    with no_collection():
-        compiled = _with_names(source, model, strict=strict, std=std, read_import=read_import)
-        return compiled if names_only else _with_code(with_flow(compiled))
+    with pause_garbage_collection():
+        compiled = _check_names(source, model, strict=strict, std=std, read_import=read_import)
+        return compiled if names_only else _generate_code(analyse_flow(compiled))
 
 
 def run(
@@ -178,7 +178,7 @@ def import_reader(folder: Path) -> ReadImport:
     return read
 
 
-def with_imports(cell: Cell | None, imports: Iterable[Imported]) -> Cell | None:
+def add_imported_frames(cell: Cell | None, imports: Iterable[Imported]) -> Cell | None:
     """Return a cell with the frames of imported cells; a frame of the cell itself stays as it is."""
     cells = [imported.cell for imported in imports if imported.cell is not None and imported.cell is not cell]
     if cell is None or not cells:
@@ -190,7 +190,7 @@ def with_imports(cell: Cell | None, imports: Iterable[Imported]) -> Cell | None:
 
 
 @contextmanager
-def no_collection() -> Iterator[None]:
+def pause_garbage_collection() -> Iterator[None]:
     """Keep the collector of rings away: a translation makes many small things and few rings, and it looks at them all.
 
     Of a program of ten thousand lines that is half the time.
@@ -204,7 +204,7 @@ def no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _bounded(read_import: ReadImport) -> ReadImport:
+def _limit_imports(read_import: ReadImport) -> ReadImport:
     """Return what reads imports, and refuses more files than the limit, or more frames in all of them."""
     frames: dict[str, int] = {}
 
@@ -234,7 +234,7 @@ def _imported_cell(program: tree.Program, read_import: ReadImport) -> Cell | Non
     return None
 
 
-def _with_names(
+def _check_names(
     source: Source, cell: Cell | KnownCell | None, *, strict: bool, std: Standard, read_import: ReadImport | None
 ) -> Compilation:
     """Return a program with its syntax, names and types checked."""
@@ -242,7 +242,7 @@ def _with_names(
     scanned = scan(source, text, std)
     program, syntax_errors = parse(source, scanned.tokens, std)
     if read_import is not None:
-        read_import = cache(_bounded(read_import))
+        read_import = cache(_limit_imports(read_import))
         cell = _imported_cell(program, read_import) if cell is None else cell
     known = known_cell(cell) if isinstance(cell, Cell) else cell
     symbols, name_errors, imports = check.check(program, known, std=std, read_import=read_import)
@@ -261,13 +261,13 @@ def _with_names(
         flow=None,
         diagnostics=in_order(diagnostics),
         code=None,
-        cell=with_imports(cell, imports) if isinstance(cell, Cell) else None,
+        cell=add_imported_frames(cell, imports) if isinstance(cell, Cell) else None,
         known=known,
         strict=strict,
     )
 
 
-def with_flow(compiled: Compilation) -> Compilation:
+def analyse_flow(compiled: Compilation) -> Compilation:
     """Return a program whose names have been checked with its flow analysed, and with all diagnostics.
 
     Where the parser had to guess, the effect of the statements is unknown, and there is no flow.
@@ -275,21 +275,21 @@ def with_flow(compiled: Compilation) -> Compilation:
     if any(diagnostic.is_syntax for diagnostic in compiled.diagnostics):
         return compiled
     source, known, strict = compiled.source, compiled.known, compiled.strict
-    with no_collection():
+    with pause_garbage_collection():
         flow, diagnostics = analysis.check(
-            compiled.tree, compiled.symbols, _spelling(compiled), known, strict=strict, source=source
+            compiled.tree, compiled.symbols, _name_spellings(compiled), known, strict=strict, source=source
         )
     return attrs.evolve(compiled, flow=flow, diagnostics=in_order((*compiled.diagnostics, *diagnostics)))
 
 
-def _with_code(compiled: Compilation) -> Compilation:
+def _generate_code(compiled: Compilation) -> Compilation:
     """Return a program with its intermediate code, unless it has errors."""
     if compiled.flow is None or any(diagnostic.is_error for diagnostic in compiled.diagnostics):
         return compiled
-    code = generate(compiled.source, compiled.tree, compiled.symbols, compiled.flow, _spelling(compiled))
+    code = generate(compiled.source, compiled.tree, compiled.symbols, compiled.flow, _name_spellings(compiled))
     return attrs.evolve(compiled, code=attrs.evolve(code, standard=compiled.standard))
 
 
-def _spelling(compiled: Compilation) -> dict[str, str]:
+def _name_spellings(compiled: Compilation) -> dict[str, str]:
     """Return how a program first writes each of its names."""
     return {token.key: token.text for token in reversed(compiled.tokens) if token.kind is TokenKind.NAME}

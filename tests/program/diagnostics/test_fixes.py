@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from armwright.program import Compilation, Source, compile as translate
-from armwright.program.diagnostics.fixes import Fixed, apart, fixed
+from armwright.program.diagnostics.fixes import FixResult, apply_fixes, select_disjoint
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
@@ -16,8 +16,8 @@ SIGNS = (";", ".", "=", ",", "(", ")", "BEGIN", "DO", "TO", "WITH")
 PROGRAMS = {path.stem: path.read_text(encoding="utf-8") for path in sorted(CORPUS.glob("p0*.rlo"))}
 
 
-def cure(text: str) -> Fixed:
-    return fixed(Source("t.rlo", text), translate)
+def cure(text: str) -> FixResult:
+    return apply_fixes(Source("t.rlo", text), translate)
 
 
 def slips(compilation: Compilation) -> list[Diagnostic]:
@@ -37,15 +37,15 @@ def test_one_sign_left_out(name: str, sign: str) -> None:
     for start, end in places[:: max(1, len(places) // 12)]:
         damaged = Source("t.rlo", text[:start] + text[end:])
         before = translate(damaged)
-        offered = apart(one for one in before.diagnostics if one.fixes)
-        result = fixed(damaged, translate)
+        offered = select_disjoint(one for one in before.diagnostics if one.fixes)
+        result = apply_fixes(damaged, translate)
         if not offered:
             assert result.text == damaged.text
             continue
-        cured = [one for one in result.cures if one.diagnostic.is_syntax]
+        cured = [one for one in result.applied if one.diagnostic.is_syntax]
         assert len(slips(result.compilation)) <= len(slips(before)) - len(cured)
         assert not {one.message for one in result.compilation.diagnostics} & {
-            one.diagnostic.message for one in result.cures
+            one.diagnostic.message for one in result.applied
         }
 
 
@@ -76,12 +76,12 @@ def test_rejected_programs(path: Path) -> None:
         return translate(source, cell_of(text), std=std, read_import=imports_of(text))
 
     before = in_its_cell(Source(path.name, text))
-    result = fixed(before.source, in_its_cell)
+    result = apply_fixes(before.source, in_its_cell)
 
     assert len(slips(result.compilation)) <= len(slips(before))
-    assert bool(result.cures) == (result.text != text)
+    assert bool(result.applied) == (result.text != text)
     if not any(one.fixes for one in before.diagnostics):
-        assert not result.cures
+        assert not result.applied
 
 
 def test_rounds() -> None:
@@ -90,15 +90,15 @@ def test_rounds() -> None:
     result = cure(text)
 
     assert result.text == "VAR f : FRAME ; BEGIN READ VISIONS (f);\n MOVE ARM_1 TO f END."
-    assert [one.what for one in result.cures] == ["inserted `)`", "inserted `;`"]
-    assert fixed(Source("t.rlo", text), translate, rounds=1).text == text.replace("(f\n", "(f)\n")
+    assert [one.description for one in result.applied] == ["inserted `)`", "inserted `;`"]
+    assert apply_fixes(Source("t.rlo", text), translate, rounds=1).text == text.replace("(f\n", "(f)\n")
 
 
 def test_words_for_cures() -> None:
     """What was done is told: put in, left out, or written for something else."""
     result = cure("VAR f : FRAME ; n : SCALAR ; BEGIN n := +5 ; f = ARM - 1 ; MOVE ARM_1 TO f WITH SPEED n END.")
 
-    assert [one.what for one in result.cures] == [
+    assert [one.description for one in result.applied] == [
         "replaced `:=` by `=`",
         "removed `+`",
         "replaced `ARM - 1` by `ARM_1`",
@@ -113,7 +113,7 @@ def test_matrix_row_by_row() -> None:
 
     assert "f = (0,1,0, -1,0,0, 0,0,1, 0.5,0.1,0.2) ;" in result.text
     assert not result.compilation.diagnostics
-    assert "by `(0,1,0, -1,0,0, 0,0,1, 0.5,0." in result.cures[0].what
+    assert "by `(0,1,0, -1,0,0, 0,0,1, 0.5,0." in result.applied[0].description
 
 
 def complaining(*fixes: Fix, code: str = "E101", message: str = "wrong") -> Diagnostic:
@@ -127,8 +127,8 @@ def test_changes_that_touch() -> None:
     around = complaining(Fix(Span(0, 0), "("), Fix(Span(3, 3), ")"))
     far = complaining(Fix(Span(9, 9), "z"))
 
-    assert apart([far, beside, first]) == [first, far]
-    assert apart([first, around, far]) == [around, far]
+    assert select_disjoint([far, beside, first]) == [first, far]
+    assert select_disjoint([first, around, far]) == [around, far]
 
 
 def test_vain_change() -> None:
@@ -157,7 +157,7 @@ def test_vain_change() -> None:
             code=None,
         )
 
-    result = fixed(Source("t.rlo", "a  c  e"), find)
+    result = apply_fixes(Source("t.rlo", "a  c  e"), find)
 
     assert result.text == "b  c  e"
     assert [one.message for one in result.compilation.diagnostics] == ["c"]
@@ -172,9 +172,9 @@ def test_long_program() -> None:
         return translate(source)
 
     statements = "OPEN ARM_1\nGRASP\n" * 1000
-    result = fixed(Source("t.rlo", f"BEGIN\n{statements}END."), counted)
+    result = apply_fixes(Source("t.rlo", f"BEGIN\n{statements}END."), counted)
 
-    assert len(result.cures) == 1999
+    assert len(result.applied) == 1999
     assert len(rounds) == 2
 
 
@@ -187,9 +187,9 @@ def test_one_vain_change_among_thousands() -> None:
         return translate(source)
 
     # The commas cure what they are for; the parenthesis shows that END is missing too.
-    result = fixed(Source("t.rlo", "BEGIN PRINT(" + '""' * 500), counted)
+    result = apply_fixes(Source("t.rlo", "BEGIN PRINT(" + '""' * 500), counted)
 
-    assert len(result.cures) == 499
+    assert len(result.applied) == 499
     assert len(rounds) < 50
 
 

@@ -9,24 +9,24 @@ from lsprotocol import types as lsp
 
 from armwright.errors import InvalidValueError
 from armwright.program import KnownCell, Source, compile as translate
-from armwright.program.api import with_flow
+from armwright.program.api import analyse_flow
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.text_edits import Edit, apply_edits
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Analysis, Settings, analyse
-from armwright.program.language_server.cell_lookup import Cells
-from armwright.program.language_server.code_actions import all_fixes, quickfixes
+from armwright.program.language_server.cell_lookup import CellCache
+from armwright.program.language_server.code_actions import all_fixes, quick_fixes
 from armwright.program.language_server.completions import completions
 from armwright.program.language_server.hover import hover
-from armwright.program.language_server.inlay_hints import hints
-from armwright.program.language_server.keyword_docs import WORDS, explained
-from armwright.program.language_server.outline import folds, outline
+from armwright.program.language_server.inlay_hints import inlay_hints
+from armwright.program.language_server.keyword_docs import WORDS, word_doc
+from armwright.program.language_server.outline import document_symbols, folding_ranges
 from armwright.program.language_server.positions import position, span_of, span_range
 from armwright.program.language_server.rename import rename
-from armwright.program.language_server.semantic_tokens import difference, encoded, line_stretches
-from armwright.program.language_server.signature_help import signature_at
-from armwright.program.language_server.symbol_index import What
+from armwright.program.language_server.semantic_tokens import encode, line_tokens, token_edit
+from armwright.program.language_server.signature_help import signature_help
+from armwright.program.language_server.symbol_index import NameKind
 from armwright.program.semantics.builtins import FUNCTIONS
 from program.shelf import ACCEPTED, CORPUS
 
@@ -35,7 +35,7 @@ STANFORD = CORPUS / "cell1.json"
 
 def analysis_of(text: str, *, cell: Path | None = None, std: Standard = Standard.RLO_2) -> Analysis:
     """Return what is known of a program."""
-    return analyse("test.rlo", PositionCodec(text), None, Cells(), Settings(cell=cell, std=std))
+    return analyse("test.rlo", PositionCodec(text), None, CellCache(), Settings(cell=cell, std=std))
 
 
 def labels(text: str, **how: Standard) -> list[str]:
@@ -51,9 +51,9 @@ def labels(text: str, **how: Standard) -> list[str]:
 def test_every_word_is_explained() -> None:
     """Each word of the language and each function has a sentence, in the statements where it stands."""
     for word in (*VOCABULARIES[Standard.RLO_2].reserved, *FUNCTIONS):
-        meaning = explained(word)
+        meaning = word_doc(word)
         assert meaning is not None, word
-        assert word in meaning.form
+        assert word in meaning.syntax
         assert meaning.text.endswith(".")
     assert set(WORDS) <= VOCABULARIES[Standard.RLO_2].reserved | set(FUNCTIONS) | {"VISIONS", "SYSTEM"}
 
@@ -85,18 +85,18 @@ def test_names_that_are_variables_only_sometimes() -> None:
         "UNITS MM ; VAR X, mm, lamp : SCALAR ; f : FRAME ; BEGIN\n"
         "READ VISIONS (f) ; OPERATE lamp ; X = FORCE(X) + mm * lamp ; END."
     )
-    found = [(one.key, one.what, one.writes) for one in analysis_of(text).occurrences if not one.declares]
+    found = [(one.key, one.kind, one.writes) for one in analysis_of(text).occurrences if not one.declares]
 
     assert found == [
-        ("MM", What.UNIT, False),
-        ("VISIONS", What.SENSOR, False),
-        ("F", What.VARIABLE, True),
-        ("LAMP", What.DEVICE, False),
-        ("X", What.VARIABLE, True),
-        ("FORCE", What.FUNCTION, False),
-        ("X", What.AXIS, False),
-        ("MM", What.VARIABLE, False),
-        ("LAMP", What.VARIABLE, False),
+        ("MM", NameKind.UNIT, False),
+        ("VISIONS", NameKind.SENSOR, False),
+        ("F", NameKind.VARIABLE, True),
+        ("LAMP", NameKind.DEVICE, False),
+        ("X", NameKind.VARIABLE, True),
+        ("FORCE", NameKind.FUNCTION, False),
+        ("X", NameKind.AXIS, False),
+        ("MM", NameKind.VARIABLE, False),
+        ("LAMP", NameKind.VARIABLE, False),
     ]
 
 
@@ -264,7 +264,7 @@ def test_analysis_has_all_diagnostics() -> None:
     """A program that is analysed in two steps has the diagnostics of the compiled program, and no intermediate code."""
     for path in ACCEPTED:
         source = Source(path.name, path.read_text())
-        analysed = with_flow(translate(source, names_only=True))
+        analysed = analyse_flow(translate(source, names_only=True))
 
         assert analysed.code is None
         assert analysed.diagnostics == translate(source).diagnostics
@@ -290,11 +290,11 @@ def test_colours_that_are_sent_again() -> None:
         text = path.read_text(encoding="utf-8")
         at = chance.randrange(len(text))
         changed = text[:at] + chance.choice([" ", "7", ";", "\n", "{"]) + text[at:]
-        old, new = (line_stretches(analysis_of(one)) for one in (text, changed))
-        start, gone, come = difference(old, new)
-        numbers = encoded(old)
+        old, new = (line_tokens(analysis_of(one)) for one in (text, changed))
+        start, gone, come = token_edit(old, new)
+        numbers = encode(old)
         numbers[start : start + gone] = come
-        assert numbers == encoded(new)
+        assert numbers == encode(new)
 
 
 # ---- anything ------------------------------------------------------------------------------------------------------
@@ -320,7 +320,7 @@ def test_words_that_were_meant(line: str, title: str) -> None:
     text = f"VAR part : FRAME ;\nBEGIN\n  READ VISIONS (part) ;\n  {line} ;\nEND.\n"
     cell = KnownCell(arms=frozenset({"ARM_1"}), frames={"FEEDER": "WORLD"})
     analysis = attrs.evolve(analysis_of(text), compiled=translate(Source("t.rlo", text), cell))
-    [fix] = quickfixes(analysis, "t.rlo", span_range(analysis.codec, Span(0, len(text))), ())
+    [fix] = quick_fixes(analysis, "t.rlo", span_range(analysis.codec, Span(0, len(text))), ())
 
     assert fix.title == title
     assert not fix.is_preferred
@@ -341,21 +341,21 @@ def ask_everything(analysis: Analysis, text: str, offset: int, new: str) -> None
         assert isinstance(one.text_edit, lsp.TextEdit)
         word = span_of(codec, one.text_edit.range)
         assert word.start <= offset == word.end
-    for signature in getattr(signature_at(text, analysis, offset), "signatures", ()):
+    for signature in getattr(signature_help(text, analysis, offset), "signatures", ()):
         assert all(one.label[0] < one.label[1] <= len(signature.label) for one in signature.parameters)
-    assert len(line_stretches(analysis)) == len(analysis.codec.starts)
+    assert len(line_tokens(analysis)) == len(analysis.codec.starts)
     place = min(offset, len(analysis.text))
     where = position(analysis.codec, place)
     found = hover(analysis, place, markdown=True)
     assert found is None or (found.range is not None and found.range.start <= where <= found.range.end)
     whole = span_range(analysis.codec, Span(0, len(analysis.text)))
-    for hint in hints(analysis, whole):
+    for hint in inlay_hints(analysis, whole):
         assert whole.start <= hint.position <= whole.end
-    for symbol in outline(analysis):
+    for symbol in document_symbols(analysis):
         name = symbol.selection_range
         assert symbol.range.start <= name.start <= name.end <= symbol.range.end
-    assert all(0 <= fold.start_line < fold.end_line < len(analysis.codec.starts) for fold in folds(analysis))
-    quickfixes(analysis, "test.rlo", lsp.Range(where, where), ())
+    assert all(0 <= fold.start_line < fold.end_line < len(analysis.codec.starts) for fold in folding_ranges(analysis))
+    quick_fixes(analysis, "test.rlo", lsp.Range(where, where), ())
     apply_edits(analysis.text, all_fixes(analysis.compiled.diagnostics))
     try:
         rename(analysis, place, new)

@@ -12,8 +12,8 @@ from armwright.cell.simulator import Simulator
 from armwright.errors import FileFormatError
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
-from armwright.program.repl.frame_view import arms, frames, to_zyx
-from armwright.program.repl.session import Answer, Session
+from armwright.program.repl.frame_view import arm_lines, frame_table_lines, zyx_angles
+from armwright.program.repl.session import InputResult, Session
 from armwright.program.semantics.cell_symbols import Imported
 from armwright.program.vm.interpreter import Limits, interpret
 from armwright.program.vm.machine import Machine
@@ -31,12 +31,12 @@ def session(*inputs: str, cell: Cell | None = None, std: Standard = Standard.RLO
     talk = Session(cell or cell_of("cell1"), std)
     for text in inputs:
         answer = talk.enter(text)
-        assert answer.complete, text
+        assert answer.is_complete, text
         assert not answer.is_wrong, answer.diagnostics
     return talk
 
 
-def codes(answer: Answer) -> list[str]:
+def codes(answer: InputResult) -> list[str]:
     """Return the codes of what is wrong."""
     return [one.code for one in answer.diagnostics]
 
@@ -92,7 +92,7 @@ def test_values(text: str, shown: str) -> None:
 
     answer = talk.enter(text)
 
-    assert answer.printed == (shown,)
+    assert answer.printed_lines == (shown,)
     assert not answer.diagnostics
 
 
@@ -101,7 +101,7 @@ def test_values_leave_nothing() -> None:
     talk = session("VAR n : SCALAR ; n = 3")
     before = everything(talk)
 
-    assert talk.enter("n + 1").printed == ("4",)
+    assert talk.enter("n + 1").printed_lines == ("4",)
 
     assert everything(talk) == before
     assert talk.undo() == ("n = 3",)
@@ -115,8 +115,8 @@ def test_an_arm_stands_where_the_last_statement_left_it() -> None:
     then = talk.state.machine.now
     second = talk.enter("MOVE ARM_1 TO b STRAIGHTLY")
 
-    assert first.trace == ("ARM_1 MOVE: PTP a @100",)
-    assert second.trace == ("ARM_1 MOVE: LINE b @100",)
+    assert first.trace_lines == ("ARM_1 MOVE: PTP a @100",)
+    assert second.trace_lines == ("ARM_1 MOVE: LINE b @100",)
     assert second.effects[0].t0 == then
     np.testing.assert_allclose(talk.state.machine.state.tree.world("ARM_1"), down(0.5, -0.1, 0.15), atol=EXACT)
 
@@ -137,7 +137,7 @@ def test_programs_do_what_they_do(name: str, *, line_by_line: bool) -> None:
             begun += f"{line}\n"
             answer = talk.enter(begun)
             assert not answer.is_wrong, answer.diagnostics
-            if answer.complete:
+            if answer.is_complete:
                 trace += [one.text for one in answer.effects if one.kind not in ("PLACE", "LOCK")]
                 begun = ""
         assert not begun
@@ -184,7 +184,7 @@ def test_branches_side_by_side() -> None:
 
     assert not answer.is_wrong
     np.testing.assert_allclose(talk.state.machine.state.tree.world("PART"), down(0.70, -0.20, 0.05), atol=EXACT)
-    assert talk.enter("OPEN ARM_2").trace == ("ARM_2 OPEN",)
+    assert talk.enter("OPEN ARM_2").trace_lines == ("ARM_2 OPEN",)
 
 
 # ---- what is not complete ------------------------------------------------------------------------------------------
@@ -227,7 +227,7 @@ def test_more_must_come(text: str) -> None:
 
     answer = talk.enter(text)
 
-    assert not answer.complete
+    assert not answer.is_complete
     assert not answer.diagnostics
     assert everything(talk) == before
     assert talk.enter(text, complete=True).is_wrong
@@ -254,7 +254,7 @@ def test_slips_are_told_at_once(text: str, code: str) -> None:
 
     answer = talk.enter(text)
 
-    assert answer.complete
+    assert answer.is_complete
     assert code in codes(answer)
 
 
@@ -264,7 +264,7 @@ def test_a_call_without_parentheses() -> None:
 
     answer = talk.enter("hello")
 
-    assert answer.complete
+    assert answer.is_complete
     assert "()" in answer.diagnostics[0].message
 
 
@@ -341,9 +341,9 @@ def test_statements_before_an_error_stay() -> None:
 
     answer = talk.enter("n = 1 ; OPEN ARM_1 ; MOVE ARM_1 TO c ; n = 2 ; n = 3")
 
-    assert answer.trace == ("ARM_1 OPEN",)
+    assert answer.trace_lines == ("ARM_1 OPEN",)
     assert answer.remarks == ("not executed: the 2 statements after it",)
-    assert talk.enter("n").printed == ("1",)
+    assert talk.enter("n").printed_lines == ("1",)
 
 
 def test_an_input_with_an_error_in_it_does_nothing() -> None:
@@ -353,14 +353,14 @@ def test_an_input_with_an_error_in_it_does_nothing() -> None:
     answer = talk.enter("n = 1 ; m = 2 ; n = 3")
 
     assert codes(answer) == ["E202"]
-    assert talk.enter("n").printed == ("0",)
+    assert talk.enter("n").printed_lines == ("0",)
 
 
 def test_errors_name_the_lines_that_were_seen() -> None:
     """Every line counts, also those that were wrong or said nothing to the cell."""
     talk = Session(cell_of("cell1"))
     talk.enter("VAR n : SCALAR")
-    talk.pass_over(":frames")
+    talk.skip_lines(":frames")
     talk.enter("m = 1")
 
     answer = talk.enter("\n  n = XYZ(0, 0, 1)")
@@ -378,7 +378,7 @@ def test_a_file_has_its_own_lines() -> None:
 
     assert answer.source.name == "weld.rlo"
     assert answer.source.line(answer.diagnostics[0].span.start) == 3
-    assert talk.enter("n").printed == ("1",)
+    assert talk.enter("n").printed_lines == ("1",)
 
 
 def test_the_checker_knows_what_was_done() -> None:
@@ -398,7 +398,7 @@ def test_a_halt_ends_the_program() -> None:
 
     assert answer.is_wrong
     assert "HALT" in answer.remarks[0]
-    assert talk.enter("n").printed == ("1",)
+    assert talk.enter("n").printed_lines == ("1",)
     talk.undo()
     assert not talk.enter("n = 2").is_wrong
 
@@ -479,7 +479,7 @@ def test_undo_goes_no_further_than_the_start() -> None:
     talk.redo(2)
     talk.enter("n = 5")
     assert talk.redo() == ()
-    assert talk.enter("n").printed == ("5",)
+    assert talk.enter("n").printed_lines == ("5",)
 
 
 # ---- names that are declared anew ----------------------------------------------------------------------------------
@@ -493,8 +493,8 @@ def test_a_name_declared_anew() -> None:
     talk.enter("f = 3")
 
     assert answer.remarks == ("`f` is declared again; the previous one is now called `f_1`",)
-    assert talk.enter("f").printed == ("3",)
-    assert talk.enter("DIST(f_1, part)").printed == ("0",)
+    assert talk.enter("f").printed_lines == ("3",)
+    assert talk.enter("DIST(f_1, part)").printed_lines == ("0",)
     assert talk.state.machine.state.tree.parent("PART") == "F_1"
     assert "AFFIX part TO f_1 ;" in talk.program()
     cell = cell_of("cell1")
@@ -521,7 +521,7 @@ def test_a_procedure_declared_anew() -> None:
     talk.enter("PROCEDURE one ; BEGIN n = n + 100 END")
     talk.enter("two()")
 
-    assert talk.enter("n").printed == ("202",)
+    assert talk.enter("n").printed_lines == ("202",)
     cell = cell_of("cell1")
     end = "\n  PRINT(n)\nEND."
     recording = interpret(code_of(talk.program().replace("\nEND.", end), cell), cell, Simulator(cell))
@@ -593,7 +593,7 @@ def test_units_come_first() -> None:
     assert "`25cm`" in answer.diagnostics[0].helps[0]
     assert not talk.enter("UNITS MM").is_wrong
     assert talk.program().startswith("UNITS RAD, MM ;")
-    assert "30.00      0.00" not in "\n".join(frames(talk))
+    assert "30.00      0.00" not in "\n".join(frame_table_lines(talk))
 
 
 def test_an_import_brings_arms() -> None:
@@ -606,12 +606,12 @@ def test_an_import_brings_arms() -> None:
         return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     talk = Session(None, read_import=read)
-    assert arms(talk) == ["no arms: begin with `--cell`, or with an IMPORT of a cell"]
+    assert arm_lines(talk) == ["no arms: begin with `--cell`, or with an IMPORT of a cell"]
     assert codes(talk.enter("OPEN ARM_1")) == ["E302"]
     assert codes(talk.enter('IMPORT "cel.json"')) == ["E228"]
     assert not talk.enter('IMPORT "cell.json"').is_wrong
-    assert talk.enter("OPEN ARM_1").trace == ("ARM_1 OPEN",)
-    assert talk.enter("station").printed == ("(1,0,0, 0,1,0, 0,0,1, 0.45,0,0)",)
+    assert talk.enter("OPEN ARM_1").trace_lines == ("ARM_1 OPEN",)
+    assert talk.enter("station").printed_lines == ("(1,0,0, 0,1,0, 0,0,1, 0.45,0,0)",)
     assert talk.enter('IMPORT "cell.json"').remarks == ("`cell.json` is imported already",)
     talk.undo(2)
     assert codes(talk.enter("OPEN ARM_1")) == ["E302"]
@@ -621,7 +621,7 @@ def test_the_old_language() -> None:
     """With the old standard nothing of the new one is taken, line numbers are, and a name shows its value."""
     talk = session("100 VAR f : FRAME ;", f"200 f = {ABOVE} ;", "300 MOVE ARM-1 TO f ;", std=Standard.RLO_83)
 
-    assert talk.enter("f").printed == ("(1,0,0, 0,-1,0, 0,0,-1, 0.4,0.15,0.2)",)
+    assert talk.enter("f").printed_lines == ("(1,0,0, 0,-1,0, 0,0,-1, 0.4,0.15,0.2)",)
     assert codes(talk.enter("PRINT(f)")) == ["E214"]
     assert codes(talk.enter("VAR longernames : FRAME ;")) == ["E103"]
     assert "MOVE ARM_1 TO f ;" in talk.program()
@@ -637,13 +637,13 @@ def test_frames() -> None:
         "table = WORLD * XYZ(400, 0, 10) * ROTZ(90) ; AFFIX cup TO table AT XYZ(10, 20, 30) * ROTX(45)",
     )
 
-    rows = [row.split() for row in frames(talk)]
+    rows = [row.split() for row in frame_table_lines(talk)]
 
     assert rows[0] == ["frame", "x", "y", "z", "mm", "z", "y", "x", "deg"]
     assert ["table", "400.00", "0.00", "10.00", "90.00", "0.00", "0.00"] in rows
     assert ["cup", "380.00", "10.00", "40.00", "90.00", "0.00", "45.00"] in rows
     assert ["nil", "no", "value", "yet"] in rows
-    lines = frames(talk)
+    lines = frame_table_lines(talk)
     assert any(line.startswith("    cup") for line in lines)
     assert any(line.startswith("  table") for line in lines)
     assert not any("BASE" in line for line in lines)
@@ -661,14 +661,14 @@ def test_turns(angles: tuple[float, float, float]) -> None:
         R[a, a], R[b, b], R[a, b], R[b, a] = c, c, -s, s
         return R
 
-    np.testing.assert_allclose(to_zyx(turn(2, z) @ turn(1, y) @ turn(0, x)), angles, atol=1e-7)
+    np.testing.assert_allclose(zyx_angles(turn(2, z) @ turn(1, y) @ turn(0, x)), angles, atol=1e-7)
 
 
 def test_arms() -> None:
     """Of an arm one sees its joints, where its hand is, what it holds and what hangs on it."""
     talk = session("VAR a : FRAME", f"a = {ABOVE} ; OPEN ARM_1 ; MOVE ARM_1 TO a ; GRASP ; AFFIX a TO ARM_1")
 
-    head, joints, hand = arms(talk)
+    head, joints, hand = arm_lines(talk)
 
     assert head == "ARM_1  stanford"
     assert joints.count("deg") == 5
@@ -691,5 +691,5 @@ def test_the_200th_statement() -> None:
         talk.enter("n = n + 1")
         times.append(time.perf_counter() - start)
 
-    assert talk.enter("n").printed == ("105",)
+    assert talk.enter("n").printed_lines == ("105",)
     assert min(times) < 0.05

@@ -26,7 +26,7 @@ from armwright.program.vm.interpreter import Limits, RunError, motion_warnings
 _CELLS = Path(__file__).parent / "pages" / "cells"
 _RUN = re.compile(r"^// run in (\w+)$", re.MULTILINE)
 _AROUND = re.compile(r"^// around: (via|damped)$", re.MULTILINE)
-_WAYS: Mapping[str, Around] = {"via": "via", "damped": "damped"}
+_DETOUR_METHODS: Mapping[str, Around] = {"via": "via", "damped": "damped"}
 _EFFORT = re.compile(r"^// effort: (\d+) in joint (\d)$", re.MULTILINE)
 _LIMIT = re.compile(r"^// limits: (steps|depth|time) (\d+)$", re.MULTILINE)
 _KNOWN = re.compile(r"^// cell: (arms|frames|devices|visions) (.+)$", re.MULTILINE)
@@ -35,19 +35,19 @@ _OLD = re.compile(r"^// std=83$", re.MULTILINE)
 _STRICT = re.compile(r"^// strict$", re.MULTILINE)
 
 
-def answer(source: Source) -> tuple[Diagnostic, ...]:
+def diagnose_example(source: Source) -> tuple[Diagnostic, ...]:
     """Return what is said of a program: by the translator and, where its comments have it run, on the way.
 
     Args:
         source: the program, with its comments.
     """
-    cell = _cell(source.text)
+    cell = _run_cell(source.text)
     compiled = translate(
         source,
-        cell or _known(source.text),
+        cell or _known_cell(source.text),
         strict=bool(_STRICT.search(source.text)),
         std=Standard.RLO_83 if _OLD.search(source.text) else Standard.RLO_2,
-        read_import=_imports(source.text),
+        read_import=_import_reader(source.text),
     )
     if cell is None or compiled.code is None:
         return compiled.diagnostics
@@ -59,21 +59,21 @@ def answer(source: Source) -> tuple[Diagnostic, ...]:
     return (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell))
 
 
-def _cell(text: str) -> Cell | None:
+def _run_cell(text: str) -> Cell | None:
     """Return the cell that a program is run in; None where it is not run."""
     match = _RUN.search(text)
     if match is None:
         return None
     cell = read_cell(_CELLS / f"{match[1]}.toml")
     if around := _AROUND.search(text):
-        cell = attrs.evolve(cell, around=_WAYS[around[1]])
+        cell = attrs.evolve(cell, around=_DETOUR_METHODS[around[1]])
     for effort, number in _EFFORT.findall(text):
-        arms = {name: _weaker(arm, int(number) - 1, float(effort)) for name, arm in cell.arms.items()}
+        arms = {name: _limit_effort(arm, int(number) - 1, float(effort)) for name, arm in cell.arms.items()}
         cell = attrs.evolve(cell, arms=arms)
     return cell
 
 
-def _weaker(placed: CellArm, joint: int, effort: float) -> CellArm:
+def _limit_effort(placed: CellArm, joint: int, effort: float) -> CellArm:
     """Return an arm of a cell of which one joint has no more effort than this."""
     joints = list(placed.arm.joints)
     limits = attrs.evolve(joints[joint].limits, effort=effort)
@@ -81,28 +81,28 @@ def _weaker(placed: CellArm, joint: int, effort: float) -> CellArm:
     return attrs.evolve(placed, arm=attrs.evolve(placed.arm, joints=joints))
 
 
-def _known(text: str) -> KnownCell | None:
+def _known_cell(text: str) -> KnownCell | None:
     """Return the cell that a program is checked against."""
     known: Mapping[str, list[str]] = {what: names.split(", ") for what, names in _KNOWN.findall(text)}
     if not known:
         return None
     return KnownCell(
         arms=frozenset(known["arms"]),
-        frames=_hanging(known.get("frames", [])),
+        frames=_frame_parents(known.get("frames", [])),
         devices=frozenset(known["devices"]) if "devices" in known else None,
         visions=frozenset(known["visions"]) if "visions" in known else None,
     )
 
 
-def _hanging(names: list[str]) -> dict[str, str]:
+def _frame_parents(names: list[str]) -> dict[str, str]:
     """Return what each frame hangs on, of names such as ``LID on CUP``."""
     parts = (name.partition(" on ") for name in names)
     return {name: parent or "WORLD" for name, _, parent in parts}
 
 
-def _imports(text: str) -> ReadImport | None:
+def _import_reader(text: str) -> ReadImport | None:
     """Return a reader of the files that a program is told of; any other file is missing."""
-    files = {path: _hanging(names.split(", ")) for path, names in _IMPORT.findall(text)}
+    files = {path: _frame_parents(names.split(", ")) for path, names in _IMPORT.findall(text)}
 
     def read(path: str) -> Imported:
         if path not in files:

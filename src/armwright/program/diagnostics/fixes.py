@@ -13,13 +13,13 @@ from armwright.program.language.source import Source
 from armwright.program.language.text_edits import Edit, apply_edits
 
 # How often a program is looked at again: one cure may bring the next slip to light.
-ROUNDS = 10
+MAX_ROUNDS = 10
 # How often a program is translated at most to find out which changes help, in one round.
 _MAX_TRIALS = 200
 # A longer text is not shown whole.
 _MAX_SHOWN_LENGTH = 30
 
-Translate: TypeAlias = Callable[[Source], Compilation]
+Compile: TypeAlias = Callable[[Source], Compilation]
 
 
 @attrs.frozen
@@ -35,21 +35,21 @@ class AppliedFix:
     diagnostic: Diagnostic
 
     @property
-    def what(self) -> str:
+    def description(self) -> str:
         """What was done, such as ``put in `;```."""
         return " and ".join(dict.fromkeys(_description(fix, self.source) for fix in self.diagnostic.fixes))
 
 
 @attrs.frozen(kw_only=True)
-class Fixed:
+class FixResult:
     """A program after all that is certain has been cured.
 
     Attributes:
-        cures: what was done, in order.
+        applied: what was done, in order.
         compilation: of the program as it is now; what is left is in its diagnostics.
     """
 
-    cures: tuple[AppliedFix, ...]
+    applied: tuple[AppliedFix, ...]
     compilation: Compilation
 
     @property
@@ -58,7 +58,7 @@ class Fixed:
         return self.compilation.source.text
 
 
-def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixed:
+def apply_fixes(source: Source, compile_source: Compile, *, rounds: int = MAX_ROUNDS) -> FixResult:
     """Make the changes that diagnostics offer.
 
     In each round all changes are made that do not touch one another. Where one does not make its message go away, or
@@ -66,31 +66,31 @@ def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixe
 
     Args:
         source: the program.
-        translate: how to find out what is wrong.
+        compile_source: how to find out what is wrong.
         rounds: how often to look again at most.
     """
-    now = translate(source)
+    now = compile_source(source)
     cures: list[AppliedFix] = []
     vain: set[tuple[str, str]] = set()
     for _ in range(rounds if "\0" not in source.text else 0):
         offered = [
             diagnostic
             for diagnostic in now.diagnostics
-            if diagnostic.fixes and _line_of(diagnostic, now.source) not in vain
+            if diagnostic.fixes and _message_key(diagnostic, now.source) not in vain
         ]
-        selected = apart(offered)
+        selected = select_disjoint(offered)
         if not selected:
             break
-        after = translate(_with(now.source, selected))
-        if not _helps(selected, now, after):
-            selected, after = _that_help(selected, now, translate)
-            vain |= {_line_of(one, now.source) for one in offered if one not in selected}
+        after = compile_source(_apply(now.source, selected))
+        if not _improves(selected, now, after):
+            selected, after = _select_improving(selected, now, compile_source)
+            vain |= {_message_key(one, now.source) for one in offered if one not in selected}
         cures += [AppliedFix(now.source, one) for one in selected]
         now = after
-    return Fixed(cures=tuple(cures), compilation=now)
+    return FixResult(applied=tuple(cures), compilation=now)
 
 
-def apart(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+def select_disjoint(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Return those whose changes can be made at once: of two that touch, the first."""
     diagnostics_: list[Diagnostic] = []
     taken: list[tuple[int, int]] = []
@@ -109,25 +109,25 @@ def _touches(span: tuple[int, int], taken: Sequence[tuple[int, int]]) -> bool:
     return (index > 0 and taken[index - 1][1] >= span[0]) or (index < len(taken) and taken[index][0] <= span[1])
 
 
-def _with(source: Source, diagnostics: Iterable[Diagnostic]) -> Source:
+def _apply(source: Source, diagnostics: Iterable[Diagnostic]) -> Source:
     """Return a program with the changes made that diagnostics offer."""
     edits = tuple(Edit(fix.span, fix.replacement) for diagnostic in diagnostics for fix in diagnostic.fixes)
     return Source(source.name, apply_edits(source.text, edits))
 
 
-def _helps(selected: Sequence[Diagnostic], before: Compilation, after: Compilation) -> bool:
+def _improves(selected: Sequence[Diagnostic], before: Compilation, after: Compilation) -> bool:
     """Whether changes have made their messages go away, and have brought no other slip of syntax.
 
     What else is said afterwards was hidden by them: what a program does is looked at when its syntax is right, and
     of two slips at one place that can be cured one is told at a time.
     """
-    changes = _Changes(selected)
-    again = {(one.code, one.message, index) for one in selected for index in changes.moved(one.span.start)}
+    changes = _OffsetMap(selected)
+    again = {(one.code, one.message, index) for one in selected for index in changes.map_offset(one.span.start)}
     known = {
         (diagnostic.code, index)
         for diagnostic in before.diagnostics
         if diagnostic.is_syntax
-        for index in changes.moved(diagnostic.span.start)
+        for index in changes.map_offset(diagnostic.span.start)
     } - {(code, index) for code, _, index in again}
     for diagnostic in after.diagnostics:
         index = diagnostic.span.start
@@ -142,7 +142,7 @@ def _helps(selected: Sequence[Diagnostic], before: Compilation, after: Compilati
     return True
 
 
-class _Changes:
+class _OffsetMap:
     """How places move when changes are made."""
 
     def __init__(self, selected: Iterable[Diagnostic]) -> None:
@@ -150,17 +150,17 @@ class _Changes:
             (fix.span.start, fix.span.end, len(fix.replacement)) for diagnostic in selected for fix in diagnostic.fixes
         )
         self._starts = [start for start, _, _ in spans]
-        self._longer = [0, *accumulate(longer - (end - start) for start, end, longer in spans)]
-        self.ends = {end + longer for (_, end, _), longer in zip(spans, self._longer[1:], strict=True)}
+        self._shifts = [0, *accumulate(longer - (end - start) for start, end, longer in spans)]
+        self.ends = {end + longer for (_, end, _), longer in zip(spans, self._shifts[1:], strict=True)}
 
-    def moved(self, offset: int) -> tuple[int, int]:
+    def map_offset(self, offset: int) -> tuple[int, int]:
         """Return where a place is afterwards: in front of what is put in there, and behind it."""
         first, last = bisect_left(self._starts, offset), bisect_right(self._starts, offset)
-        return offset + self._longer[first], offset + self._longer[last]
+        return offset + self._shifts[first], offset + self._shifts[last]
 
 
-def _that_help(
-    selected: Sequence[Diagnostic], before: Compilation, translate: Translate
+def _select_improving(
+    selected: Sequence[Diagnostic], before: Compilation, compile_source: Compile
 ) -> tuple[list[Diagnostic], Compilation]:
     """Return the changes that help together, and what becomes of the program.
 
@@ -173,8 +173,8 @@ def _that_help(
         if not waiting:
             break
         several = waiting.pop()
-        tried = translate(_with(before.source, [*diagnostics_, *several]))
-        if _helps([*diagnostics_, *several], before, tried):
+        tried = compile_source(_apply(before.source, [*diagnostics_, *several]))
+        if _improves([*diagnostics_, *several], before, tried):
             diagnostics_, after = [*diagnostics_, *several], tried
         elif len(several) > 1:
             half = len(several) // 2
@@ -182,7 +182,7 @@ def _that_help(
     return diagnostics_, after
 
 
-def _line_of(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:
+def _message_key(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:
     """Return what a message says and of which line, by which it is known again after other lines have changed."""
     return diagnostic.message, source.line_text(source.line(diagnostic.span.start))
 

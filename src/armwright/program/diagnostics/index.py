@@ -51,15 +51,15 @@ class Page:
 @cache
 def codes() -> tuple[str, ...]:
     """Return all codes that have a page: errors, devices, warnings, style."""
-    return tuple(sorted((path.stem for path in _PAGES.glob("*.md")), key=_rank))
+    return tuple(sorted((path.stem for path in _PAGES.glob("*.md")), key=_sort_key))
 
 
-def ranges() -> dict[str, tuple[str, ...]]:
+def codes_by_range() -> dict[str, tuple[str, ...]]:
     """Return the codes by what they are about."""
     return {name: tuple(code for code in codes() if code.startswith(head)) for head, name in _RANGES.items()}
 
 
-def explanation(code: str) -> Page:
+def find_page(code: str) -> Page:
     """Return what a code means.
 
     Args:
@@ -75,15 +75,15 @@ def explanation(code: str) -> Page:
     if not meant:
         alike = [one for one in known if one[:2] == code.strip().upper()[:2]]
         raise UnknownNameError("code", code, alike or known)
-    return _read(meant[0])
+    return _read_page(meant[0])
 
 
 @cache
-def _read(code: str) -> Page:
+def _read_page(code: str) -> Page:
     match = _PAGE.fullmatch((_PAGES / f"{code}.md").read_text(encoding="utf-8"))
     assert match is not None, f"the page of {code} has not the form of a page"  # noqa: S101 - our own pages
     return Page(**match.groupdict())
 
 
-def _rank(code: str) -> tuple[int, str]:
+def _sort_key(code: str) -> tuple[int, str]:
     return _ORDER.index(code[0]), code

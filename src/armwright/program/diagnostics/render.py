@@ -20,14 +20,14 @@ MAX_SHOWN = 100
 _TAB = 4
 _NARROWEST_GUTTER = 2
 # Longer lines are shown in part, from so many characters before the first place on.
-_MAX_LINE_LENGTH, _AROUND, _CUT = 240, 60, "..."
-_LOUD = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow"}
-_QUIET = "bold blue"
+_MAX_LINE_LENGTH, _CONTEXT_LENGTH, _ELLIPSIS = 240, 60, "..."
+_SEVERITY_STYLES = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow"}
+_GUTTER_STYLE = "bold blue"
 
 
 def render(diagnostics: Iterable[Diagnostic], source: Source) -> str:
     """Return diagnostics as plain text, sorted by place, a hundred at most, with a count of all at the end."""
-    return "".join("".join(text for text, _ in row).rstrip() + "\n" for row in _page(diagnostics, source))
+    return "".join("".join(text for text, _ in row).rstrip() + "\n" for row in _page_rows(diagnostics, source))
 
 
 def render_rich(diagnostics: Iterable[Diagnostic], source: Source) -> "Text":
@@ -35,19 +35,19 @@ def render_rich(diagnostics: Iterable[Diagnostic], source: Source) -> "Text":
     from rich.text import Text  # noqa: PLC0415 - only who watches waits for it
 
     page = Text(no_wrap=True)
-    for row in _page(diagnostics, source):
+    for row in _page_rows(diagnostics, source):
         for text, style in row:
             page.append(text, style or None)
         page.append("\n")
     return page
 
 
-def _page(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Row]:
+def _page_rows(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Row]:
     ordered = in_order(diagnostics)
     # Of too many the errors come first: a warning is never shown in place of what keeps a program from running.
     shown = in_order(sorted(ordered, key=lambda one: not one.is_error)[:MAX_SHOWN])
     for diagnostic in shown:
-        yield from _block(diagnostic, source)
+        yield from _diagnostic_rows(diagnostic, source)
         yield [("", "")]
     if len(ordered) > MAX_SHOWN:
         rest = f"{len(ordered) - MAX_SHOWN} more are not shown; one mistake may have caused many"
@@ -56,47 +56,47 @@ def _page(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Row]:
     yield [(count_line(ordered, source), "bold" if ordered else "")]
 
 
-def _block(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
-    loud = _LOUD[diagnostic.severity]
+def _diagnostic_rows(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
+    loud = _SEVERITY_STYLES[diagnostic.severity]
     labels = [Label(diagnostic.span, diagnostic.label), *diagnostic.secondary]
     numbers = sorted({source.line(label.span.start) for label in labels})
     width = max(_NARROWEST_GUTTER, len(str(numbers[-1])))
     yield [(f"{diagnostic.severity.value}[{diagnostic.code}]", loud), (f": {diagnostic.message}", "bold")]
     place = f"{source.name}:{source.line(diagnostic.span.start)}:{source.column(diagnostic.span.start)}"
-    yield [(" " * width + "--> ", _QUIET), (place, "")]
-    yield [(" " * width + " |", _QUIET)]
+    yield [(" " * width + "--> ", _GUTTER_STYLE), (place, "")]
+    yield [(" " * width + " |", _GUTTER_STYLE)]
     before = numbers[0]
     for number in numbers:
         if number > before + 1:
-            yield [("...", _QUIET)]
+            yield [("...", _GUTTER_STYLE)]
         before = number
         here = [label for label in labels if source.line(label.span.start) == number]
         line = source.line_text(number)
         anchor = labels[0] if labels[0] in here else here[0]
-        first, last = _window(len(line), source.column(anchor.span.start) - 1)
-        before_it, behind_it = _CUT if first else "", _CUT if last < len(line) else ""
-        shown = before_it + "".join(_cells(line[first:last])) + behind_it
-        yield [(f"{number:>{width}} | ", _QUIET), (shown, "")]
+        first, last = _visible_range(len(line), source.column(anchor.span.start) - 1)
+        before_it, behind_it = _ELLIPSIS if first else "", _ELLIPSIS if last < len(line) else ""
+        shown = before_it + "".join(_visible_cells(line[first:last])) + behind_it
+        yield [(f"{number:>{width}} | ", _GUTTER_STYLE), (shown, "")]
         for label in sorted(here, key=lambda one: one.span.start):
-            mark, style = ("^", loud) if label is labels[0] else ("-", _QUIET)
+            mark, style = ("^", loud) if label is labels[0] else ("-", _GUTTER_STYLE)
             yield [
-                (" " * width + " | " + " " * len(before_it), _QUIET),
-                *_marks(label, mark, style, source, (first, last)),
+                (" " * width + " | " + " " * len(before_it), _GUTTER_STYLE),
+                *_marker_row(label, mark, style, source, (first, last)),
             ]
     for head, texts in (("note", diagnostic.notes), ("help", diagnostic.helps)):
         for text in texts:
-            yield [(" " * width + " = ", _QUIET), (f"{head}: ", "bold"), (text, "")]
+            yield [(" " * width + " = ", _GUTTER_STYLE), (f"{head}: ", "bold"), (text, "")]
 
 
-def _window(length: int, column: int) -> tuple[int, int]:
+def _visible_range(length: int, column: int) -> tuple[int, int]:
     """Return which characters of a line are shown: all, or of a very long line those around a place."""
     if length <= _MAX_LINE_LENGTH:
         return 0, length
-    first = max(0, column - _AROUND)
+    first = max(0, column - _CONTEXT_LENGTH)
     return first, min(length, first + _MAX_LINE_LENGTH)
 
 
-def _marks(label: Label, mark: str, style: str, source: Source, shown: tuple[int, int]) -> Row:
+def _marker_row(label: Label, mark: str, style: str, source: Source, shown: tuple[int, int]) -> Row:
     """Return the blanks, the marks and the words under one place; a place of several lines is marked in its first.
 
     Args:
@@ -108,36 +108,36 @@ def _marks(label: Label, mark: str, style: str, source: Source, shown: tuple[int
     """
     begin, end = shown
     line = source.line_text(source.line(label.span.start))
-    cells = _cells(line[begin:end])
+    cells = _visible_cells(line[begin:end])
     column = source.column(label.span.start) - 1
     # What lies in a part that is not shown is marked at its edge.
     first = column if end == len(line) and column >= begin else min(max(column, begin), end)
     last = min(column + label.span.end - label.span.start, len(line), end)
     # Beyond the end of the line every character that does not exist counts one.
-    indent = sum(map(_width, cells[: first - begin])) + max(0, first - len(line))
-    length = sum(map(_width, cells[first - begin : max(0, last - begin)]))
+    indent = sum(map(_column_width, cells[: first - begin])) + max(0, first - len(line))
+    length = sum(map(_column_width, cells[first - begin : max(0, last - begin)]))
     return [(" " * indent, ""), (mark * max(1, length), style), (f" {label.text}" if label.text else "", style)]
 
 
 # Diagnostics that follow one another are often about the same line.
 @lru_cache(maxsize=4)
-def _cells(line: str) -> Sequence[str]:
+def _visible_cells(line: str) -> Sequence[str]:
     """Return what is shown for each character of a line: blanks up to the next stop for a tab."""
     shown: list[str] = []
     column = 0
     for character in line:
-        cell = " " * (_TAB - column % _TAB) if character == "\t" else _visible(character)
-        column += _width(cell)
+        cell = " " * (_TAB - column % _TAB) if character == "\t" else _printable(character)
+        column += _column_width(cell)
         shown.append(cell)
     return tuple(shown)
 
 
-def _visible(character: str) -> str:
+def _printable(character: str) -> str:
     """Return the character, or a stand-in for one that would disturb the terminal."""
     return "\N{REPLACEMENT CHARACTER}" if unicodedata.category(character) in ("Cc", "Cf", "Cs") else character
 
 
-def _width(cell: str) -> int:
+def _column_width(cell: str) -> int:
     """Return how many columns of a terminal a shown character takes."""
     return sum(
         0 if unicodedata.combining(character) else 2 if unicodedata.east_asian_width(character) in "WF" else 1

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from armwright.program.diagnostics.index import explanation
+from armwright.program.diagnostics.index import find_page
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.language.source import Source, Span
 from armwright.version import __version__
@@ -44,33 +44,35 @@ def to_sarif(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> di
 
 
 def _rule(code: str) -> dict[str, Any]:
-    page = explanation(code)
+    page = find_page(code)
     return {"id": code, "shortDescription": {"text": page.title}, "fullDescription": {"text": page.text}}
 
 
-def _result(one: Diagnostic, source: Source, uri: str, codes: list[str]) -> dict[str, Any]:
+def _result(diagnostic: Diagnostic, source: Source, uri: str, codes: list[str]) -> dict[str, Any]:
     advice = "".join(
-        f"\n{head}: {text}" for head, texts in (("note", one.notes), ("help", one.helps)) for text in texts
+        f"\n{head}: {text}"
+        for head, texts in (("note", diagnostic.notes), ("help", diagnostic.helps))
+        for text in texts
     )
     result: dict[str, Any] = {
-        "ruleId": one.code,
-        "ruleIndex": codes.index(one.code),
-        "level": _LEVELS[one.severity],
-        "message": {"text": one.message + advice},
-        "locations": [_location(one.span, source, uri, one.label)],
+        "ruleId": diagnostic.code,
+        "ruleIndex": codes.index(diagnostic.code),
+        "level": _LEVELS[diagnostic.severity],
+        "message": {"text": diagnostic.message + advice},
+        "locations": [_location(diagnostic.span, source, uri, diagnostic.label)],
     }
-    if one.secondary:
+    if diagnostic.secondary:
         result["relatedLocations"] = [
             {"id": number, **_location(label.span, source, uri, label.text)}
-            for number, label in enumerate(one.secondary, 1)
+            for number, label in enumerate(diagnostic.secondary, 1)
         ]
-    if one.fixes:
+    if diagnostic.fixes:
         replacements = [
             {"deletedRegion": _region(fix.span, source), "insertedContent": {"text": fix.replacement}}
-            for fix in one.fixes
+            for fix in diagnostic.fixes
         ]
         change = {"artifactLocation": {"uri": uri}, "replacements": replacements}
-        words = one.helps[0] if one.helps else one.message
+        words = diagnostic.helps[0] if diagnostic.helps else diagnostic.message
         result["fixes"] = [{"description": {"text": words}, "artifactChanges": [change]}]
     return result
 

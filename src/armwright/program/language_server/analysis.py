@@ -10,12 +10,12 @@ import attrs
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
 from armwright.errors import FileFormatError
-from armwright.program.api import Compilation, compile as compile_program, with_flow, with_imports
+from armwright.program.api import Compilation, add_imported_frames, analyse_flow, compile as compile_program
 from armwright.program.flow_analysis.side_effects import every
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
-from armwright.program.language_server.cell_lookup import Cells
+from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.symbol_index import Occurrence, ScopeExtents, occurrences, scope_extents
 from armwright.program.semantics.cell_symbols import Imported
 from armwright.program.syntax import tree
@@ -46,20 +46,20 @@ class Analysis:
         compiled: the translation up to its names, which takes half the time of all.
         codec: of its text.
         cell: what it acts on, with what it imports; None where that is not known.
-        files: where frames and arms are declared, by name: the URI of the file, and the line from 1.
-        problem: why the cell of the settings cannot be read; empty if it can.
+        declaration_lines: where frames and arms are declared, by name: the URI of the file, and the line from 1.
+        cell_error: why the cell of the settings cannot be read; empty if it can.
     """
 
     compiled: Compilation
     codec: PositionCodec
     cell: Cell | None = None
-    files: Mapping[str, tuple[str, int]] = attrs.field(factory=dict)
-    problem: str = ""
+    declaration_lines: Mapping[str, tuple[str, int]] = attrs.field(factory=dict)
+    cell_error: str = ""
 
     @cached_property
     def complete(self) -> Compilation:
         """The translation with its flow analysed, and with all diagnostics."""
-        return with_flow(self.compiled)
+        return analyse_flow(self.compiled)
 
     @property
     def text(self) -> str:
@@ -82,7 +82,7 @@ class Analysis:
         return occurrences(self.compiled.tokens, self.scopes)
 
     @cached_property
-    def statements(self) -> tuple[tree.Move | tree.Call | tree.Grasp, ...]:
+    def hinted_statements(self) -> tuple[tree.Move | tree.Call | tree.Grasp, ...]:
         """The statements that hints are given for, in the order of the text."""
         program = self.compiled.tree
         bodies = (*(procedure.body for procedure in program.procedures), *program.statements)
@@ -90,29 +90,29 @@ class Analysis:
         return tuple(sorted(hinted, key=lambda node: node.span.start))
 
     @cached_property
-    def lower(self) -> bool:
+    def uses_lower_case(self) -> bool:
         """Whether the program writes the words of the language in lower case."""
         first = next((token for token in self.compiled.tokens if token.kind is TokenKind.KEYWORD), None)
         return first is not None and first.text.islower()
 
-    def at(self, offset: int) -> Occurrence | None:
+    def occurrence_at(self, offset: int) -> Occurrence | None:
         """Return the name at a position, or right in front of it."""
         index = bisect_right(self.occurrences, offset, key=lambda occurrence: occurrence.start) - 1
         return self.occurrences[index] if index >= 0 and self.occurrences[index].end >= offset else None
 
     def token_at(self, offset: int) -> Token | None:
         """Return the token that holds a position."""
-        token = next(self.tokens_back(offset), None)
+        token = next(self.tokens_before(offset), None)
         return token if token is not None and offset < token.end else None
 
-    def tokens_back(self, offset: int) -> Iterator[Token]:
+    def tokens_before(self, offset: int) -> Iterator[Token]:
         """Give the tokens that start at a position or in front of it, the nearest first."""
         index = bisect_right(self.compiled.tokens, offset, key=lambda token: token.start)
         return reversed(self.compiled.tokens[:index])
 
-    def same(self, occurrence: Occurrence) -> tuple[Occurrence, ...]:
+    def same_occurrences(self, occurrence: Occurrence) -> tuple[Occurrence, ...]:
         """Return all occurrences of the same thing."""
-        return tuple(other for other in self.occurrences if other.is_same(occurrence))
+        return tuple(other for other in self.occurrences if other.refers_to_same(occurrence))
 
     def declaration(self, occurrence: Occurrence) -> tree.Name | None:
         """Return where the name was declared, if it was."""
@@ -124,7 +124,7 @@ class Analysis:
         return symbols.declared.get(occurrence.key)
 
 
-def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: Cells, settings: Settings) -> Analysis:
+def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: CellCache, settings: Settings) -> Analysis:
     """Analyse the names of a program with its cell and its imports; its flow is analysed when it is asked for.
 
     Args:
@@ -136,14 +136,14 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: Cells, 
     """
     file, problem = None, ""
     try:
-        file = cells.around(folder, codec.text, settings.cell)
+        file = cells.find_cell(folder, codec.text, settings.cell)
     except FileFormatError as error:
         problem = str(error)
     imports: list[Path] = []
 
     def read_import(path: str) -> Imported:
         assert folder is not None  # noqa: S101 - imports are read only with a folder
-        imported = cells.imported(folder, path)
+        imported = cells.read_import(folder, path)
         imports.append(folder / path)
         return imported
 
@@ -159,26 +159,26 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: Cells, 
     lines = {name: (file.path.absolute().as_uri(), line) for file in files for name, line in file.lines.items()}
     # Where nothing has arms, an imported file still tells where its frames are.
     imported = (imported.cell for imported in compiled.imports)
-    cell = compiled.cell or with_imports(next(filter(None, imported), None), compiled.imports)
-    return Analysis(compiled=compiled, codec=codec, cell=cell, files=lines, problem=problem)
+    cell = compiled.cell or add_imported_frames(next(filter(None, imported), None), compiled.imports)
+    return Analysis(compiled=compiled, codec=codec, cell=cell, declaration_lines=lines, cell_error=problem)
 
 
 @attrs.frozen(kw_only=True)
-class Before:
+class LexicalContext:
     """What stands in front of a place of a text, and behind it.
 
     Attributes:
-        tokens: those in front of the word, in order.
+        preceding: those in front of the word, in order.
         word: the word that is being written at the place; the place itself where there is none.
-        behind: the tokens from the word on.
+        following: the tokens from the word on.
     """
 
-    tokens: tuple[Token, ...]
+    preceding: tuple[Token, ...]
     word: Span
-    behind: tuple[Token, ...]
+    following: tuple[Token, ...]
 
 
-def before(text: str, offset: int, std: Standard) -> Before | None:
+def lexical_context(text: str, offset: int, std: Standard) -> LexicalContext | None:
     """Return what stands in front of a place; None within a comment or a text in quotes.
 
     Args:
@@ -199,7 +199,7 @@ def before(text: str, offset: int, std: Standard) -> Before | None:
     if behind[0].kind is TokenKind.STRING and behind[0].start < offset:
         return None
     opened = any(diagnostic.code == "E102" and diagnostic.span.end <= offset for diagnostic in scanned.diagnostics)
-    return None if opened else Before(tokens=front, word=word, behind=behind)
+    return None if opened else LexicalContext(preceding=front, word=word, following=behind)
 
 
 def _word_start(text: str, start: int, end: int) -> int:

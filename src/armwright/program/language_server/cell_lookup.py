@@ -36,7 +36,7 @@ class CellFile:
     lines: Mapping[str, int]
 
 
-class Cells:
+class CellCache:
     """Cell files that have been read; one that has changed since is read again."""
 
     def __init__(self) -> None:
@@ -49,15 +49,15 @@ class Cells:
         Raises:
             FileFormatError: it cannot be read.
         """
-        stamp = _stamp(path)
+        stamp = _file_stamp(path)
         known = self._read.get(path)
         if known is None or known[0] != stamp:
-            known = self._read[path] = stamp, _read(path)
+            known = self._read[path] = stamp, _read_cell_file(path)
         if isinstance(known[1], FileFormatError):
             raise known[1]
         return known[1]
 
-    def imported(self, folder: Path, name: str) -> Imported:
+    def read_import(self, folder: Path, name: str) -> Imported:
         """Return what the IMPORT of a file brings.
 
         Raises:
@@ -66,7 +66,7 @@ class Cells:
         cell = self.read(folder / name).cell
         return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
-    def around(self, folder: Path | None, text: str, setting: Path | None) -> CellFile | None:
+    def find_cell(self, folder: Path | None, text: str, setting: Path | None) -> CellFile | None:
         """Return the cell that a program acts on; None where there is none.
 
         Args:
@@ -84,13 +84,13 @@ class Cells:
             return file
         if folder is None:
             return None
-        imported = (self._with_arms(folder / name) for name in dict.fromkeys(_IMPORT.findall(text)))
+        imported = (self._read_with_arms(folder / name) for name in dict.fromkeys(_IMPORT.findall(text)))
         if (first := next(filter(None, imported), None)) is not None:
             return first
-        beside = list(filter(None, map(self._with_arms, _candidates(folder))))
+        beside = list(filter(None, map(self._read_with_arms, _cell_candidates(folder))))
         return beside[0] if len(beside) == 1 else None
 
-    def _with_arms(self, path: Path) -> CellFile | None:
+    def _read_with_arms(self, path: Path) -> CellFile | None:
         try:
             file = self.read(path)
         except FileFormatError:
@@ -98,7 +98,7 @@ class Cells:
         return file if file.cell.arms else None
 
 
-def _candidates(folder: Path) -> Iterator[Path]:
+def _cell_candidates(folder: Path) -> Iterator[Path]:
     """Give the files of a folder that might be cells."""
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES)
@@ -108,7 +108,7 @@ def _candidates(folder: Path) -> Iterator[Path]:
         return
 
 
-def _stamp(path: Path) -> tuple[int, int]:
+def _file_stamp(path: Path) -> tuple[int, int]:
     """Return what changes when a file does."""
     try:
         status = path.stat()
@@ -117,18 +117,18 @@ def _stamp(path: Path) -> tuple[int, int]:
     return status.st_mtime_ns, status.st_size
 
 
-def _read(path: Path) -> CellFile | FileFormatError:
+def _read_cell_file(path: Path) -> CellFile | FileFormatError:
     try:
         # A program or a setting names it, and neither may name what never ends.
         cell = read_cell(regular_file(path), arms_needed=False)
-        return CellFile(path=path, cell=cell, lines=_lines(path))
+        return CellFile(path=path, cell=cell, lines=_declaration_lines(path))
     except FileFormatError as error:
         return error
     except (ArmwrightError, ArithmeticError) as error:
         return FileFormatError(path, None, "", str(error))
 
 
-def _lines(path: Path) -> dict[str, int]:
+def _declaration_lines(path: Path) -> dict[str, int]:
     document = Document.read(path)
     lines: dict[str, int] = {}
     for table in ("visions", "frames", "arms"):

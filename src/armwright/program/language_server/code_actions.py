@@ -7,7 +7,7 @@ from itertools import chain
 import attrs
 from lsprotocol import types as lsp
 
-from armwright.program.diagnostics.fixes import apart
+from armwright.program.diagnostics.fixes import select_disjoint
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.text_edits import Edit
@@ -35,31 +35,31 @@ def code_actions(
         context: the kinds of cures that are asked for, and the diagnostics that the editor shows.
     """
     actions = []
-    if _wanted(lsp.CodeActionKind.QuickFix.value, context):
-        actions += quickfixes(analysis, uri, range_, context.diagnostics)
+    if _is_requested(lsp.CodeActionKind.QuickFix.value, context):
+        actions += quick_fixes(analysis, uri, range_, context.diagnostics)
     certain = all_fixes(analysis.complete.diagnostics)
-    if certain and _wanted(FIX_ALL, context):
+    if certain and _is_requested(FIX_ALL, context):
         edit = _workspace_edit(analysis, uri, certain)
         actions.append(lsp.CodeAction("apply all certain fixes", kind=FIX_ALL, edit=edit))
     return actions
 
 
-def _wanted(kind: str, context: lsp.CodeActionContext) -> bool:
+def _is_requested(kind: str, context: lsp.CodeActionContext) -> bool:
     """Whether an editor asks for a kind of cures, or for all kinds."""
     only = context.only
     prefixes = [prefix.value if isinstance(prefix, lsp.CodeActionKind) else prefix for prefix in only or ()]
     return only is None or any(f"{kind}.".startswith(f"{prefix}.") for prefix in prefixes)
 
 
-def quickfixes(
+def quick_fixes(
     analysis: Analysis, uri: str, range_: lsp.Range, published: Sequence[lsp.Diagnostic]
 ) -> list[lsp.CodeAction]:
     """Return the cures of what is wrong in a stretch of text: those that are certain, and names that were meant."""
     source, span = analysis.compiled.source, span_of(analysis.codec, range_)
     actions = []
     for diagnostic in analysis.complete.diagnostics:
-        cured = _meant(diagnostic, source)
-        if not any(_touch(part, span) for part in (cured.span, *(fix.span for fix in cured.fixes)) if cured.fixes):
+        cured = _with_suggested_word(diagnostic, source)
+        if not any(_overlap(part, span) for part in (cured.span, *(fix.span for fix in cured.fixes)) if cured.fixes):
             continue
         key = diagnostic.code, position(analysis.codec, diagnostic.span.start)
         shown = [one for one in published if (one.code, one.range.start) == key]
@@ -79,7 +79,7 @@ def _workspace_edit(analysis: Analysis, uri: str, edits: Iterable[Edit]) -> lsp.
     return lsp.WorkspaceEdit(changes={uri: text_edits(analysis.codec, edits)})
 
 
-def _meant(diagnostic: Diagnostic, source: Source) -> Diagnostic:
+def _with_suggested_word(diagnostic: Diagnostic, source: Source) -> Diagnostic:
     """Return a diagnostic that asks whether another word was meant with that word as its cure.
 
     It is no certain one, so that an editor offers it and `armwright fix` leaves it alone.
@@ -96,7 +96,7 @@ def _meant(diagnostic: Diagnostic, source: Source) -> Diagnostic:
 
 def all_fixes(diagnostics: Iterable[Diagnostic]) -> tuple[Edit, ...]:
     """Return all certain cures that can be made at once, in the order of the text; of two that touch the first."""
-    curable = apart([diagnostic for diagnostic in diagnostics if diagnostic.fixes])
+    curable = select_disjoint([diagnostic for diagnostic in diagnostics if diagnostic.fixes])
     edits = chain.from_iterable(map(_edits, curable))
     return tuple(sorted(edits, key=lambda edit: edit.span.start))
 
@@ -105,7 +105,7 @@ def _edits(diagnostic: Diagnostic) -> tuple[Edit, ...]:
     return tuple(Edit(fix.span, fix.replacement) for fix in diagnostic.fixes)
 
 
-def _touch(span: Span, other: Span) -> bool:
+def _overlap(span: Span, other: Span) -> bool:
     return span.start <= other.end and other.start <= span.end
 
 

@@ -12,12 +12,12 @@ from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source
 from armwright.program.language.units import DECLARABLE
 from armwright.program.language.words import CLOSING, SENSORS, VOCABULARIES, Standard
-from armwright.program.language_server.analysis import Analysis, Before, before
+from armwright.program.language_server.analysis import Analysis, LexicalContext, lexical_context
 from armwright.program.language_server.hover import signature
-from armwright.program.language_server.keyword_docs import WORDS, Word, explained
+from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_doc
 from armwright.program.language_server.positions import span_range
-from armwright.program.language_server.signature_help import open_call
-from armwright.program.language_server.symbol_index import What
+from armwright.program.language_server.signature_help import enclosing_call
+from armwright.program.language_server.symbol_index import NameKind
 from armwright.program.semantics.builtins import AXES, FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
@@ -44,7 +44,7 @@ _SNIPPETS = {
     "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,EVENT|} ;"),),
 }
 # How a word that wants more is written on.
-_GOES_ON = {
+_WORD_SNIPPETS = {
     "VIA": "VIA (${1:point})",
     **{word: f"{word} = ${{1:value}}" for word in ("APPROACH", "DEPARTURE", "SPEED", "BLEND", "DURATION")},
     "ON": "ON ${1:condition} DO ${2:HALT}",
@@ -66,7 +66,7 @@ _EXCLUDES: Mapping[str, frozenset[str]] = {
 
 
 @attrs.frozen(kw_only=True)
-class _Operand:
+class _OperandRule:
     """What may stand for a value or a name.
 
     Attributes:
@@ -87,33 +87,38 @@ class _Operand:
 _STEPS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV")
 _MEASURES = ("DIST", "FORCE")
 _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCALAR,))
-_NOTHING = _Operand()
-_ANYTHING = _Operand(kinds=frozenset(VariableKind) - {VariableKind.EVENT}, arms=True, functions=tuple(FUNCTIONS))
-_NUMBER = _Operand(kinds=_SCALAR, functions=_MEASURES)
-_POSE = _Operand(kinds=_FRAME, arms=True)
-_TRANS = _Operand(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
-_STEP = _Operand(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
-_EVENT = _Operand(kinds=frozenset((VariableKind.EVENT,)))
-_FITS = {VariableKind.SCALAR: _NUMBER, VariableKind.TRANS: _STEP, VariableKind.FRAME: _POSE, VariableKind.EVENT: _EVENT}
+_NO_OPERAND = _OperandRule()
+_ANY_VALUE = _OperandRule(kinds=frozenset(VariableKind) - {VariableKind.EVENT}, arms=True, functions=tuple(FUNCTIONS))
+_NUMBER = _OperandRule(kinds=_SCALAR, functions=_MEASURES)
+_POSE = _OperandRule(kinds=_FRAME, arms=True)
+_TRANS = _OperandRule(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
+_STEP = _OperandRule(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
+_EVENT = _OperandRule(kinds=frozenset((VariableKind.EVENT,)))
+_RULES_BY_KIND = {
+    VariableKind.SCALAR: _NUMBER,
+    VariableKind.TRANS: _STEP,
+    VariableKind.FRAME: _POSE,
+    VariableKind.EVENT: _EVENT,
+}
 # By what the parser calls it in its messages.
-_OPERANDS: Mapping[str, _Operand] = {
-    "a value or a text": _ANYTHING,
+_RULES_BY_NAME: Mapping[str, _OperandRule] = {
+    "a value or a text": _ANY_VALUE,
     "a condition": attrs.evolve(_NUMBER, words=("NOT",)),
     **dict.fromkeys(("a number", "a number of seconds", "a width"), _NUMBER),
-    **dict.fromkeys(("an index", "the name of a SCALAR"), _Operand(kinds=_SCALAR)),
+    **dict.fromkeys(("an index", "the name of a SCALAR"), _OperandRule(kinds=_SCALAR)),
     **dict.fromkeys(("a pose", "the name of a FRAME or an arm"), _POSE),
     "a TRANS": _TRANS,
-    "the name of a FRAME": _Operand(kinds=_FRAME),
+    "the name of a FRAME": _OperandRule(kinds=_FRAME),
     "the name of an EVENT": _EVENT,
-    "the name of a variable": _Operand(kinds=frozenset(VariableKind)),
-    "the name of a device": _Operand(devices=True),
-    "an arm such as ARM_1": _Operand(arms=True),
-    "a sensor": _Operand(words=SENSORS),
-    "a unit": _Operand(words=DECLARABLE),
+    "the name of a variable": _OperandRule(kinds=frozenset(VariableKind)),
+    "the name of a device": _OperandRule(devices=True),
+    "an arm such as ARM_1": _OperandRule(arms=True),
+    "a sensor": _OperandRule(words=SENSORS),
+    "a unit": _OperandRule(words=DECLARABLE),
 }
 # What functions take.
-_TAKEN: Mapping[str, _Operand] = {
-    "FORCE": _Operand(words=AXES),
+_ARGUMENT_RULES: Mapping[str, _OperandRule] = {
+    "FORCE": _OperandRule(words=AXES),
     "DIST": _POSE,
     "INV": _STEP,
     **dict.fromkeys(("XYZ", "ROTX", "ROTY", "ROTZ"), _NUMBER),
@@ -129,48 +134,48 @@ def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippe
         offset: the position.
         snippets: whether the editor leads from part to part of what is to be filled in.
     """
-    items = _items(codec, analysis, offset, snippets=snippets)
+    items = _completion_items(codec, analysis, offset, snippets=snippets)
     for number, item in enumerate(items):
         item.sort_text = f"{number:04d}"
     return items
 
 
-def _items(codec: PositionCodec, analysis: Analysis, offset: int, *, snippets: bool) -> list[CompletionItem]:
+def _completion_items(codec: PositionCodec, analysis: Analysis, offset: int, *, snippets: bool) -> list[CompletionItem]:
     text, compiled = codec.text, analysis.compiled
-    around = before(text, offset, compiled.standard)
+    around = lexical_context(text, offset, compiled.standard)
     if around is None:
         return []
     end = Token(TokenKind.END, "", "", around.word.start, around.word.start)
     source = Source(compiled.source.name, text)
-    expectation = expected(source, (*around.tokens, end), compiled.standard, declared=compiled.symbols.types)
+    expectation = expected(source, (*around.preceding, end), compiled.standard, declared=compiled.symbols.types)
     procedure = expectation.procedure if expectation.procedure in compiled.symbols.procedures else None
     scope = compiled.symbols.scope(procedure)
-    maker = _Maker(analysis, span_range(codec, around.word), scope, snippets=snippets)
-    operand = _NOTHING if expectation.operand is None else _operand(expectation, around.tokens, scope)
-    words = (*operand.words, *_words(expectation, around, compiled.standard))
+    maker = _ItemFactory(analysis, span_range(codec, around.word), scope, snippets=snippets)
+    operand = _NO_OPERAND if expectation.operand is None else _operand_rule(expectation, around.preceding, scope)
+    words = (*operand.words, *_allowed_words(expectation, around, compiled.standard))
     if not expectation.starts:
         operands = [*maker.arms(operand), *maker.names(operand.kinds), *maker.devices(operand)]
         return [*operands, *maker.functions(operand), *maker.words(words)]
     statements = [*maker.words(words, starts=True)]
     if "MOVE" not in words and "HALT" not in words:
         return statements
-    return [*statements, *maker.procedures(), *maker.names(_ANYTHING.kinds, starts=True)]
+    return [*statements, *maker.procedures(), *maker.names(_ANY_VALUE.kinds, starts=True)]
 
 
-def _operand(operand: Expected, tokens: Sequence[Token], scope: Scope) -> _Operand:
+def _operand_rule(operand: Expected, tokens: Sequence[Token], scope: Scope) -> _OperandRule:
     """Return what may stand for the value or name that is looked for."""
     assert operand.operand is not None  # noqa: S101 - the caller has looked
     wants, where = operand.operand
-    operand_ = _OPERANDS.get(wants)
-    call = open_call(tokens)
+    operand_ = _RULES_BY_NAME.get(wants)
+    call = enclosing_call(tokens)
     if call is not None and wants not in ("an index", "the name of a FRAME", "an arm such as ARM_1"):
-        operand_ = _argument(*call, scope.symbols)
+        operand_ = _argument_rule(*call, scope.symbols)
     elif where in ("after SPEED =", "after BLEND =", "after DURATION ="):
         operand_ = _NUMBER
     elif operand_ is None:
         kind = scope.type(operand.target)
         # Behind a comma stands a number of a matrix.
-        operand_ = _NUMBER if tokens[-1].key == "," else _ANYTHING if kind is None else _FITS[kind.kind]
+        operand_ = _NUMBER if tokens[-1].key == "," else _ANY_VALUE if kind is None else _RULES_BY_KIND[kind.kind]
     if tokens and tokens[-1].key == "*":
         # Behind `*` stands a step.
         if VariableKind.FRAME in operand_.kinds:
@@ -179,21 +184,23 @@ def _operand(operand: Expected, tokens: Sequence[Token], scope: Scope) -> _Opera
     return operand_
 
 
-def _argument(name: Token, number: int, symbols: Symbols) -> _Operand:
+def _argument_rule(name: Token, number: int, symbols: Symbols) -> _OperandRule:
     procedure = symbols.procedures.get(name.key)
     if procedure is None:
-        return _TAKEN.get(name.key, _NOTHING)
+        return _ARGUMENT_RULES.get(name.key, _NO_OPERAND)
     if number >= len(procedure.parameters):
-        return _NOTHING
+        return _NO_OPERAND
     kind = procedure.types.get(procedure.parameters[number])
-    return _ANYTHING if kind is None else _FITS[kind.kind]
+    return _ANY_VALUE if kind is None else _RULES_BY_KIND[kind.kind]
 
 
-def _words(operand: Expected, around: Before, std: Standard) -> Iterator[str]:
+def _allowed_words(operand: Expected, around: LexicalContext, std: Standard) -> Iterator[str]:
     """Give the words that may stand at a place; of clauses those that go with the others of their MOVE."""
     vocabulary = VOCABULARIES[std]
     clauses = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *VOCABULARIES[Standard.RLO_2].with_clauses))
-    written = operand.given | {token.key for token in takewhile(lambda token: not _ends(token), around.behind)}
+    written = operand.given | {
+        token.key for token in takewhile(lambda token: not _ends_clause(token), around.following)
+    }
     # What ends a stretch of statements is not offered behind each of them, unless it is being written.
     unasked = frozenset() if operand.starts or around.word.start < around.word.end else frozenset(CLOSING | {"RECOVER"})
     without_via = "VIA" not in written
@@ -206,14 +213,14 @@ def _words(operand: Expected, around: Before, std: Standard) -> Iterator[str]:
             yield word
 
 
-def _ends(token: Token) -> bool:
-    return token.key == ";" or (token.kind is TokenKind.KEYWORD and token.key in _STOPS)
+def _ends_clause(token: Token) -> bool:
+    return token.key == ";" or (token.kind is TokenKind.KEYWORD and token.key in _CLAUSE_ENDS)
 
 
-_STOPS = frozenset((*VOCABULARIES[Standard.RLO_2].closing, *VOCABULARIES[Standard.RLO_2].statements))
+_CLAUSE_ENDS = frozenset((*VOCABULARIES[Standard.RLO_2].closing, *VOCABULARIES[Standard.RLO_2].statements))
 
 
-class _Maker:
+class _ItemFactory:
     """Makes completions for one position."""
 
     def __init__(self, analysis: Analysis, word: Range, scope: Scope, *, snippets: bool) -> None:
@@ -235,21 +242,25 @@ class _Maker:
             text_edit=TextEdit(self._word, label if is_snippet and not self._snippets else text or label),
         )
 
-    def _cased(self, text: str) -> str:
+    def _match_case(self, text: str) -> str:
         """Return words of the language as this program writes them; names to be filled in are lower case anyway."""
-        return text.lower() if self._analysis.lower else text
+        return text.lower() if self._analysis.uses_lower_case else text
 
     def words(self, words: Iterable[str], *, starts: bool = False) -> Iterator[CompletionItem]:
         """Give words of the language and, where a statement starts, statements that begin with them."""
         for word in words:
             last = word.rpartition(" ")[2]
-            meaning = explained(last, "MOVE") or Word("", "")
-            written = _GOES_ON.get(last, "")
+            meaning = word_doc(last, "MOVE") or WordDoc("", "")
+            written = _WORD_SNIPPETS.get(last, "")
             written = (f"WITH {written}" if word != last else written) if written else ""
             kind = Kind.TypeParameter if word in _TYPES else Kind.Keyword
-            yield self._item(self._cased(word), kind, self._cased(written or word), meaning.form, meaning.text)
+            yield self._item(
+                self._match_case(word), kind, self._match_case(written or word), meaning.syntax, meaning.text
+            )
             for label, snippet in _SNIPPETS.get(word, ()) if starts and self._snippets else ():
-                yield self._item(self._cased(label), Kind.Snippet, self._cased(snippet), meaning.form, meaning.text)
+                yield self._item(
+                    self._match_case(label), Kind.Snippet, self._match_case(snippet), meaning.syntax, meaning.text
+                )
 
     def names(self, kinds: frozenset[VariableKind], *, starts: bool = False) -> Iterator[CompletionItem]:
         """Give the variables that can be seen and are of the right kind."""
@@ -262,7 +273,7 @@ class _Maker:
             if kind is None or kind.kind not in kinds or (starts and key == WORLD):
                 continue
             declared = self._scope.declared(key)
-            name = declared.text if declared else self._cased(key)
+            name = declared.text if declared else self._match_case(key)
             where = "" if declared else "predeclared" if key in PREDECLARED else "imported"
             where = f"of {local.node.name.text}" if local is not None and key in own else where
             text = f"{name}[${{1:1}}]" if kind.sizes else name
@@ -275,28 +286,28 @@ class _Maker:
             return ""
         return f"attached to {frames.parent(key)} in the cell"
 
-    def arms(self, operand: _Operand) -> Iterator[CompletionItem]:
+    def arms(self, operand: _OperandRule) -> Iterator[CompletionItem]:
         """Give the arms of the cell, or those of the program where there is none."""
         if not operand.arms:
             return
         cell = self._analysis.cell
-        written = (occurrence.key for occurrence in self._analysis.occurrences if occurrence.what is What.ARM)
+        written = (occurrence.key for occurrence in self._analysis.occurrences if occurrence.kind is NameKind.ARM)
         used = dict.fromkeys(("ARM_1", *filter(is_arm, written)), "arm")
         arms = used if cell is None else {name: arm.arm.name for name, arm in cell.arms.items()}
         for name in sorted(arms):
             yield self._item(name, Kind.Constant, "", arms[name])
 
-    def devices(self, operand: _Operand) -> Iterator[CompletionItem]:
+    def devices(self, operand: _OperandRule) -> Iterator[CompletionItem]:
         """Give the devices of the cell."""
         if operand.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):
-                yield self._item(self._cased(name), Kind.Property, "", "device")
+                yield self._item(self._match_case(name), Kind.Property, "", "device")
 
-    def functions(self, operand: _Operand) -> Iterator[CompletionItem]:
+    def functions(self, operand: _OperandRule) -> Iterator[CompletionItem]:
         """Give functions of the language, which RLO-83 has none of."""
         for name in operand.functions if self._analysis.compiled.standard is Standard.RLO_2 else ():
-            cased, meaning = self._cased(name), WORDS[name]
-            yield self._item(cased, Kind.Function, f"{cased}($1)", meaning.form, meaning.text)
+            cased, meaning = self._match_case(name), WORDS[name]
+            yield self._item(cased, Kind.Function, f"{cased}($1)", meaning.syntax, meaning.text)
 
     def procedures(self) -> Iterator[CompletionItem]:
         """Give the procedures of the program."""

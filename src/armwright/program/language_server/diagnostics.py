@@ -8,7 +8,7 @@ from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.positions import span_range
 
 
-def diagnostics(analysis: Analysis, uri: str, *, related: bool) -> list[lsp.Diagnostic]:
+def lsp_diagnostics(analysis: Analysis, uri: str, *, related: bool) -> list[lsp.Diagnostic]:
     """Return what is wrong with a program.
 
     Args:

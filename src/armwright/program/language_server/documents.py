@@ -14,9 +14,9 @@ from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.positions import span_of
 
 # How many lines a program may have that is analysed at every change.
-SHORT_LINES = 2000
+MAX_SHORT_LINES = 2000
 # How long nothing has to be typed before a program is analysed though nobody asks: short ones and long ones [s].
-PAUSE, PAUSE_LONG = 0.02, 0.5
+TYPING_DELAY, LONG_TYPING_DELAY = 0.02, 0.5
 
 
 Analyse: TypeAlias = "Callable[[Document], Analysis]"
@@ -31,7 +31,7 @@ class Document:
         path: of its file; None where it has none.
         version: as the editor counts.
         codec: of its text.
-        last: the analysis of the text, or of one before; None before the first.
+        last_analysis: the analysis of the text, or of one before; None before the first.
     """
 
     def __init__(
@@ -41,12 +41,12 @@ class Document:
         self.uri, self.codec, self.version = uri, codec, version
         path = to_fs_path(uri) if uri.startswith("file:") else None
         self.path = None if path is None else Path(path)
-        self.last: Analysis | None = None
+        self.last_analysis: Analysis | None = None
         self._analyse, self._publish = analyse, publish
         self._outdated = True
         self._timer: asyncio.TimerHandle | None = None
         self._published = asyncio.Event()
-        self.outdate()
+        self.invalidate()
 
     @property
     def text(self) -> str:
@@ -61,7 +61,7 @@ class Document:
     @property
     def is_short(self) -> bool:
         """Whether it is analysed at every change."""
-        return len(self.codec.starts) <= SHORT_LINES
+        return len(self.codec.starts) <= MAX_SHORT_LINES
 
     def change(self, changes: Sequence[lsp.TextDocumentContentChangeEvent], version: int | None) -> None:
         """Make changes, one after the other; a change that names no range brings the whole text anew."""
@@ -71,21 +71,21 @@ class Document:
                 gone = span_of(self.codec, change.range)
             self.codec = PositionCodec(text[: gone.start] + change.text + text[gone.end :], self.codec.encoding)
         self.version = version
-        self.outdate()
+        self.invalidate()
 
-    def outdate(self) -> None:
+    def invalidate(self) -> None:
         """Take the analysis for old: the text has changed, or what it depends on."""
         self._outdated = True
         self._published.clear()
         self._stop_timer()
-        pause = PAUSE if self.is_short else PAUSE_LONG
+        pause = TYPING_DELAY if self.is_short else LONG_TYPING_DELAY
         self._timer = asyncio.get_running_loop().call_later(pause, self.publish)
 
     def analyse(self) -> Analysis:
         """Return the analysis of the text as it is now."""
-        if self._outdated or self.last is None:
-            self.last, self._outdated = self._analyse(self), False
-        return self.last
+        if self._outdated or self.last_analysis is None:
+            self.last_analysis, self._outdated = self._analyse(self), False
+        return self.last_analysis
 
     def publish(self) -> None:
         """Publish what is wrong with the text as it is now."""

@@ -12,20 +12,20 @@ from armwright.program.language.text_edits import smallest_edit
 from armwright.program.language_server.code_actions import FIX_ALL, code_actions
 from armwright.program.language_server.completions import completions
 from armwright.program.language_server.hover import hover
-from armwright.program.language_server.inlay_hints import hints
-from armwright.program.language_server.outline import folds, outline
+from armwright.program.language_server.inlay_hints import inlay_hints
+from armwright.program.language_server.outline import document_symbols, folding_ranges
 from armwright.program.language_server.positions import offset_of, span_range, text_edits
-from armwright.program.language_server.rename import nameable, rename
+from armwright.program.language_server.rename import rename, renameable_occurrence
 from armwright.program.language_server.semantic_tokens import (
     KINDS,
     MODIFIERS,
-    Stretch,
-    difference,
-    encoded,
-    line_stretches,
+    SemanticToken,
+    encode,
+    line_tokens,
+    token_edit,
 )
-from armwright.program.language_server.server import RloServer, refusal
-from armwright.program.language_server.signature_help import signature_at
+from armwright.program.language_server.server import RloServer, request_error
+from armwright.program.language_server.signature_help import signature_help
 from armwright.program.language_server.symbol_index import Occurrence
 
 _LEGEND = lsp.SemanticTokensLegend(token_types=list(KINDS), token_modifiers=list(MODIFIERS))
@@ -33,7 +33,13 @@ _LEGEND = lsp.SemanticTokensLegend(token_types=list(KINDS), token_modifiers=list
 
 def register(server: RloServer) -> None:
     """Let a server answer."""
-    for features in (_position_features, _name_features, _rename_features, _document_features, _colours):
+    for features in (
+        _position_features,
+        _name_features,
+        _rename_features,
+        _document_features,
+        _semantic_token_features,
+    ):
         features(server)
 
 
@@ -43,16 +49,18 @@ def register(server: RloServer) -> None:
 def _position_features(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_HOVER)
     async def on_hover(params: lsp.HoverParams) -> lsp.Hover | None:
-        analysis, offset = await server.located(params.text_document, params.position)
-        markdown = lsp.MarkupKind.Markdown in (server.can("text_document", "hover", "content_format") or ())
+        analysis, offset = await server.locate(params.text_document, params.position)
+        markdown = lsp.MarkupKind.Markdown in (
+            server.client_capability("text_document", "hover", "content_format") or ()
+        )
         return hover(analysis, offset, markdown=markdown)
 
     @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[" ", "(", "=", ","]))
     async def on_completion(params: lsp.CompletionParams) -> lsp.CompletionList:
         document = server.document(params.text_document.uri)
         # Names may be those from before the last words, which are read anew in any case.
-        analysis = document.last or await document.analysis()
-        snippets = bool(server.can("text_document", "completion", "completion_item", "snippet_support"))
+        analysis = document.last_analysis or await document.analysis()
+        snippets = bool(server.client_capability("text_document", "completion", "completion_item", "snippet_support"))
         offset = offset_of(document.codec, params.position)
         items = completions(document.codec, analysis, offset, snippets=snippets)
         return lsp.CompletionList(is_incomplete=False, items=items)
@@ -60,8 +68,8 @@ def _position_features(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_SIGNATURE_HELP, lsp.SignatureHelpOptions(trigger_characters=["(", ","]))
     async def on_signature(params: lsp.SignatureHelpParams) -> lsp.SignatureHelp | None:
         document = server.document(params.text_document.uri)
-        analysis = document.last or await document.analysis()
-        return signature_at(document.text, analysis, offset_of(document.codec, params.position))
+        analysis = document.last_analysis or await document.analysis()
+        return signature_help(document.text, analysis, offset_of(document.codec, params.position))
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------
@@ -70,23 +78,23 @@ def _position_features(server: RloServer) -> None:
 def _name_features(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
     async def on_definition(params: lsp.DefinitionParams) -> lsp.Location | None:
-        analysis, offset = await server.located(params.text_document, params.position)
-        occurrence = analysis.at(offset)
+        analysis, offset = await server.locate(params.text_document, params.position)
+        occurrence = analysis.occurrence_at(offset)
         if occurrence is None:
             return None
         declared = analysis.declaration(occurrence)
         if declared is not None:
             return lsp.Location(params.text_document.uri, span_range(analysis.codec, declared.span))
-        if occurrence.key not in analysis.files:
+        if occurrence.key not in analysis.declaration_lines:
             return None
-        uri, line = analysis.files[occurrence.key]
+        uri, line = analysis.declaration_lines[occurrence.key]
         start = lsp.Position(line - 1, 0)
         return lsp.Location(uri, lsp.Range(start, start))
 
     async def same(document: lsp.TextDocumentIdentifier, where: lsp.Position) -> list[tuple[Occurrence, lsp.Range]]:
-        analysis, offset = await server.located(document, where)
-        occurrence = analysis.at(offset)
-        others = () if occurrence is None else analysis.same(occurrence)
+        analysis, offset = await server.locate(document, where)
+        occurrence = analysis.occurrence_at(offset)
+        others = () if occurrence is None else analysis.same_occurrences(occurrence)
         return [(other, span_range(analysis.codec, other.span)) for other in others]
 
     @server.feature(lsp.TEXT_DOCUMENT_REFERENCES)
@@ -107,21 +115,21 @@ def _name_features(server: RloServer) -> None:
 def _rename_features(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_PREPARE_RENAME)
     async def on_prepare_rename(params: lsp.PrepareRenameParams) -> lsp.PrepareRenamePlaceholder:
-        analysis, offset = await server.located(params.text_document, params.position)
+        analysis, offset = await server.locate(params.text_document, params.position)
         try:
-            occurrence = nameable(analysis, offset)
+            occurrence = renameable_occurrence(analysis, offset)
         except ArmwrightError as error:
-            raise refusal(str(error)) from error
+            raise request_error(str(error)) from error
         name = analysis.text[occurrence.start : occurrence.end]
         return lsp.PrepareRenamePlaceholder(span_range(analysis.codec, occurrence.span), name)
 
     @server.feature(lsp.TEXT_DOCUMENT_RENAME, lsp.RenameOptions(prepare_provider=True))
     async def on_rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit:
-        analysis, offset = await server.located(params.text_document, params.position)
+        analysis, offset = await server.locate(params.text_document, params.position)
         try:
             edits = rename(analysis, offset, params.new_name.strip())
         except ArmwrightError as error:
-            raise refusal(str(error)) from error
+            raise request_error(str(error)) from error
         return lsp.WorkspaceEdit(changes={params.text_document.uri: text_edits(analysis.codec, edits)})
 
 
@@ -143,34 +151,34 @@ def _document_features(server: RloServer) -> None:
         try:
             after = formatted_around(Source(document.name, before), std=server.settings.std)
         except ArmwrightError as error:
-            raise refusal(str(error)) from error
+            raise request_error(str(error)) from error
         if "\r\n" in before:
             after = after.replace("\n", "\r\n")
         return [] if after == before else text_edits(document.codec, (smallest_edit(before, after),))
 
     @server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
     async def on_symbols(params: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
-        return outline(await server.analysis(params.text_document))
+        return document_symbols(await server.analysis(params.text_document))
 
     @server.feature(lsp.TEXT_DOCUMENT_FOLDING_RANGE)
     async def on_folding(params: lsp.FoldingRangeParams) -> list[lsp.FoldingRange]:
-        return folds(await server.analysis(params.text_document))
+        return folding_ranges(await server.analysis(params.text_document))
 
     @server.feature(lsp.TEXT_DOCUMENT_INLAY_HINT)
     async def on_hints(params: lsp.InlayHintParams) -> list[lsp.InlayHint]:
-        return hints(await server.analysis(params.text_document), params.range)
+        return inlay_hints(await server.analysis(params.text_document), params.range)
 
 
 # ---- colours -------------------------------------------------------------------------------------------------------
 
 
-def _colours(server: RloServer) -> None:
-    sent: dict[str, tuple[str, Sequence[list[Stretch]]]] = {}
+def _semantic_token_features(server: RloServer) -> None:
+    sent: dict[str, tuple[str, Sequence[list[SemanticToken]]]] = {}
     numbers = itertools.count(1)
 
-    async def coloured(document: lsp.TextDocumentIdentifier) -> tuple[str, list[list[Stretch]]]:
+    async def coloured(document: lsp.TextDocumentIdentifier) -> tuple[str, list[list[SemanticToken]]]:
         """Return the coloured lines of a document with the number under which the editor keeps them."""
-        lines = line_stretches(await server.analysis(document))
+        lines = line_tokens(await server.analysis(document))
         for closed in set(sent) - set(server.documents):
             del sent[closed]
         sent[document.uri] = str(next(numbers)), lines
@@ -179,19 +187,19 @@ def _colours(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, _LEGEND)
     async def on_full(params: lsp.SemanticTokensParams) -> lsp.SemanticTokens:
         result, lines = await coloured(params.text_document)
-        return lsp.SemanticTokens(encoded(lines), result)
+        return lsp.SemanticTokens(encode(lines), result)
 
     @server.feature(lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL_DELTA, _LEGEND)
     async def on_delta(params: lsp.SemanticTokensDeltaParams) -> lsp.SemanticTokens | lsp.SemanticTokensDelta:
         before, old = sent.get(params.text_document.uri, ("", ()))
         result, lines = await coloured(params.text_document)
         if before != params.previous_result_id:
-            return lsp.SemanticTokens(encoded(lines), result)
-        start, gone, come = difference(old, lines)
+            return lsp.SemanticTokens(encode(lines), result)
+        start, gone, come = token_edit(old, lines)
         edits = [lsp.SemanticTokensEdit(start, gone, come)] if gone or come else []
         return lsp.SemanticTokensDelta(edits, result)
 
     @server.feature(lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_RANGE, _LEGEND)
     async def on_range(params: lsp.SemanticTokensRangeParams) -> lsp.SemanticTokens:
-        lines = line_stretches(await server.analysis(params.text_document))
-        return lsp.SemanticTokens(encoded(lines, params.range.start.line, params.range.end.line))
+        lines = line_tokens(await server.analysis(params.text_document))
+        return lsp.SemanticTokens(encode(lines, params.range.start.line, params.range.end.line))

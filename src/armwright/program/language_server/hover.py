@@ -12,9 +12,9 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 from armwright.program.language.units import UNITS, UnitSystem, convert, dimension
 from armwright.program.language_server.analysis import Analysis
-from armwright.program.language_server.keyword_docs import explained
+from armwright.program.language_server.keyword_docs import word_doc
 from armwright.program.language_server.positions import span_range
-from armwright.program.language_server.symbol_index import Occurrence, What
+from armwright.program.language_server.symbol_index import NameKind, Occurrence
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
@@ -22,7 +22,7 @@ from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.vm.value_text import value_text
 
 # Words that a statement can start with and that a word of the same statement is looked up by.
-_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE"))
+_STATEMENT_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE"))
 
 
 # What something is, as the language would write it; and what there is to say about it, a sentence or fact each.
@@ -37,10 +37,10 @@ def hover(analysis: Analysis, offset: int, *, markdown: bool) -> lsp.Hover | Non
         offset: the position.
         markdown: whether the editor shows Markdown.
     """
-    item = analysis.at(offset) or analysis.token_at(offset)
+    item = analysis.occurrence_at(offset) or analysis.token_at(offset)
     if item is None:
         return None
-    described = _of_name(analysis, item) if isinstance(item, Occurrence) else _of_token(analysis, item)
+    described = _describe_name(analysis, item) if isinstance(item, Occurrence) else _describe_token(analysis, item)
     if described is None:
         return None
     code, lines = described
@@ -51,12 +51,12 @@ def hover(analysis: Analysis, offset: int, *, markdown: bool) -> lsp.Hover | Non
     return lsp.Hover(content, span_range(analysis.codec, item.span))
 
 
-def _of_token(analysis: Analysis, token: Token) -> _Description | None:
+def _describe_token(analysis: Analysis, token: Token) -> _Description | None:
     """Return what there is to say about a word of the language or a number with a unit."""
     if token.kind is TokenKind.NUMBER:
-        return _of_number(token, analysis.compiled.symbols.units)
-    word = explained(token.key, _statement(analysis, token)) if token.kind is TokenKind.KEYWORD else None
-    return None if word is None else (word.form, [word.text])
+        return _describe_number(token, analysis.compiled.symbols.units)
+    word = word_doc(token.key, _statement_word(analysis, token)) if token.kind is TokenKind.KEYWORD else None
+    return None if word is None else (word.syntax, [word.text])
 
 
 def signature(procedure: tree.Procedure) -> tuple[str, tuple[tuple[int, int], ...]]:
@@ -78,39 +78,39 @@ def _type_text(written: tree.TypeName) -> str:
     return f"ARRAY [{sizes}] OF {name}" if sizes else name
 
 
-def _statement(analysis: Analysis, token: Token) -> str:
+def _statement_word(analysis: Analysis, token: Token) -> str:
     """Return the word that starts the statement that a token stands in."""
-    own = takewhile(lambda before: before.key != ";", analysis.tokens_back(token.start))
-    starts = (before.key for before in own if before.key in _STARTS and before.kind is TokenKind.KEYWORD)
+    own = takewhile(lambda before: before.key != ";", analysis.tokens_before(token.start))
+    starts = (before.key for before in own if before.key in _STATEMENT_STARTS and before.kind is TokenKind.KEYWORD)
     return next(starts, "")
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------
 
 
-def _of_name(analysis: Analysis, occurrence: Occurrence) -> _Description | None:
+def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description | None:
     key, text = occurrence.key, analysis.text[occurrence.start : occurrence.end]
     entry: _Description | None = None
-    match occurrence.what:
-        case What.VARIABLE:
-            entry = _variable(analysis, occurrence, text)
-        case What.ARM:
-            entry = f"{key} : FRAME", _arm(analysis, key)
-        case What.PROCEDURE:
-            entry = _procedure(analysis, key)
-        case What.DEVICE:
-            entry = text, [_device(analysis, key)]
-        case What.UNIT if key in UNITS:
+    match occurrence.kind:
+        case NameKind.VARIABLE:
+            entry = _describe_variable(analysis, occurrence, text)
+        case NameKind.ARM:
+            entry = f"{key} : FRAME", _describe_arm(analysis, key)
+        case NameKind.PROCEDURE:
+            entry = _describe_procedure(analysis, key)
+        case NameKind.DEVICE:
+            entry = text, [_describe_device(analysis, key)]
+        case NameKind.UNIT if key in UNITS:
             entry = key, [f"a unit of {dimension(key)}"]
-        case What.AXIS:
+        case NameKind.AXIS:
             entry = key, [f"the {key.lower()} axis"]
-        case What.FUNCTION | What.SENSOR if (word := explained(key)) is not None:
-            value = f" : {FUNCTIONS[key].gives.name}" if occurrence.what is What.FUNCTION else ""
-            entry = word.form + value, [word.text]
+        case NameKind.FUNCTION | NameKind.SENSOR if (word := word_doc(key)) is not None:
+            value = f" : {FUNCTIONS[key].gives.name}" if occurrence.kind is NameKind.FUNCTION else ""
+            entry = word.syntax + value, [word.text]
     return entry
 
 
-def _procedure(analysis: Analysis, key: str) -> _Description | None:
+def _describe_procedure(analysis: Analysis, key: str) -> _Description | None:
     procedure = analysis.compiled.symbols.procedures.get(key)
     if procedure is None:
         return None
@@ -118,7 +118,7 @@ def _procedure(analysis: Analysis, key: str) -> _Description | None:
     return signature(procedure.node)[0], [f"declared in line {line}"]
 
 
-def _variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:
+def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:
     symbols = analysis.compiled.symbols
     declared = analysis.declaration(occurrence)
     code = f"{declared.text if declared else text} : {occurrence.type or 'of an invalid type'}"
@@ -135,11 +135,11 @@ def _variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Descrip
     elif occurrence.key in PREDECLARED:
         lines.append("predeclared")
     if occurrence.owner is None and occurrence.type == VariableType(VariableKind.FRAME):
-        lines += _frame(analysis, occurrence.key)
+        lines += _describe_frame(analysis, occurrence.key)
     return code, lines
 
 
-def _frame(analysis: Analysis, key: str) -> list[str]:
+def _describe_frame(analysis: Analysis, key: str) -> list[str]:
     """Return where the cell has a frame at the start."""
     cell, frames = analysis.cell, analysis.frames
     if cell is None or frames is None:
@@ -148,18 +148,18 @@ def _frame(analysis: Analysis, key: str) -> list[str]:
     if key in frames:
         parent = frames.parent(key)
         if parent is not None:
-            lines.append(f"attached to {_shown(parent)} in {cell.name}")
+            lines.append(f"attached to {_parent_text(parent)} in {cell.name}")
         if parent is not None and frames.has_value(key):
             units = analysis.compiled.symbols.units
             if parent != "WORLD":
-                lines.append(f"relative to {_shown(parent)}: {pose_text(frames.relation(key, parent), units)}")
+                lines.append(f"relative to {_parent_text(parent)}: {pose_text(frames.relation(key, parent), units)}")
             lines.append(f"in the world: {pose_text(frames.world(key), units)}")
     if count := len(cell.visions.get(key, ())):
         lines.append(f"the camera of {cell.name} has {count} answer{'s' * (count > 1)} for it")
     return lines
 
 
-def _arm(analysis: Analysis, key: str) -> list[str]:
+def _describe_arm(analysis: Analysis, key: str) -> list[str]:
     """Return what the cell knows of an arm."""
     cell, frames = analysis.cell, analysis.frames
     if cell is None or frames is None:
@@ -174,14 +174,14 @@ def _arm(analysis: Analysis, key: str) -> list[str]:
     ]
 
 
-def _device(analysis: Analysis, key: str) -> str:
+def _describe_device(analysis: Analysis, key: str) -> str:
     cell = analysis.cell
     if cell is None or cell.devices is None:
         return "a device"
     return f"a device of {cell.name}" if key in cell.devices else f"{cell.name} has no such device"
 
 
-def _shown(frame: str) -> str:
+def _parent_text(frame: str) -> str:
     arm = frame.removesuffix(base_name(""))
     return f"the base of {arm}" if arm != frame and is_arm(arm) else frame
 
@@ -194,7 +194,7 @@ def pose_text(X: Array, units: UnitSystem) -> str:
 # ---- numbers -------------------------------------------------------------------------------------------------------
 
 
-def _of_number(token: Token, units: UnitSystem) -> _Description | None:
+def _describe_number(token: Token, units: UnitSystem) -> _Description | None:
     """Return what a number with a unit is worth in the program."""
     unit = token.text[len(token.key) :].upper()
     if unit not in UNITS or token.damaged:

@@ -14,31 +14,31 @@ from armwright.program.language_server.positions import offset_of, position
 from armwright.program.syntax import tree
 
 # A statement that starts further in front of a place does not reach it.
-_REACH = 4000
+_MAX_STATEMENT_LENGTH = 4000
 
 
-def hints(analysis: Analysis, within: lsp.Range) -> list[lsp.InlayHint]:
+def inlay_hints(analysis: Analysis, within: lsp.Range) -> list[lsp.InlayHint]:
     """Return the words that belong to a stretch of text, in order."""
-    statements = analysis.statements
+    statements = analysis.hinted_statements
     start, end = offset_of(analysis.codec, within.start), offset_of(analysis.codec, within.end)
-    first = bisect_left(statements, start - _REACH, key=lambda statement: statement.span.start)
+    first = bisect_left(statements, start - _MAX_STATEMENT_LENGTH, key=lambda statement: statement.span.start)
     near = takewhile(lambda statement: statement.span.start <= end, statements[first:])
-    found = [hint for statement in near for hint in _of(analysis, statement)]
+    found = [hint for statement in near for hint in _statement_hints(analysis, statement)]
     own = (hint for hint in found if within.start <= hint.position <= within.end)
     return sorted(own, key=lambda hint: (hint.position.line, hint.position.character))
 
 
-def _of(analysis: Analysis, statement: tree.Move | tree.Call | tree.Grasp) -> Iterator[lsp.InlayHint]:
+def _statement_hints(analysis: Analysis, statement: tree.Move | tree.Call | tree.Grasp) -> Iterator[lsp.InlayHint]:
     match statement:
         case tree.Move():
-            yield from _move(analysis, statement)
+            yield from _move_hints(analysis, statement)
         case tree.Grasp(arm=None):
             flow = analysis.complete.flow
             arm = None if flow is None else flow.arms.get(statement.span.start)
             if arm:
                 yield _hint(analysis, statement.span.end, arm, "the arm that was named or moved last")
         case tree.Call():
-            yield from _call(analysis, statement)
+            yield from _call_hints(analysis, statement)
 
 
 def _hint(analysis: Analysis, offset: int, text: str, tooltip: str, *, names_parameter: bool = False) -> lsp.InlayHint:
@@ -53,7 +53,7 @@ def _hint(analysis: Analysis, offset: int, text: str, tooltip: str, *, names_par
     )
 
 
-def _move(analysis: Analysis, move: tree.Move) -> Iterator[lsp.InlayHint]:
+def _move_hints(analysis: Analysis, move: tree.Move) -> Iterator[lsp.InlayHint]:
     if isinstance(move.moved, tree.Poison) or any(isinstance(node, tree.Poison) for node in tree.walk(move)):
         return
     source, flow = analysis.compiled.source, analysis.complete.flow
@@ -67,7 +67,7 @@ def _move(analysis: Analysis, move: tree.Move) -> Iterator[lsp.InlayHint]:
     yield _hint(analysis, move.span.end, text, tooltip)
 
 
-def _call(analysis: Analysis, call: tree.Call) -> Iterator[lsp.InlayHint]:
+def _call_hints(analysis: Analysis, call: tree.Call) -> Iterator[lsp.InlayHint]:
     procedure = analysis.compiled.symbols.procedures.get(call.name.key)
     if procedure is None:
         return

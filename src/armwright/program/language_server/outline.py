@@ -17,20 +17,22 @@ from armwright.program.syntax.lexer import Token, TokenKind
 _KINDS = {VariableKind.FRAME: SymbolKind.Struct, VariableKind.EVENT: SymbolKind.Event}
 
 
-def outline(analysis: Analysis) -> list[DocumentSymbol]:
+def document_symbols(analysis: Analysis) -> list[DocumentSymbol]:
     """Return what a program declares, in the order of the text."""
     symbols, codec = analysis.compiled.symbols, analysis.codec
     declared: list[DocumentSymbol] = []
     for header in analysis.compiled.tree.headers:
         if isinstance(header, tree.Declaration):
-            declared += _variables(codec, header, symbols.types)
+            declared += _variable_symbols(codec, header, symbols.types)
         elif isinstance(header, tree.Procedure):
             own = symbols.procedures.get(header.name.key)
             types = {} if own is None else own.types
             children = [
-                symbol for part in header.parameters for symbol in _variables(codec, part, types, parameters=True)
+                symbol
+                for part in header.parameters
+                for symbol in _variable_symbols(codec, part, types, parameters=True)
             ]
-            children += [symbol for part in header.declarations for symbol in _variables(codec, part, types)]
+            children += [symbol for part in header.declarations for symbol in _variable_symbols(codec, part, types)]
             whole, name = span_range(codec, header.span), span_range(codec, header.name.span)
             # A name that is missing may stand anywhere.
             name = name if whole.start <= name.start and name.end <= whole.end else whole
@@ -42,7 +44,7 @@ def outline(analysis: Analysis) -> list[DocumentSymbol]:
     return sorted(declared, key=lambda symbol: (symbol.range.start.line, symbol.range.start.character))
 
 
-def _variables(
+def _variable_symbols(
     codec: PositionCodec,
     declaration: tree.Declaration,
     types: Mapping[str, VariableType | None],
@@ -66,19 +68,19 @@ _OPENING = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
 _CLOSING = frozenset(("END", "COEND", "UNTIL"))
 
 
-def folds(analysis: Analysis) -> list[FoldingRange]:
+def folding_ranges(analysis: Analysis) -> list[FoldingRange]:
     """Return what can be folded away: blocks, declarations, statements and comments of several lines."""
     line_of = analysis.codec.line_of
-    comments = _comments(analysis)
-    stretches = {*_blocks(analysis), *_parts(analysis), *comments}
-    stretches |= {(line_of(node.span.start), line_of(node.span.end)) for node in analysis.statements}
+    comments = _comment_lines(analysis)
+    stretches = {*_block_lines(analysis), *_declaration_lines(analysis), *comments}
+    stretches |= {(line_of(node.span.start), line_of(node.span.end)) for node in analysis.hinted_statements}
     # Of those that begin in one line the longest comes last.
     longest = dict(sorted(stretches))
     kinds = dict.fromkeys(comments, FoldingRangeKind.Comment)
     return [FoldingRange(*lines, kind=kinds.get(lines)) for lines in longest.items() if lines[0] < lines[1]]
 
 
-def _blocks(analysis: Analysis) -> Iterator[_Lines]:
+def _block_lines(analysis: Analysis) -> Iterator[_Lines]:
     line_of, opened = analysis.codec.line_of, []
     for token in analysis.compiled.tokens:
         if token.kind is not TokenKind.KEYWORD:
@@ -92,7 +94,7 @@ def _blocks(analysis: Analysis) -> Iterator[_Lines]:
             yield line_of(opened.pop().start), line_of(token.end)
 
 
-def _parts(analysis: Analysis) -> Iterator[_Lines]:
+def _declaration_lines(analysis: Analysis) -> Iterator[_Lines]:
     """Give VAR parts and procedures."""
     line_of = analysis.codec.line_of
     part: Token | None = None
@@ -113,7 +115,7 @@ def _parts(analysis: Analysis) -> Iterator[_Lines]:
             head = None
 
 
-def _comments(analysis: Analysis) -> list[_Lines]:
+def _comment_lines(analysis: Analysis) -> list[_Lines]:
     """Return the lines of comments, those that follow one another together."""
     line_of, source = analysis.codec.line_of, analysis.compiled.source
     comments: list[_Lines] = []

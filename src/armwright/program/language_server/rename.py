@@ -6,51 +6,51 @@ from armwright.errors import InvalidValueError
 from armwright.program.language.text_edits import Edit
 from armwright.program.language.words import VOCABULARIES, is_later
 from armwright.program.language_server.analysis import Analysis
-from armwright.program.language_server.symbol_index import Occurrence, What
+from armwright.program.language_server.symbol_index import NameKind, Occurrence
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ARM = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)
-_NO_NAMES = {
-    What.ARM: "an arm, whose name is defined by the cell",
-    What.DEVICE: "a device, whose name is defined by the cell",
-    What.FUNCTION: "a function of the language",
-    What.UNIT: "a unit",
-    What.SENSOR: "a reserved word",
-    What.AXIS: "an axis",
+_NOT_RENAMEABLE = {
+    NameKind.ARM: "an arm, whose name is defined by the cell",
+    NameKind.DEVICE: "a device, whose name is defined by the cell",
+    NameKind.FUNCTION: "a function of the language",
+    NameKind.UNIT: "a unit",
+    NameKind.SENSOR: "a reserved word",
+    NameKind.AXIS: "an axis",
 }
 
 
-def nameable(analysis: Analysis, offset: int) -> Occurrence:
+def renameable_occurrence(analysis: Analysis, offset: int) -> Occurrence:
     """Return the name at a position, which can be changed.
 
     Raises:
         InvalidValueError: there is none; the text says what is there.
     """
-    occurrence = analysis.at(offset)
+    occurrence = analysis.occurrence_at(offset)
     if occurrence is None:
         token = analysis.token_at(offset)
         what = f"`{token.text}` is no name" if token is not None else "here is no name"
         raise InvalidValueError(f"{what}; only variables and procedures can be renamed")
     text = analysis.text[occurrence.start : occurrence.end]
-    if occurrence.what in _NO_NAMES:
-        raise InvalidValueError(f"`{text}` is {_NO_NAMES[occurrence.what]}, and cannot be renamed")
-    undeclared = occurrence.what is What.UNKNOWN or analysis.declaration(occurrence) is None
-    if undeclared or (occurrence.what is What.VARIABLE and occurrence.owner is None):
+    if occurrence.kind in _NOT_RENAMEABLE:
+        raise InvalidValueError(f"`{text}` is {_NOT_RENAMEABLE[occurrence.kind]}, and cannot be renamed")
+    undeclared = occurrence.kind is NameKind.UNKNOWN or analysis.declaration(occurrence) is None
+    if undeclared or (occurrence.kind is NameKind.VARIABLE and occurrence.owner is None):
         if occurrence.key in analysis.compiled.symbols.imported:
             raise InvalidValueError(f"`{text}` is imported, and cannot be renamed here")
         if occurrence.key in PREDECLARED:
             raise InvalidValueError(f"`{text}` is predeclared, and cannot be renamed")
         if undeclared:
             raise InvalidValueError(f"`{text}` is not declared, and cannot be renamed")
-        source = _known_by(analysis, occurrence.key)
+        source = _cell_source(analysis, occurrence.key)
         if source is not None:
             raise InvalidValueError(f"`{text}` {source} by this name; rename it there first")
     return occurrence
 
 
-def _known_by(analysis: Analysis, key: str) -> str | None:
+def _cell_source(analysis: Analysis, key: str) -> str | None:
     """Return how the cell knows a frame by its name; None where it does not."""
     cell = analysis.cell
     if cell is not None and key in cell.frames:
@@ -69,15 +69,15 @@ def rename(analysis: Analysis, offset: int, new: str) -> tuple[Edit, ...]:
     Raises:
         InvalidValueError: the name cannot be changed, the new one is none, or it has another meaning somewhere.
     """
-    occurrence = nameable(analysis, offset)
-    _require_name(analysis, new)
+    occurrence = renameable_occurrence(analysis, offset)
+    _require_valid_name(analysis, new)
     key = new.upper()
     if key != occurrence.key:
         _require_unused(analysis, occurrence, new)
-    return tuple(Edit(other.span, new) for other in analysis.same(occurrence))
+    return tuple(Edit(other.span, new) for other in analysis.same_occurrences(occurrence))
 
 
-def _require_name(analysis: Analysis, new: str) -> None:
+def _require_valid_name(analysis: Analysis, new: str) -> None:
     """Refuse what is no name in the language of the program."""
     words = VOCABULARIES[analysis.compiled.standard]
     if not _NAME.fullmatch(new):
@@ -104,7 +104,7 @@ def _require_unused(analysis: Analysis, occurrence: Occurrence, new: str) -> Non
     if key in procedure.types:
         raise InvalidValueError(f"procedure `{procedure.node.name.text}` already has a name '{new}'")
     span = procedure.node.span
-    if any(other.key == key and span.start <= other.start < span.end for other in _meant(analysis)):
+    if any(other.key == key and span.start <= other.start < span.end for other in _referring_occurrences(analysis)):
         name = procedure.node.name.text
         raise InvalidValueError(f"procedure `{name}` uses the '{new}' of the program, which would then be hidden")
 
@@ -118,18 +118,18 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
         raise InvalidValueError(f"the program already has a name '{new}'")
     if key in FUNCTIONS:
         raise InvalidValueError(f"'{new}' is a function of the language")
-    if cell is not None and occurrence.what is What.VARIABLE and (key in cell.frames or key in cell.visions):
+    if cell is not None and occurrence.kind is NameKind.VARIABLE and (key in cell.frames or key in cell.visions):
         raise InvalidValueError(f"{cell.name} has a frame '{new}', which this would become")
-    if any(other.key == key and other.owner is None for other in _meant(analysis)):
+    if any(other.key == key and other.owner is None for other in _referring_occurrences(analysis)):
         raise InvalidValueError(f"the program uses '{new}' already, though it is not declared")
-    for other in analysis.same(occurrence):
-        procedure = analysis.scopes.at(other.start).procedure
+    for other in analysis.same_occurrences(occurrence):
+        procedure = analysis.scopes.scope_at(other.start).procedure
         if procedure is not None and key in procedure.types:
             name = procedure.node.name.text
             raise InvalidValueError(f"procedure `{name}` has a '{new}' of its own, which would hide this one there")
 
 
-def _meant(analysis: Analysis) -> tuple[Occurrence, ...]:
+def _referring_occurrences(analysis: Analysis) -> tuple[Occurrence, ...]:
     """Return the occurrences that stand for something by their name, and not by their place."""
-    fixed = (What.UNIT, What.SENSOR, What.AXIS, What.DEVICE)
-    return tuple(occurrence for occurrence in analysis.occurrences if occurrence.what not in fixed)
+    fixed = (NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE)
+    return tuple(occurrence for occurrence in analysis.occurrences if occurrence.kind not in fixed)

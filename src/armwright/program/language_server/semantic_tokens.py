@@ -9,7 +9,7 @@ from armwright.program.language.source import Span
 from armwright.program.language.units import UNITS
 from armwright.program.language.words import LATER_TYPES, TYPES
 from armwright.program.language_server.analysis import Analysis
-from armwright.program.language_server.symbol_index import Occurrence, What
+from armwright.program.language_server.symbol_index import NameKind, Occurrence
 from armwright.program.syntax.lexer import Token, TokenKind
 
 _NAMES = ("variable", "parameter", "event", "function", "property", "enumMember")
@@ -20,49 +20,49 @@ _KEYWORD, _TYPE, _NUMBER, _STRING, _COMMENT, _OPERATOR = (
 )
 _TYPES = frozenset((*TYPES, *LATER_TYPES, *UNITS))
 _BIT = {name: 1 << at for at, name in enumerate(MODIFIERS)}
-_WHATS = {
-    What.PROCEDURE: ("function", 0),
-    What.FUNCTION: ("function", _BIT["defaultLibrary"]),
-    What.ARM: ("variable", _BIT["readonly"] | _BIT["defaultLibrary"] | _BIT["arm"] | _BIT["frame"]),
-    What.DEVICE: ("property", 0),
-    What.UNIT: ("type", _BIT["defaultLibrary"]),
-    What.SENSOR: ("keyword", 0),
-    What.AXIS: ("enumMember", _BIT["readonly"]),
+_NAME_STYLES = {
+    NameKind.PROCEDURE: ("function", 0),
+    NameKind.FUNCTION: ("function", _BIT["defaultLibrary"]),
+    NameKind.ARM: ("variable", _BIT["readonly"] | _BIT["defaultLibrary"] | _BIT["arm"] | _BIT["frame"]),
+    NameKind.DEVICE: ("property", 0),
+    NameKind.UNIT: ("type", _BIT["defaultLibrary"]),
+    NameKind.SENSOR: ("keyword", 0),
+    NameKind.AXIS: ("enumMember", _BIT["readonly"]),
 }
 
 # One stretch of a line: where it starts and how long it is, in columns; its kind and modifiers as numbers.
-Stretch = tuple[int, int, int, int]
+SemanticToken = tuple[int, int, int, int]
 
 
 # An editor asks for the colours of what it shows and for those of the whole, of the same text.
 @lru_cache(maxsize=4)
-def line_stretches(analysis: Analysis) -> list[list[Stretch]]:
+def line_tokens(analysis: Analysis) -> list[list[SemanticToken]]:
     """Return the coloured stretches of each line of a program."""
     codec, compiled = analysis.codec, analysis.compiled
-    lines: list[list[Stretch]] = [[] for _ in codec.starts]
-    _put(lines, codec, analysis)
+    lines: list[list[SemanticToken]] = [[] for _ in codec.starts]
+    _add_tokens(lines, codec, analysis)
     for comment in compiled.comments:
-        _put_comment(lines, codec, comment)
+        _add_comment(lines, codec, comment)
     for comment in compiled.comments:
         lines[codec.line_of(comment.start)].sort()
         lines[codec.line_of(comment.end)].sort()
     return lines
 
 
-def _put(lines: list[list[Stretch]], codec: PositionCodec, analysis: Analysis) -> None:
+def _add_tokens(lines: list[list[SemanticToken]], codec: PositionCodec, analysis: Analysis) -> None:
     """Add the stretches of tokens to their lines."""
     names = iter((*analysis.occurrences, None))
     name = next(names)
     for token in analysis.compiled.tokens:
-        what = _plain(token)
+        what = _token_style(token)
         if name is not None and name.start == token.start:
-            what, name = _named(name, analysis), next(names)
+            what, name = _name_style(name, analysis), next(names)
         if what is not None:
             line, column = codec.place(token.start)
             lines[line].append((column, codec.width(token.start, token.end), *what))
 
 
-def _plain(token: Token) -> tuple[int, int] | None:
+def _token_style(token: Token) -> tuple[int, int] | None:
     kind = token.kind
     if kind is TokenKind.KEYWORD:
         return (_TYPE if token.key in _TYPES else _KEYWORD), 0
@@ -78,12 +78,12 @@ def _plain(token: Token) -> tuple[int, int] | None:
 _OPERATORS = frozenset(("+", "-", "*", "/", "=", "<", ">", "<=", ">=", "<>"))
 
 
-def _named(name: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
+def _name_style(name: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
     own = _BIT["declaration"] * name.declares | _BIT["modification"] * (name.writes and not name.declares)
-    if name.what in _WHATS:
-        kind, bits = _WHATS[name.what]
+    if name.kind in _NAME_STYLES:
+        kind, bits = _NAME_STYLES[name.kind]
         return KINDS.index(kind), bits | own
-    if name.what is not What.VARIABLE:
+    if name.kind is not NameKind.VARIABLE:
         return None
     symbols = analysis.compiled.symbols
     word = "variable"
@@ -101,7 +101,7 @@ def _named(name: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
     return KINDS.index(word), bits
 
 
-def _put_comment(lines: list[list[Stretch]], codec: PositionCodec, comment: Span) -> None:
+def _add_comment(lines: list[list[SemanticToken]], codec: PositionCodec, comment: Span) -> None:
     """Add a comment to each of its lines."""
     start = comment.start
     for line in range(codec.line_of(comment.start), codec.line_of(comment.end) + 1):
@@ -113,7 +113,7 @@ def _put_comment(lines: list[list[Stretch]], codec: PositionCodec, comment: Span
             start += 1
 
 
-def encoded(lines: Sequence[list[Stretch]], first: int = 0, last: int | None = None, start: int = 0) -> list[int]:
+def encode(lines: Sequence[list[SemanticToken]], first: int = 0, last: int | None = None, start: int = 0) -> list[int]:
     """Return stretches as the protocol wants them: five numbers each, places counted from the stretch before.
 
     Args:
@@ -132,7 +132,7 @@ def encoded(lines: Sequence[list[Stretch]], first: int = 0, last: int | None = N
     return found
 
 
-def difference(old: Sequence[list[Stretch]], new: Sequence[list[Stretch]]) -> tuple[int, int, list[int]]:
+def token_edit(old: Sequence[list[SemanticToken]], new: Sequence[list[SemanticToken]]) -> tuple[int, int, list[int]]:
     """Return what makes the numbers of new lines out of those of old ones: where, how many go, and what comes."""
     above = next((at for at, (one, other) in enumerate(zip(old, new, strict=False)) if one != other), None)
     if above is None:
@@ -146,4 +146,4 @@ def difference(old: Sequence[list[Stretch]], new: Sequence[list[Stretch]]) -> tu
     start = 5 * sum(map(len, old[:above]))
     gone = 5 * sum(map(len, old[above : len(old) - below]))
     before = next((line for line in range(above - 1, -1, -1) if new[line]), 0)
-    return start, gone, encoded(new, above, len(new) - below - 1, before)
+    return start, gone, encode(new, above, len(new) - below - 1, before)

@@ -19,8 +19,8 @@ from armwright.files.message_stream import MessageStream
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.words import Standard
 from armwright.program.language_server.analysis import Analysis, Settings, analyse
-from armwright.program.language_server.cell_lookup import Cells
-from armwright.program.language_server.diagnostics import diagnostics
+from armwright.program.language_server.cell_lookup import CellCache
+from armwright.program.language_server.diagnostics import lsp_diagnostics
 from armwright.program.language_server.documents import Document
 from armwright.program.language_server.positions import offset_of
 from armwright.version import __version__
@@ -29,7 +29,7 @@ SECTION = "armwright"
 # What the protocol calls a request that cannot be granted.
 _REQUEST_FAILED = -32803
 # Columns are counted so where the editor says nothing.
-_USUAL = "utf-16"
+_DEFAULT_ENCODING = "utf-16"
 
 
 class _Protocol(LanguageServerProtocol):
@@ -61,10 +61,10 @@ class RloServer(LanguageServer):
         super().__init__("armwright", __version__, protocol_cls=_Protocol)
         self.documents: dict[str, Document] = {}
         self.settings = Settings()
-        self.encoding = _USUAL
-        self.cells = Cells()
+        self.encoding = _DEFAULT_ENCODING
+        self.cells = CellCache()
         # Whether the editor has sent ``exit``.
-        self.left = False
+        self.has_exited = False
         self._last_problem = ""
 
     def shutdown(self) -> None:
@@ -75,11 +75,11 @@ class RloServer(LanguageServer):
     @property
     def status(self) -> int:
         """The exit status that the protocol asks for: 1 where ``exit`` came without ``shutdown``."""
-        return int(self.left and not self.protocol._shutdown)  # noqa: SLF001 - pygls keeps it so
+        return int(self.has_exited and not self.protocol._shutdown)  # noqa: SLF001 - pygls keeps it so
 
     # ---- what the editor can do
 
-    def can(self, *path: str) -> Any:
+    def client_capability(self, *path: str) -> Any:
         """Return a capability of the editor; None where it says nothing of it."""
         capabilities: Any = self.client_capabilities
         return reduce(lambda part, name: getattr(part, name, None), path, capabilities)
@@ -95,7 +95,7 @@ class RloServer(LanguageServer):
         try:
             return self.documents[uri]
         except KeyError:
-            raise refusal(f"{uri} is not open") from None
+            raise request_error(f"{uri} is not open") from None
 
     async def analysis(self, document: lsp.TextDocumentIdentifier) -> Analysis:
         """Return the analysis of an open document as it is now.
@@ -105,7 +105,7 @@ class RloServer(LanguageServer):
         """
         return await self.document(document.uri).analysis()
 
-    async def located(self, document: lsp.TextDocumentIdentifier, where: lsp.Position) -> tuple[Analysis, int]:
+    async def locate(self, document: lsp.TextDocumentIdentifier, where: lsp.Position) -> tuple[Analysis, int]:
         """Return the analysis of an open document, and the offset of a position in it.
 
         Raises:
@@ -114,10 +114,10 @@ class RloServer(LanguageServer):
         analysis = await self.analysis(document)
         return analysis, offset_of(analysis.codec, where)
 
-    def outdate(self) -> None:
+    def invalidate(self) -> None:
         """Take the analyses of all documents for old: what they depend on has changed."""
         for document in self.documents.values():
-            document.outdate()
+            document.invalidate()
 
     def analyse(self, document: Document) -> Analysis:
         """Analyse a document as it is now."""
@@ -133,17 +133,19 @@ class RloServer(LanguageServer):
         """Tell the editor what is wrong with a document."""
         if self.documents.get(document.uri, document) is not document:
             return
-        related = bool(self.can("text_document", "publish_diagnostics", "related_information"))
+        related = bool(self.client_capability("text_document", "publish_diagnostics", "related_information"))
         try:
-            published = diagnostics(analysis, document.uri, related=related)
+            published = lsp_diagnostics(analysis, document.uri, related=related)
         except Exception as error:  # noqa: BLE001 - as above
             self._log(error)
             published = []
         params = lsp.PublishDiagnosticsParams(document.uri, published, document.version)
         self.text_document_publish_diagnostics(params)
-        if analysis.problem and analysis.problem != self._last_problem:
-            self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {analysis.problem}"))
-        self._last_problem = analysis.problem
+        if analysis.cell_error and analysis.cell_error != self._last_problem:
+            self.window_show_message(
+                lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {analysis.cell_error}")
+            )
+        self._last_problem = analysis.cell_error
 
     def _log(self, error: Exception) -> None:
         text = f"armwright: this should not happen: {type(error).__name__}: {error}"
@@ -151,38 +153,38 @@ class RloServer(LanguageServer):
 
     # ---- settings
 
-    def take_settings(self, told: object) -> None:
+    def apply_settings(self, values: object) -> None:
         """Take up settings as an editor tells them; what is no setting is passed over."""
-        values = told if isinstance(told, dict) else {}
+        values = values if isinstance(values, dict) else {}
         values = values[SECTION] if isinstance(values.get(SECTION), dict) else values
         cell, std = values.get("cell"), str(values.get("std") or Standard.RLO_2)
         settings = Settings(
-            cell=self._path(cell) if isinstance(cell, str) and cell.strip() else None,
+            cell=self._settings_path(cell) if isinstance(cell, str) and cell.strip() else None,
             std=Standard(std) if std in set(Standard) else Standard.RLO_2,
             strict=values.get("strict") is True,
         )
         if settings != self.settings:
             self.settings = settings
-            self.outdate()
+            self.invalidate()
 
-    def _path(self, text: str) -> Path:
+    def _settings_path(self, text: str) -> Path:
         """Return the file that a setting names: seen from the folder of the workspace."""
         folders = [to_fs_path(uri) for uri in self.workspace.folders]
         root = next((folder for folder in (*folders, self.workspace.root_path) if folder), ".")
         return Path(root, text.strip().replace("${workspaceFolder}", root)).expanduser()
 
-    async def ask_settings(self) -> None:
+    async def request_settings(self) -> None:
         """Ask the editor for its settings."""
-        if not self.can("workspace", "configuration"):
+        if not self.client_capability("workspace", "configuration"):
             return
         items = [lsp.ConfigurationItem(section=SECTION)]
         with suppress(JsonRpcException):
             told = await self.workspace_configuration_async(lsp.ConfigurationParams(items))
             if told and told[0] is not None:
-                self.take_settings(told[0])
+                self.apply_settings(told[0])
 
 
-def refusal(text: str) -> JsonRpcException:
+def request_error(text: str) -> JsonRpcException:
     """Return what tells an editor that something cannot be done, and why."""
     return JsonRpcException(text, code=_REQUEST_FAILED)
 
@@ -195,8 +197,8 @@ def make_server() -> RloServer:
     # What is refused is told to the editor; its record need not have it again.
     logging.getLogger("pygls").setLevel(logging.CRITICAL)
     server = RloServer()
-    _conversation(server)
-    _surroundings(server)
+    _register_document_features(server)
+    _register_workspace_features(server)
     handlers.register(server)
     return server
 
@@ -221,19 +223,19 @@ def serve() -> int:
     return server.status
 
 
-def _conversation(server: RloServer) -> None:
+def _register_document_features(server: RloServer) -> None:
     """Let the server hear of the beginning, and of documents."""
 
     @server.feature(lsp.INITIALIZE)
     def initialize(params: lsp.InitializeParams) -> None:
-        encoding = server.workspace.position_encoding or _USUAL
+        encoding = server.workspace.position_encoding or _DEFAULT_ENCODING
         server.encoding = encoding.value if isinstance(encoding, lsp.PositionEncodingKind) else encoding
-        server.take_settings(params.initialization_options)
+        server.apply_settings(params.initialization_options)
 
     @server.feature(lsp.INITIALIZED)
     async def initialized(_: lsp.InitializedParams) -> None:
-        await _watch(server)
-        await server.ask_settings()
+        await _register_watchers(server)
+        await server.request_settings()
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
     async def did_open(params: lsp.DidOpenTextDocumentParams) -> None:
@@ -257,40 +259,40 @@ def _conversation(server: RloServer) -> None:
             server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri=document.uri, diagnostics=[]))
 
 
-def _surroundings(server: RloServer) -> None:
+def _register_workspace_features(server: RloServer) -> None:
     """Let the server hear of settings and files, and of the end."""
 
     @server.feature(lsp.EXIT)
     def left(_: Any) -> None:
-        server.left = True
+        server.has_exited = True
 
     @server.feature(lsp.WORKSPACE_DID_CHANGE_CONFIGURATION)
     async def did_change_configuration(params: lsp.DidChangeConfigurationParams) -> None:
-        if server.can("workspace", "configuration"):
-            await server.ask_settings()
+        if server.client_capability("workspace", "configuration"):
+            await server.request_settings()
         else:
-            server.take_settings(params.settings)
+            server.apply_settings(params.settings)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
     def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
         # Others may depend on what has been saved beside them.
-        server.outdate()
+        server.invalidate()
         if (document := server.documents.get(params.text_document.uri)) is not None:
             document.publish()
 
     @server.feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
     def did_change_watched_files(_: lsp.DidChangeWatchedFilesParams) -> None:
-        server.outdate()
+        server.invalidate()
 
 
-async def _watch(server: RloServer) -> None:
+async def _register_watchers(server: RloServer) -> None:
     """Ask the editor to tell of changes of cell files, and of settings."""
     wanted: dict[str, Any] = {}
-    if server.can("workspace", "did_change_watched_files", "dynamic_registration"):
+    if server.client_capability("workspace", "did_change_watched_files", "dynamic_registration"):
         wanted[lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES] = lsp.DidChangeWatchedFilesRegistrationOptions(
             watchers=[lsp.FileSystemWatcher(glob_pattern="**/*.{toml,json}")]
         )
-    if server.can("workspace", "did_change_configuration", "dynamic_registration"):
+    if server.client_capability("workspace", "did_change_configuration", "dynamic_registration"):
         wanted[lsp.WORKSPACE_DID_CHANGE_CONFIGURATION] = lsp.DidChangeConfigurationRegistrationOptions(section=SECTION)
     if wanted:
         asked = [lsp.Registration(method, method, options) for method, options in wanted.items()]

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from lsprotocol import types as lsp
 
 from armwright.program.language.position_codec import PositionCodec
-from armwright.program.language_server.analysis import Analysis, before
+from armwright.program.language_server.analysis import Analysis, lexical_context
 from armwright.program.language_server.hover import signature
-from armwright.program.language_server.keyword_docs import explained
+from armwright.program.language_server.keyword_docs import word_doc
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.syntax.lexer import Token, TokenKind
 
-_TAKES = {
+_PARAMETERS = {
     **dict.fromkeys(("ROTX", "ROTY", "ROTZ"), ("angle",)),
     "XYZ": ("x", "y", "z"),
     "INV": ("step",),
@@ -20,7 +20,7 @@ _TAKES = {
 }
 
 
-def signature_at(text: str, analysis: Analysis, offset: int) -> lsp.SignatureHelp | None:
+def signature_help(text: str, analysis: Analysis, offset: int) -> lsp.SignatureHelp | None:
     """Return what the call takes whose arguments are being written at a position; None where there is none.
 
     Args:
@@ -28,18 +28,18 @@ def signature_at(text: str, analysis: Analysis, offset: int) -> lsp.SignatureHel
         analysis: of the program, or of what it was before.
         offset: the position.
     """
-    around = before(text, offset, analysis.compiled.standard)
-    call = None if around is None else open_call(around.tokens)
+    around = lexical_context(text, offset, analysis.compiled.standard)
+    call = None if around is None else enclosing_call(around.preceding)
     if call is None:
         return None
     name, argument = call
     procedure, meaning = analysis.compiled.symbols.procedures.get(name.key), None
     if procedure is not None:
         label, parameters = signature(procedure.node)
-    elif name.key in FUNCTIONS and (word := explained(name.key)) is not None:
-        takes, meaning = _TAKES[name.key], word.text
+    elif name.key in FUNCTIONS and (word := word_doc(name.key)) is not None:
+        takes, meaning = _PARAMETERS[name.key], word.text
         label = f"{name.key} ({', '.join(takes)}) : {FUNCTIONS[name.key].gives.name}"
-        parameters = _places(label, takes)
+        parameters = _parameter_columns(label, takes)
     else:
         return None
     codec = PositionCodec(label, analysis.codec.encoding)
@@ -48,7 +48,7 @@ def signature_at(text: str, analysis: Analysis, offset: int) -> lsp.SignatureHel
     return lsp.SignatureHelp([lsp.SignatureInformation(label, meaning, columns, active)], 0, active)
 
 
-def open_call(tokens: Sequence[Token]) -> tuple[Token, int] | None:
+def enclosing_call(tokens: Sequence[Token]) -> tuple[Token, int] | None:
     """Return the name in front of the innermost parenthesis that is open behind tokens, and how many commas follow."""
     depth = commas = 0
     for at in range(len(tokens) - 1, 0, -1):
@@ -71,7 +71,7 @@ def open_call(tokens: Sequence[Token]) -> tuple[Token, int] | None:
     return None
 
 
-def _places(label: str, parts: Sequence[str]) -> tuple[tuple[int, int], ...]:
+def _parameter_columns(label: str, parts: Sequence[str]) -> tuple[tuple[int, int], ...]:
     at, places = label.find("("), []
     for part in parts:
         at = label.find(part, at + 1)

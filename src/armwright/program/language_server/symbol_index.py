@@ -14,13 +14,13 @@ from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax.lexer import Token, TokenKind
 
 # Behind these words and signs a statement begins.
-OPENERS = frozenset((";", "BEGIN", "THEN", "ELSE", "DO", "TRY", "RECOVER", "REPEAT", "COBEGIN"))
+STATEMENT_OPENERS = frozenset((";", "BEGIN", "THEN", "ELSE", "DO", "TRY", "RECOVER", "REPEAT", "COBEGIN"))
 _NAME, _ARM, _KEYWORD = TokenKind.NAME, TokenKind.ARM, TokenKind.KEYWORD
 # How far an index may reach before its variable is no longer taken for one that gets a value.
 _MAX_INDEX_LENGTH = 50
 
 
-class What(enum.Enum):
+class NameKind(enum.Enum):
     """What a name is where it stands."""
 
     VARIABLE = "variable"
@@ -43,7 +43,7 @@ class Occurrence:
         start: its first character.
         end: the one after its last.
         key: as compared.
-        what: what it is here.
+        kind: what it is here.
         owner: the procedure whose own name it is; None for names of the program.
         type: of a variable, where it is known.
         declares: whether the name is declared here.
@@ -53,7 +53,7 @@ class Occurrence:
     start: int
     end: int
     key: str
-    what: What
+    kind: NameKind
     owner: str | None = None
     type: VariableType | None = None
     declares: bool = False
@@ -64,9 +64,9 @@ class Occurrence:
         """Where it stands."""
         return Span(self.start, self.end)
 
-    def is_same(self, other: "Occurrence") -> bool:
+    def refers_to_same(self, other: "Occurrence") -> bool:
         """Whether another occurrence is one of the same thing."""
-        return (self.key, self.what, self.owner) == (other.key, other.what, other.owner)
+        return (self.key, self.kind, self.owner) == (other.key, other.kind, other.owner)
 
 
 @attrs.frozen
@@ -81,7 +81,7 @@ class ScopeExtents:
     starts: Sequence[int]
     scopes: Sequence[Scope]
 
-    def at(self, offset: int) -> Scope:
+    def scope_at(self, offset: int) -> Scope:
         """Return the names that are visible at a position."""
         return self.scopes[bisect_right(self.starts, offset) - 1]
 
@@ -111,16 +111,16 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
         if kind is _NAME or kind is _ARM:
             follows = tokens[at + 1].key if at + 1 < len(tokens) else ""
             if kind is _ARM:
-                found.append(Occurrence(token.start, token.end, key, What.ARM))
+                found.append(Occurrence(token.start, token.end, key, NameKind.ARM))
             else:
-                found.append(_name(token, scopes.at(token.start), before, follows, in_units=in_units))
+                found.append(_classify_name(token, scopes.scope_at(token.start), before, follows, in_units=in_units))
             name = found[-1]
             if (in_read and before in ("(", ",")) or before == "FOR":
                 name.writes = True
-            elif before in OPENERS or not before:
-                name.writes = follows == "=" or (follows == "[" and _assigned(tokens, at + 1))
+            elif before in STATEMENT_OPENERS or not before:
+                name.writes = follows == "=" or (follows == "[" and _is_assigned(tokens, at + 1))
             elif before == "(" and key in AXES and at > 1 and tokens[at - 2].key == "FORCE":
-                name.what, name.owner, name.type = What.AXIS, None, None
+                name.kind, name.owner, name.type = NameKind.AXIS, None, None
         elif kind is _KEYWORD or key in (";", ")"):
             in_units = key == "UNITS"
             in_read = key == "READ" or (in_read and key not in (";", ")") and kind is not _KEYWORD)
@@ -128,7 +128,7 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
     return tuple(found)
 
 
-def _name(token: Token, scope: Scope, before: str, follows: str, *, in_units: bool) -> Occurrence:
+def _classify_name(token: Token, scope: Scope, before: str, follows: str, *, in_units: bool) -> Occurrence:
     """Return what a name is between the tokens around it."""
     key, start, end = token.key, token.start, token.end
     procedures = scope.symbols.procedures
@@ -136,32 +136,32 @@ def _name(token: Token, scope: Scope, before: str, follows: str, *, in_units: bo
     if before == "PROCEDURE" or (called and key in procedures):
         procedure = procedures.get(key)
         declares = procedure is not None and procedure.node.name.span.start == start
-        return Occurrence(start, end, key, What.PROCEDURE, declares=declares)
+        return Occurrence(start, end, key, NameKind.PROCEDURE, declares=declares)
     fixed = (
-        (in_units, What.UNIT),
-        (before == "READ" and key in SENSORS, What.SENSOR),
-        (before == "OPERATE", What.DEVICE),
-        (follows == "(" and key in FUNCTIONS, What.FUNCTION),
+        (in_units, NameKind.UNIT),
+        (before == "READ" and key in SENSORS, NameKind.SENSOR),
+        (before == "OPERATE", NameKind.DEVICE),
+        (follows == "(" and key in FUNCTIONS, NameKind.FUNCTION),
     )
     for holds, what in fixed:
         if holds:
             return Occurrence(start, end, key, what)
-    return _variable(token, scope)
+    return _classify_variable(token, scope)
 
 
-def _variable(token: Token, scope: Scope) -> Occurrence:
+def _classify_variable(token: Token, scope: Scope) -> Occurrence:
     """Return which variable a name is, if it is one."""
     key, symbols, local = token.key, scope.symbols, scope.procedure
     names, owner = (local, local.node.name.key) if local is not None and key in local.types else (symbols, None)
     kind, declared = names.types.get(key), names.declared.get(key)
     if owner is None and kind is None and declared is None:
-        what = What.PROCEDURE if key in symbols.procedures else What.UNKNOWN
+        what = NameKind.PROCEDURE if key in symbols.procedures else NameKind.UNKNOWN
         return Occurrence(token.start, token.end, key, what)
     declares = declared is not None and declared.span.start == token.start
-    return Occurrence(token.start, token.end, key, What.VARIABLE, owner, kind, declares)
+    return Occurrence(token.start, token.end, key, NameKind.VARIABLE, owner, kind, declares)
 
 
-def _assigned(tokens: Sequence[Token], at: int) -> bool:
+def _is_assigned(tokens: Sequence[Token], at: int) -> bool:
     """Whether ``=`` stands behind the index that begins at a token."""
     depth = 0
     for index in range(at, min(len(tokens), at + _MAX_INDEX_LENGTH)):

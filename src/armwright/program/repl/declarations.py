@@ -7,13 +7,13 @@ import attrs
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.units import UNITS, dimension
 from armwright.program.language.words import VOCABULARIES, Standard
-from armwright.program.repl.input import Entry
-from armwright.program.repl.redefinition import Redeclared, declared, own_names, redeclare
+from armwright.program.repl.input import ParsedInput
+from armwright.program.repl.redefinition import RenamedProgram, declared_names, local_names, redeclare
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.syntax import tree
 
 
-class NotNowError(Exception):
+class RedefinitionError(Exception):
     """An input cannot be taken any more, though it might have been earlier.
 
     Attributes:
@@ -27,15 +27,15 @@ class NotNowError(Exception):
 
 
 @attrs.frozen(kw_only=True)
-class Heading:
+class MergedHeaders:
     """The declarations of a session together with those of an input.
 
     Attributes:
         headers: all of them.
         statements: those of the session, with the names that they use now.
         spelling: of names that are declared here, and of new names for old ones, by key.
-        renamed: new names of old variables and procedures, by their old ones.
-        dropped: names that were declared anew before anything was done with them.
+        new_names: new names of old variables and procedures, by their old ones.
+        unused_names: names that were declared anew before anything was done with them.
         imports: the paths of files that are imported now for the first time.
         remarks: what is to be said about it.
     """
@@ -43,21 +43,21 @@ class Heading:
     headers: tuple[tree.Header, ...]
     statements: tuple[tree.Statement, ...]
     spelling: Mapping[str, str] = attrs.field(factory=dict)
-    renamed: Mapping[str, str] = attrs.field(factory=dict)
-    dropped: frozenset[str] = frozenset()
+    new_names: Mapping[str, str] = attrs.field(factory=dict)
+    unused_names: frozenset[str] = frozenset()
     imports: tuple[tree.Import, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
-def merged(
+def merge_headers(
     headers: Sequence[tree.Header],
     statements: Sequence[tree.Statement],
-    entry: Entry,
+    entry: ParsedInput,
     std: Standard,
     *,
-    fixed: Collection[str],
-    path_of: Callable[[str], str],
-) -> Heading:
+    cell_names: Collection[str],
+    import_path: Callable[[str], str],
+) -> MergedHeaders:
     """Put the headers of an input together with those of a session.
 
     Args:
@@ -65,8 +65,8 @@ def merged(
         statements: of the session.
         entry: the input.
         std: the language.
-        fixed: names by which the cell itself knows frames, devices and what its camera sees.
-        path_of: how the session shall name a file that the input imports.
+        cell_names: names by which the cell itself knows frames, devices and what its camera sees.
+        import_path: how the session shall name a file that the input imports.
 
     Raises:
         NotNowError: what it declares would change the meaning of what was done.
@@ -77,45 +77,45 @@ def merged(
     remarks: list[str] = []
     for header in entry.headers:
         if isinstance(header, tree.Import):
-            path = attrs.evolve(header.path, value=path_of(header.path.value))
+            path = attrs.evolve(header.path, value=import_path(header.path.value))
             if any(isinstance(known, tree.Import) and known.path.value == path.value for known in (*old, *imports)):
                 remarks.append(f"`{path.value}` is imported already")
             else:
                 imports.append(attrs.evolve(header, path=path))
             continue
         if isinstance(header, tree.Units):
-            old = _with_units(old, statements, header)
+            old = _replace_units(old, statements, header)
         new.append(header)
     new = [*imports, *new]
-    again = declared(old).keys() & declared(new).keys()
+    again = declared_names(old).keys() & declared_names(new).keys()
     words = VOCABULARIES[std]
-    taken = {*declared((*old, *new)), *fixed, *words.reserved, *FUNCTIONS}
+    taken = {*declared_names((*old, *new)), *cell_names, *words.reserved, *FUNCTIONS}
     for header in (*old, *new):
-        taken |= own_names(header) if isinstance(header, tree.Procedure) else set()
-    changed = redeclare(old, statements, again, taken=taken, longest=words.longest_name)
-    for key in sorted(changed.renamed.keys() & again & set(fixed)):
-        raise NotNowError(_known_to_the_cell(declared(new)[key]))
-    return Heading(
+        taken |= local_names(header) if isinstance(header, tree.Procedure) else set()
+    changed = redeclare(old, statements, again, unavailable=taken, max_length=words.longest_name)
+    for key in sorted(changed.new_names.keys() & again & set(cell_names)):
+        raise RedefinitionError(_cell_name_error(declared_names(new)[key]))
+    return MergedHeaders(
         headers=(*changed.headers, *new),
         statements=changed.statements,
-        spelling={**_spelling(changed), **{key: declared(new)[key].text for key in again}},
-        renamed=changed.renamed,
-        dropped=changed.dropped,
+        spelling={**_spelling(changed), **{key: declared_names(new)[key].text for key in again}},
+        new_names=changed.new_names,
+        unused_names=changed.unused_names,
         imports=tuple(imports),
-        remarks=(*remarks, *_messages(changed, declared(old), again)),
+        remarks=(*remarks, *_redefinition_messages(changed, declared_names(old), again)),
     )
 
 
-def _spelling(changed: Redeclared) -> dict[str, str]:
-    now = declared(changed.headers)
-    return {key: now[key].text for key in changed.renamed.values()}
+def _spelling(changed: RenamedProgram) -> dict[str, str]:
+    now = declared_names(changed.headers)
+    return {key: now[key].text for key in changed.new_names.values()}
 
 
-def _messages(changed: Redeclared, old: Mapping[str, tree.Name], again: Collection[str]) -> list[str]:
+def _redefinition_messages(changed: RenamedProgram, old: Mapping[str, tree.Name], again: Collection[str]) -> list[str]:
     now = _spelling(changed)
-    called = {key: f"`{old[key].text}`" for key in {*again, *changed.renamed}}
+    called = {key: f"`{old[key].text}`" for key in {*again, *changed.new_names}}
     messages = {key: f"{called[key]} is declared again" for key in sorted(again)}
-    for key, name in sorted(changed.renamed.items()):
+    for key, name in sorted(changed.new_names.items()):
         if key in again:
             messages[key] += f"; the previous one is now called `{now[name]}`"
         else:
@@ -125,7 +125,7 @@ def _messages(changed: Redeclared, old: Mapping[str, tree.Name], again: Collecti
     return [*messages.values()]
 
 
-def _known_to_the_cell(name: tree.Name) -> Diagnostic:
+def _cell_name_error(name: tree.Name) -> Diagnostic:
     return Diagnostic(
         code="E203",
         message=f"`{name.text}` cannot be declared again: it is a name of the cell, and it has been used",
@@ -138,7 +138,7 @@ def _known_to_the_cell(name: tree.Name) -> Diagnostic:
 # ---- units ---------------------------------------------------------------------------------------------------------
 
 
-def _with_units(
+def _replace_units(
     headers: tuple[tree.Header, ...], statements: Sequence[tree.Statement], new: tree.Units
 ) -> tuple[tree.Header, ...]:
     """Return the headers without the units that new ones take the place of.
@@ -146,14 +146,14 @@ def _with_units(
     Raises:
         NotNowError: numbers have been read in the old ones.
     """
-    now = {unit.key for unit in _units(headers)}
+    now = {unit.key for unit in _unit_names(headers)}
     changes = [unit for unit in new.units if unit.key in UNITS and unit.key not in now]
     began = statements or any(isinstance(header, tree.Procedure) for header in headers)
     standard = {"M", "DEG"}
     dimensions = {dimension(key) for key in now}
     changes = [change for change in changes if change.key not in standard or dimension(change.key) in dimensions]
     if began and changes:
-        raise NotNowError(
+        raise RedefinitionError(
             Diagnostic(
                 code="E224",
                 message="UNITS must precede all statements: the numbers before it were read in other units",
@@ -173,5 +173,5 @@ def _with_units(
     return tuple(remaining)
 
 
-def _units(headers: Sequence[tree.Header]) -> list[tree.Name]:
+def _unit_names(headers: Sequence[tree.Header]) -> list[tree.Name]:
     return [unit for header in headers if isinstance(header, tree.Units) for unit in header.units]

@@ -16,7 +16,7 @@ _SAME_AXIS = 1e-9
 _DIGITS = {"M": 5, "MM": 2, "CM": 3, "IN": 3}
 
 
-def frames(session: Session) -> list[str]:
+def frame_table_lines(session: Session) -> list[str]:
     """Return the frame tree as lines: each frame under the one it hangs on, seen from the world."""
     units, machine = session.state.symbols.units, session.state.machine
     rows = [["frame", "x", "y", "z", units.length.lower(), "z", "y", "x", "deg"]]
@@ -27,12 +27,12 @@ def frames(session: Session) -> list[str]:
             rows.append([shown, "no value yet"])
             continue
         X = machine.state.tree.world(name)
-        position = [_number(value, _DIGITS[units.length]) for value in X[:3, 3] / units.metres]
-        rows.append([shown, *position, "", *map(_degrees, to_zyx(X[:3, :3]).tolist()), ""])
-    return _aligned(rows)
+        position = [_number_text(value, _DIGITS[units.length]) for value in X[:3, 3] / units.metres]
+        rows.append([shown, *position, "", *map(_degrees_text, zyx_angles(X[:3, :3]).tolist()), ""])
+    return _align_columns(rows)
 
 
-def to_zyx(R: Array) -> Array:
+def zyx_angles(R: Array) -> Array:
     """Return three turns (3,) [rad]: about z, then about the new y, then about the newest x.
 
     Where the second is a right angle the third is taken as 0.
@@ -43,13 +43,13 @@ def to_zyx(R: Array) -> Array:
     return np.array([math.atan2(R[1, 0], R[0, 0]), math.atan2(-R[2, 0], across), math.atan2(R[2, 1], R[2, 2])])
 
 
-def arms(session: Session) -> list[str]:
+def arm_lines(session: Session) -> list[str]:
     """Return the arms as lines: the position of each joint [deg] or [mm], and what the hand is at and holds."""
     machine, lines = session.state.machine, []
     for name, arm in machine.cell.arms.items():
         q = machine.hardware.configuration(name, machine.now)
         shown = [
-            f"{_degrees(value)} deg" if joint.revolute else f"{_number(value * 1e3, 2)} mm"
+            f"{_degrees_text(value)} deg" if joint.revolute else f"{_number_text(value * 1e3, 2)} mm"
             for joint, value in zip(arm.arm.joints, q.tolist(), strict=True)
         ]
         hand = machine.state.hands[name]
@@ -61,23 +61,23 @@ def arms(session: Session) -> list[str]:
     return lines or ["no arms: begin with `--cell`, or with an IMPORT of a cell"]
 
 
-def names(session: Session) -> list[str]:
+def visible_names(session: Session) -> list[str]:
     """Return the names that an input can use, as they are spelled: variables, frames, procedures, arms."""
     symbols, machine = session.state.symbols, session.state.machine
     return [*map(machine.spelling, (*symbols.types, *symbols.procedures)), *machine.cell.arms]
 
 
-def _degrees(angle: float) -> str:
-    shown = _number(math.degrees(angle), 2)
+def _degrees_text(angle: float) -> str:
+    shown = _number_text(math.degrees(angle), 2)
     return "180.00" if shown == "-180.00" else shown
 
 
-def _number(value: float, digits: int) -> str:
+def _number_text(value: float, digits: int) -> str:
     # What rounds to 0 has no sign.
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+def _align_columns(rows: Sequence[Sequence[str]]) -> list[str]:
     complete = [row for row in rows if len(row) == len(rows[0])]
     widths = [max(len(row[column]) for row in complete) for column in range(len(rows[0]))]
     widths[0] = max(len(row[0]) for row in rows)

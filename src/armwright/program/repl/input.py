@@ -21,35 +21,35 @@ from armwright.program.syntax.line_numbers import without_numbers
 from armwright.program.syntax.parser import parse
 
 # No expression begins like a line of a numbered program.
-_NUMBERED = re.compile(r"\s*[0-9]+[ \t]+[A-Za-z]")
-_ASSIGNING = ("=", ":=", "==")
+_NUMBERED_LINE = re.compile(r"\s*[0-9]+[ \t]+[A-Za-z]")
+_ASSIGNMENT_SIGNS = ("=", ":=", "==")
 _OPERATORS = ("+", "-", "*", "/", "<", "<=", ">", ">=", "<>", "AND", "OR", ",")
 # What an expression can begin with, besides a name.
-_BEGINNINGS = (TokenKind.NUMBER, TokenKind.STRING)
+_LITERAL_KINDS = (TokenKind.NUMBER, TokenKind.STRING)
 
 
 @attrs.frozen(kw_only=True)
-class Entry:
+class ParsedInput:
     """One input, read.
 
     Attributes:
         headers: what it declares.
         statements: what is to be done, in order; a value that is to be shown is a PRINT.
-        shown: where the statements start that only show a value.
+        printed_starts: where the statements start that only show a value.
         spelling: how it first writes each of its names, by key.
         diagnostics: what is wrong with its syntax.
-        complete: whether it can be taken as it is; otherwise it goes on in the next line.
+        is_complete: whether it can be taken as it is; otherwise it goes on in the next line.
     """
 
     headers: tuple[tree.Header, ...]
     statements: tuple[tree.Statement, ...]
-    shown: frozenset[int]
+    printed_starts: frozenset[int]
     spelling: Mapping[str, str]
     diagnostics: tuple[Diagnostic, ...]
-    complete: bool
+    is_complete: bool
 
 
-def read(
+def parse_input(
     source: Source,
     start: int,
     std: Standard,
@@ -57,7 +57,7 @@ def read(
     names: Collection[str] = (),
     procedures: Collection[str] = (),
     is_file: bool = False,
-) -> Entry:
+) -> ParsedInput:
     """Read one input.
 
     Args:
@@ -69,34 +69,34 @@ def read(
         is_file: whether it is the text of a file; elsewhere a number that begins a line may begin an expression.
     """
     text, diagnostics = source.text[start:], []
-    if is_file or std is Standard.RLO_83 or _NUMBERED.match(text):
+    if is_file or std is Standard.RLO_83 or _NUMBERED_LINE.match(text):
         text, odd = without_numbers(Source(source.name, text))
-        diagnostics += [moved(diagnostic, start) for diagnostic in odd]
+        diagnostics += [shift_diagnostic(diagnostic, start) for diagnostic in odd]
     scanned = scan(source, " " * start + text, std)
     diagnostics += scanned.diagnostics
-    tokens = _without_frame(scanned.tokens[:-1])
-    reader = _Reader(source, std, names, procedures)
-    for is_header, part in _parts(tokens, VOCABULARIES[std]):
+    tokens = _strip_program_frame(scanned.tokens[:-1])
+    reader = _InputParser(source, std, names, procedures)
+    for is_header, part in _split_parts(tokens, VOCABULARIES[std]):
         if is_header:
-            reader.headers_of(part)
+            reader.parse_headers(part)
         else:
-            reader.statements_of(part)
-    diagnostics += map(_advised, reader.diagnostics)
-    return Entry(
+            reader.parse_statements(part)
+    diagnostics += map(_add_else_advice, reader.diagnostics)
+    return ParsedInput(
         headers=tuple(reader.headers),
         statements=tuple(reader.statements),
-        shown=frozenset(reader.shown),
+        printed_starts=frozenset(reader.printed_starts),
         spelling={token.key: token.text for token in reversed(tokens) if token.kind is TokenKind.NAME},
         diagnostics=tuple(diagnostics),
-        complete=_is_complete(scanned.tokens[:-1], diagnostics),
+        is_complete=_is_complete(scanned.tokens[:-1], diagnostics),
     )
 
 
-def moved(diagnostic: Diagnostic, by: int) -> Diagnostic:
-    """Return a diagnostic for a text that begins ``by`` characters later."""
+def shift_diagnostic(diagnostic: Diagnostic, offset: int) -> Diagnostic:
+    """Return a diagnostic for a text that begins ``offset`` characters later."""
 
     def shift(span: Span) -> Span:
-        return Span(span.start + by, span.end + by)
+        return Span(span.start + offset, span.end + offset)
 
     return attrs.evolve(
         diagnostic,
@@ -106,7 +106,7 @@ def moved(diagnostic: Diagnostic, by: int) -> Diagnostic:
     )
 
 
-def _advised(diagnostic: Diagnostic) -> Diagnostic:
+def _add_else_advice(diagnostic: Diagnostic) -> Diagnostic:
     """Return a diagnostic with the advice that it needs where a program comes line by line."""
     if diagnostic.code != "E127" or not diagnostic.message.upper().startswith("`ELSE`"):
         return diagnostic
@@ -116,7 +116,7 @@ def _advised(diagnostic: Diagnostic) -> Diagnostic:
 
 def _is_complete(tokens: Sequence[Token], diagnostics: Sequence[Diagnostic]) -> bool:
     """Whether nothing is open, and the first thing that is wrong is not that the text ends."""
-    if any(diagnostic.code == "E102" for diagnostic in diagnostics) or (tokens and _depth(tokens) > 0):
+    if any(diagnostic.code == "E102" for diagnostic in diagnostics) or (tokens and _block_depth(tokens) > 0):
         return False
     first = next((diagnostic for diagnostic in in_order(diagnostics) if diagnostic.is_syntax), None)
     # A character that RLO does not have stays wrong whatever follows, a comment of another language too.
@@ -126,13 +126,13 @@ def _is_complete(tokens: Sequence[Token], diagnostics: Sequence[Diagnostic]) -> 
     return any(fix.replacement == "()" for fix in first.fixes)
 
 
-def _depth(tokens: Sequence[Token]) -> int:
+def _block_depth(tokens: Sequence[Token]) -> int:
     """Return how many stretches of statements are open behind some tokens."""
     words = [token.key for token in tokens if token.kind is TokenKind.KEYWORD]
     return sum((word in OPENING) - (word in CLOSING) for word in words)
 
 
-def _without_frame(tokens: Sequence[Token]) -> list[Token]:
+def _strip_program_frame(tokens: Sequence[Token]) -> list[Token]:
     """Return the tokens without the BEGIN and the ``END.`` of a whole program."""
     remaining = list(tokens)
     if len(remaining) > 1 and remaining[-1].key == "." and remaining[-2].key == "END":
@@ -151,14 +151,14 @@ def _without_frame(tokens: Sequence[Token]) -> list[Token]:
 # ---- parts ---------------------------------------------------------------------------------------------------------
 
 
-def _parts(tokens: Sequence[Token], words: Vocabulary) -> Iterator[tuple[bool, Sequence[Token]]]:
+def _split_parts(tokens: Sequence[Token], words: Vocabulary) -> Iterator[tuple[bool, Sequence[Token]]]:
     """Cut an input into headers and stretches of statements, each with whether it is a header."""
     index = 0
     while index < len(tokens):
         is_header = True
         if _is_header(tokens[index], words):
             end = _end_of_header(tokens, index)
-        elif _goes_on_declaring(tokens, index):
+        elif _begins_declaration(tokens, index):
             end = _end_of_variables(tokens, index)
         else:
             is_header, end = False, _end_of_statements(tokens, index, words)
@@ -170,7 +170,7 @@ def _is_header(token: Token, words: Vocabulary) -> bool:
     return token.kind is TokenKind.KEYWORD and token.key in words.headers
 
 
-def _goes_on_declaring(tokens: Sequence[Token], index: int) -> bool:
+def _begins_declaration(tokens: Sequence[Token], index: int) -> bool:
     """Whether names and a type follow, as behind the first ``;`` of a VAR part."""
     while index + 1 < len(tokens) and tokens[index].kind is TokenKind.NAME:
         if tokens[index + 1].key == ":":
@@ -185,28 +185,28 @@ def _end_of_header(tokens: Sequence[Token], index: int) -> int:
     if tokens[index].key == "VAR":
         return _end_of_variables(tokens, index)
     if tokens[index].key != "PROCEDURE":
-        return _behind(tokens, index, ";")
-    index, depth = _behind(tokens, index, "BEGIN"), 1
+        return _index_after(tokens, index, ";")
+    index, depth = _index_after(tokens, index, "BEGIN"), 1
     while index < len(tokens) and depth:
-        depth += _depth(tokens[index : index + 1])
+        depth += _block_depth(tokens[index : index + 1])
         index += 1
     return index + 1 if index < len(tokens) and tokens[index].key in (";", ".") else index
 
 
 def _end_of_variables(tokens: Sequence[Token], index: int) -> int:
-    index = _behind(tokens, index, ";")
-    while _goes_on_declaring(tokens, index):
-        index = _behind(tokens, index, ";")
+    index = _index_after(tokens, index, ";")
+    while _begins_declaration(tokens, index):
+        index = _index_after(tokens, index, ";")
     return index
 
 
-def _behind(tokens: Sequence[Token], index: int, key: str) -> int:
+def _index_after(tokens: Sequence[Token], index: int, key: str) -> int:
     """Return the place behind the next token that reads so; the end without one."""
     return next((number + 1 for number in range(index, len(tokens)) if tokens[number].key == key), len(tokens))
 
 
 def _end_of_statements(tokens: Sequence[Token], index: int, words: Vocabulary) -> int:
-    first, *others = _pieces(tokens[index:])
+    first, *others = _split_statements(tokens[index:])
     statements = takewhile(lambda piece: not _is_header(piece[0], words), others)
     return index + len(first) + sum(map(len, statements))
 
@@ -214,7 +214,7 @@ def _end_of_statements(tokens: Sequence[Token], index: int, words: Vocabulary) -
 # ---- parsing -------------------------------------------------------------------------------------------------------
 
 
-class _Reader:
+class _InputParser:
     """Parses the parts of one input."""
 
     def __init__(self, source: Source, std: Standard, names: Collection[str], procedures: Collection[str]) -> None:
@@ -222,16 +222,16 @@ class _Reader:
         self._procedures = set(procedures)
         self.headers: list[tree.Header] = []
         self.statements: list[tree.Statement] = []
-        self.shown: list[int] = []
+        self.printed_starts: list[int] = []
         self.diagnostics: list[Diagnostic] = []
 
-    def headers_of(self, part: Sequence[Token]) -> None:
+    def parse_headers(self, part: Sequence[Token]) -> None:
         """Read declarations, units, an import or a procedure; the last ``;`` and the word VAR may be left out."""
         first, last = part[0], part[-1]
-        tokens = [*(_words("VAR", index=first.start) if first.kind is TokenKind.NAME else ()), *part]
-        if _depth(part) <= 0:
+        tokens = [*(_synthetic_tokens("VAR", index=first.start) if first.kind is TokenKind.NAME else ()), *part]
+        if _block_depth(part) <= 0:
             semicolon = () if last.key in (";", ".") else (";",)
-            tokens += _words(*semicolon, "BEGIN", "END", ".", index=last.end)
+            tokens += _synthetic_tokens(*semicolon, "BEGIN", "END", ".", index=last.end)
         program = self._parse(tokens, last.end, self._std)
         self.headers += program.headers
         for header in program.headers:
@@ -240,21 +240,21 @@ class _Reader:
             elif isinstance(header, tree.Procedure):
                 self._procedures.add(header.name.key)
 
-    def statements_of(self, part: Sequence[Token]) -> None:
+    def parse_statements(self, part: Sequence[Token]) -> None:
         """Read statements; an expression among them becomes a PRINT of it."""
-        std, tokens = self._std, _words("BEGIN", index=part[0].start)
-        pieces = list(_pieces(part))
+        std, tokens = self._std, _synthetic_tokens("BEGIN", index=part[0].start)
+        pieces = list(_split_statements(part))
         for piece in pieces:
             if not self._is_expression(piece, alone=len(pieces) == 1):
                 tokens += piece
                 continue
-            self.shown.append(piece[0].start)
+            self.printed_starts.append(piece[0].start)
             std = Standard.RLO_2
             remaining = piece[:-1] if piece[-1].key == ";" else piece
             start, end = remaining[0].start, remaining[-1].end
-            tokens += [*_words("PRINT", "(", index=start), *remaining, *_words(")", index=end)]
+            tokens += [*_synthetic_tokens("PRINT", "(", index=start), *remaining, *_synthetic_tokens(")", index=end)]
             tokens += piece[len(remaining) :]
-        tokens += _words("END", ".", index=part[-1].end)
+        tokens += _synthetic_tokens("END", ".", index=part[-1].end)
         self.statements += self._parse(tokens, part[-1].end, std).statements
 
     def _parse(self, tokens: list[Token], end: int, std: Standard) -> tree.Program:
@@ -271,12 +271,12 @@ class _Reader:
             known = first.kind is TokenKind.ARM or (first.kind is TokenKind.NAME and first.key in self._names)
             return alone and known and not remaining
         if first.kind is TokenKind.NAME:
-            return self._begins_value(first, _behind_brackets(remaining))
+            return self._is_value(first, _tokens_after_brackets(remaining))
         if first.kind is TokenKind.ARM:
-            return not remaining or remaining[0].key not in _ASSIGNING
-        return first.kind in _BEGINNINGS or first.key in ("(", "-", "NOT")
+            return not remaining or remaining[0].key not in _ASSIGNMENT_SIGNS
+        return first.kind in _LITERAL_KINDS or first.key in ("(", "-", "NOT")
 
-    def _begins_value(self, name: Token, remaining: Sequence[Token]) -> bool:
+    def _is_value(self, name: Token, remaining: Sequence[Token]) -> bool:
         """Whether a name with this behind it and its indices is a value."""
         if not remaining:
             known = name.key in self._names
@@ -287,11 +287,11 @@ class _Reader:
         return remaining[0].key in _OPERATORS
 
 
-def _pieces(part: Sequence[Token]) -> Iterator[Sequence[Token]]:
+def _split_statements(part: Sequence[Token]) -> Iterator[Sequence[Token]]:
     """Cut a stretch of statements behind each ``;`` that is not inside one of them."""
     first, depth = 0, 0
     for index, token in enumerate(part):
-        depth += _depth((token,))
+        depth += _block_depth((token,))
         if token.key == ";" and depth <= 0:
             yield part[first : index + 1]
             first = index + 1
@@ -299,7 +299,7 @@ def _pieces(part: Sequence[Token]) -> Iterator[Sequence[Token]]:
         yield part[first:]
 
 
-def _behind_brackets(tokens: Sequence[Token]) -> Sequence[Token]:
+def _tokens_after_brackets(tokens: Sequence[Token]) -> Sequence[Token]:
     """Return the tokens behind the indices that they begin with, if any."""
     if not tokens or tokens[0].key != "[":
         return tokens
@@ -311,7 +311,7 @@ def _behind_brackets(tokens: Sequence[Token]) -> Sequence[Token]:
     return ()
 
 
-def _words(*keys: str, index: int) -> list[Token]:
+def _synthetic_tokens(*keys: str, index: int) -> list[Token]:
     """Return words and signs that nobody has written."""
     kinds = {True: TokenKind.KEYWORD, False: TokenKind.SYMBOL}
     return [Token(kinds[key.isalpha()], key, key, index, index) for key in keys]

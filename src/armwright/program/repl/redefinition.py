@@ -14,23 +14,23 @@ _WITH_AXIS = ("FORCE",)
 
 
 @attrs.frozen(kw_only=True)
-class Redeclared:
+class RenamedProgram:
     """What is left of a session when names are declared anew.
 
     Attributes:
         headers: without what they declared of these names.
         statements: with other names for what they use of them.
-        renamed: new names of old variables and procedures that statements use, by their old ones.
-        dropped: names that no statement has used: there is nothing left of them.
+        new_names: new names of old variables and procedures that statements use, by their old ones.
+        unused_names: names that no statement has used: there is nothing left of them.
     """
 
     headers: tuple[tree.Header, ...]
     statements: tuple[tree.Statement, ...]
-    renamed: Mapping[str, str]
-    dropped: frozenset[str]
+    new_names: Mapping[str, str]
+    unused_names: frozenset[str]
 
 
-def declared(headers: Iterable[tree.Header]) -> dict[str, tree.Name]:
+def declared_names(headers: Iterable[tree.Header]) -> dict[str, tree.Name]:
     """Return the names that headers declare, variables and procedures, by key."""
     names_: dict[str, tree.Name] = {}
     for header in headers:
@@ -46,9 +46,9 @@ def redeclare(
     statements: Sequence[tree.Statement],
     names: Collection[str],
     *,
-    taken: Collection[str],
-    longest: int,
-) -> Redeclared:
+    unavailable: Collection[str],
+    max_length: int,
+) -> RenamedProgram:
     """Make room for names that are declared anew.
 
     Procedures mean the new ones from then on; the statements before get procedures of their own where these meant
@@ -58,40 +58,42 @@ def redeclare(
         headers: of the session so far.
         statements: of the session so far.
         names: declared before, and now again.
-        taken: names that cannot be given.
-        longest: how long a name may be.
+        unavailable: names that cannot be given.
+        max_length: how long a name may be.
     """
     if not names:
-        return Redeclared(headers=tuple(headers), statements=tuple(statements), renamed={}, dropped=frozenset())
+        return RenamedProgram(
+            headers=tuple(headers), statements=tuple(statements), new_names={}, unused_names=frozenset()
+        )
     procedures = {header.name.key: header for header in headers if isinstance(header, tree.Procedure)}
-    mentions = {key: mentioned(procedure) - {key} for key, procedure in procedures.items()}
-    used = _reached(mentioned(tuple(statements)), mentions)
+    mentions = {key: used_names(procedure) - {key} for key, procedure in procedures.items()}
+    used = _reachable_names(used_names(tuple(statements)), mentions)
     old = {key for key in names if key in used}
-    affected = {key for key in procedures if key in used and _reached(mentions[key], mentions) & old} - old
-    names_, taken = declared(headers), set(taken)
-    new = {key: _unused(names_[key].text, taken, longest) for key in sorted(old | affected)}
+    affected = {key for key in procedures if key in used and _reachable_names(mentions[key], mentions) & old} - old
+    names_, unavailable = declared_names(headers), set(unavailable)
+    new = {key: _unused_name(names_[key].text, unavailable, max_length) for key in sorted(old | affected)}
     remaining: list[tree.Header] = []
     for header in headers:
         if isinstance(header, tree.Procedure):
             key = header.name.key
             if key in new:
-                remaining.append(renamed(header, new))
+                remaining.append(rename_names(header, new))
             if key not in names:
                 remaining.append(header)
         elif isinstance(header, tree.Declaration):
-            own = tuple(_named(name, new) for name in header.names if name.key not in names or name.key in new)
+            own = tuple(_rename(name, new) for name in header.names if name.key not in names or name.key in new)
             remaining += [attrs.evolve(header, names=own)] if own else []
         else:
             remaining.append(header)
-    return Redeclared(
+    return RenamedProgram(
         headers=tuple(remaining),
-        statements=tuple(renamed(statement, new) for statement in statements),
-        renamed={key: new[key].key for key in new},
-        dropped=frozenset(names) - old,
+        statements=tuple(rename_names(statement, new) for statement in statements),
+        new_names={key: new[key].key for key in new},
+        unused_names=frozenset(names) - old,
     )
 
 
-def _reached(names: Collection[str], mentions: Mapping[str, Collection[str]]) -> set[str]:
+def _reachable_names(names: Collection[str], mentions: Mapping[str, Collection[str]]) -> set[str]:
     """Return the names that some names lead to, through the procedures among them."""
     reached, waiting = set(names), list(names)
     while waiting:
@@ -102,24 +104,24 @@ def _reached(names: Collection[str], mentions: Mapping[str, Collection[str]]) ->
     return reached
 
 
-def _unused(text: str, taken: set[str], longest: int) -> tree.Name:
+def _unused_name(text: str, unavailable: set[str], max_length: int) -> tree.Name:
     """Return a name like another that is not taken, and take it."""
     ends = (f"_{number}" for number in count(1))
-    candidates = (text[: longest - len(end)] + end for end in ends)
-    name = next(candidate for candidate in candidates if candidate.upper() not in taken)
-    taken.add(name.upper())
+    candidates = (text[: max_length - len(end)] + end for end in ends)
+    name = next(candidate for candidate in candidates if candidate.upper() not in unavailable)
+    unavailable.add(name.upper())
     return tree.Name(Span(0, 0), name, name.upper())
 
 
 # ---- trees ---------------------------------------------------------------------------------------------------------
 
 
-def own_names(procedure: tree.Procedure) -> set[str]:
+def local_names(procedure: tree.Procedure) -> set[str]:
     """Return the names that a procedure declares for itself."""
     return {name.key for part in (*procedure.parameters, *procedure.declarations) for name in part.names}
 
 
-def mentioned(node: object) -> set[str]:
+def used_names(node: object) -> set[str]:
     """Return the keys of the variables and procedures that a part of a program uses."""
     match node:
         case Span():
@@ -127,43 +129,43 @@ def mentioned(node: object) -> set[str]:
         case tree.Name(key=key):
             names_ = {key}
         case tree.Function(name=name, arguments=arguments):
-            names_ = set() if name.key in _WITH_AXIS else mentioned(arguments)
+            names_ = set() if name.key in _WITH_AXIS else used_names(arguments)
         case tree.Procedure(body=body):
-            names_ = mentioned(body) - own_names(node)
+            names_ = used_names(body) - local_names(node)
         case tuple():
-            names_ = set().union(*map(mentioned, node))
+            names_ = set().union(*map(used_names, node))
         case _:
-            names_ = set().union(*map(mentioned, _values(node).values()))
+            names_ = set().union(*map(used_names, _child_fields(node).values()))
     return names_
 
 
-def renamed(node: Any, new: Mapping[str, tree.Name]) -> Any:
+def rename_names(node: Any, new: Mapping[str, tree.Name]) -> Any:
     """Return a part of a program that uses other names; devices, axes and a procedure's own names stay."""
     changed = node
     match node:
         case Span():
             pass
         case tree.Name():
-            changed = _named(node, new)
+            changed = _rename(node, new)
         case tree.Function(name=name, arguments=arguments):
             if name.key not in _WITH_AXIS:
-                changed = attrs.evolve(node, arguments=renamed(arguments, new))
+                changed = attrs.evolve(node, arguments=rename_names(arguments, new))
         case tree.Procedure(name=name, body=body):
-            inner = {key: candidate for key, candidate in new.items() if key not in own_names(node)}
-            changed = attrs.evolve(node, name=_named(name, new), body=renamed(body, inner))
+            inner = {key: candidate for key, candidate in new.items() if key not in local_names(node)}
+            changed = attrs.evolve(node, name=_rename(name, new), body=rename_names(body, inner))
         case tuple():
-            changed = tuple(renamed(item, new) for item in node)
-        case _ if fields := _values(node):
-            changed = attrs.evolve(node, **{name: renamed(value, new) for name, value in fields.items()})
+            changed = tuple(rename_names(item, new) for item in node)
+        case _ if fields := _child_fields(node):
+            changed = attrs.evolve(node, **{name: rename_names(value, new) for name, value in fields.items()})
     return changed
 
 
-def _named(name: tree.Name, new: Mapping[str, tree.Name]) -> tree.Name:
+def _rename(name: tree.Name, new: Mapping[str, tree.Name]) -> tree.Name:
     candidate = new.get(name.key)
     return name if candidate is None else attrs.evolve(name, text=candidate.text, key=candidate.key)
 
 
-def _values(node: object) -> dict[str, object]:
+def _child_fields(node: object) -> dict[str, object]:
     """Return the parts of a node in which there can be names of variables; none of anything else."""
     kind = type(node)
     if not attrs.has(kind) or isinstance(node, tree.Operate):

@@ -15,7 +15,7 @@ def program_text(
     std: Standard,
     *,
     remark: str = "",
-    path_of: Callable[[str], str] = str,
+    import_path: Callable[[str], str] = str,
 ) -> str:
     """Return a program that declares and does what a session has.
 
@@ -25,24 +25,26 @@ def program_text(
         statements: that were done.
         std: the language.
         remark: for the first line, if any.
-        path_of: how the program shall name a file that the session has imported.
+        import_path: how the program shall name a file that the session has imported.
     """
     rows = [f"// {' '.join(remark.split())}"] if remark else []
-    rows += _units(headers)
-    rows += [f'IMPORT "{path_of(header.path.value)}" ;' for header in headers if isinstance(header, tree.Import)]
+    rows += _units_lines(headers)
+    rows += [f'IMPORT "{import_path(header.path.value)}" ;' for header in headers if isinstance(header, tree.Import)]
     variables = [header for header in headers if isinstance(header, tree.Declaration)]
-    rows += [("VAR " if variable is variables[0] else "    ") + declaration(variable) + " ;" for variable in variables]
-    rows += [f"{as_written(source, header)} ;" for header in headers if isinstance(header, tree.Procedure)]
-    rows += ["BEGIN", *(f"{as_written(source, statement)} ;" for statement in statements), "END.", ""]
+    rows += [
+        ("VAR " if variable is variables[0] else "    ") + declaration_text(variable) + " ;" for variable in variables
+    ]
+    rows += [f"{source_text(source, header)} ;" for header in headers if isinstance(header, tree.Procedure)]
+    rows += ["BEGIN", *(f"{source_text(source, statement)} ;" for statement in statements), "END.", ""]
     return formatted(Source(source.name, "\n".join(rows)), std=std)
 
 
-def _units(headers: Sequence[tree.Header]) -> list[str]:
+def _units_lines(headers: Sequence[tree.Header]) -> list[str]:
     units = [unit.text for header in headers if isinstance(header, tree.Units) for unit in header.units]
     return [f"UNITS {', '.join(units)} ;"] if units else []
 
 
-def declaration(node: tree.Declaration) -> str:
+def declaration_text(node: tree.Declaration) -> str:
     """Return a declaration with the names that it has now."""
     kind = str(node.type.key)
     if node.type.sizes:
@@ -50,24 +52,24 @@ def declaration(node: tree.Declaration) -> str:
     return f"{', '.join(name.text for name in node.names)} : {kind}"
 
 
-def title(source: Source, node: tree.Header) -> str:
+def header_title(source: Source, node: tree.Header) -> str:
     """Return a header in short."""
     if isinstance(node, tree.Declaration):
-        return f"VAR {declaration(node)}"
+        return f"VAR {declaration_text(node)}"
     return " ".join(source.slice(node.head if isinstance(node, tree.Procedure) else node.span).split())
 
 
-def as_written(source: Source, node: tree.Procedure | tree.Statement) -> str:
+def source_text(source: Source, node: tree.Procedure | tree.Statement) -> str:
     """Return a part of a session as it was entered, with the names that it uses now."""
     pieces, done = [], node.span.start
-    for start, end, text in sorted(_changes(source, node)):
+    for start, end, text in sorted(_name_changes(source, node)):
         pieces += [source.text[done:start], text]
         done = end
     pieces.append(source.text[done : node.span.end])
     return "".join(pieces)
 
 
-def _changes(source: Source, node: object) -> Iterator[tuple[int, int, str]]:
+def _name_changes(source: Source, node: object) -> Iterator[tuple[int, int, str]]:
     for node_ in tree.walk(node):
         if isinstance(node_, tree.Name) and source.slice(node_.span) != node_.text:
             yield node_.span.start, node_.span.end, node_.text

@@ -17,12 +17,12 @@ from armwright.program.vm.machine import Limits, Machine
 from armwright.program.vm.process import Process
 
 
-def fresh(cell: Cell, source: Source, limits: Limits) -> Machine:
+def new_machine(cell: Cell, source: Source, limits: Limits) -> Machine:
     """Return a machine that has done nothing yet."""
     return Machine(Code(instructions=(), types=PREDECLARED, source=source), cell, Simulator(cell), limits)
 
 
-def with_code(machine: Machine, code: Code, limits: Limits) -> Machine:
+def load_code(machine: Machine, code: Code, limits: Limits) -> Machine:
     """Return a machine in the same state that stands in front of other code, with all that its program declares.
 
     Args:
@@ -42,7 +42,7 @@ def with_code(machine: Machine, code: Code, limits: Limits) -> Machine:
     return Machine(code, copied.cell, copied.hardware, until, state)
 
 
-def go_through(machine: Machine) -> None:
+def run_statement(machine: Machine) -> None:
     """Run the code of a machine to its end, or to a HALT; devices that are on stay on.
 
     Raises:
@@ -66,37 +66,39 @@ def new_warnings(before: Machine, after: Machine) -> tuple[Diagnostic, ...]:
 # ---- names and cells that change -----------------------------------------------------------------------------------
 
 
-def rename(machine: Machine, names: Mapping[str, str]) -> None:
+def rename_variables(machine: Machine, names: Mapping[str, str]) -> None:
     """Let variables have other names from now on."""
 
-    def other(slot: str) -> str:
+    def new_name(slot: str) -> str:
         base, bracket, indices = slot.partition("[")
         return f"{names.get(base, base)}{bracket}{indices}"
 
-    machine.state.tree = _renamed(machine.state.tree, names, other)
-    machine.state.trees = [(time, _renamed(tree, names, other)) for time, tree in machine.state.trees]
-    machine.state.values = {other(name): value for name, value in machine.state.values.items()}
-    machine.state.events = {other(name): count for name, count in machine.state.events.items()}
-    machine.state.pose_origins = {other(name): span for name, span in machine.state.pose_origins.items()}
+    machine.state.tree = _rename_frames(machine.state.tree, names, new_name)
+    machine.state.trees = [(time, _rename_frames(tree, names, new_name)) for time, tree in machine.state.trees]
+    machine.state.values = {new_name(name): value for name, value in machine.state.values.items()}
+    machine.state.events = {new_name(name): count for name, count in machine.state.events.items()}
+    machine.state.pose_origins = {new_name(name): span for name, span in machine.state.pose_origins.items()}
     for hand in machine.state.hands.values():
-        hand.reached_frame = hand.reached_frame and other(hand.reached_frame)
-        hand.held_frame = hand.held_frame and other(hand.held_frame)
+        hand.reached_frame = hand.reached_frame and new_name(hand.reached_frame)
+        hand.held_frame = hand.held_frame and new_name(hand.held_frame)
 
 
-def _renamed(tree: FrameTree, names: Mapping[str, str], other: Callable[[str], str]) -> FrameTree:
+def _rename_frames(tree: FrameTree, names: Mapping[str, str], new_name: Callable[[str], str]) -> FrameTree:
     if not any(name.partition("[")[0] in names for name in tree.nodes):
         return tree
-    return FrameTree({other(name): attrs.evolve(node, parent=other(node.parent)) for name, node in tree.nodes.items()})
+    return FrameTree(
+        {new_name(name): attrs.evolve(node, parent=new_name(node.parent)) for name, node in tree.nodes.items()}
+    )
 
 
-def forget(machine: Machine, names: Iterable[str]) -> None:
+def remove_unused(machine: Machine, names: Iterable[str]) -> None:
     """Take declared variables away that were never used."""
     for name in names:
         if name in machine.state.tree and not machine.has_pose(name):
             machine.state.tree = machine.state.tree.without(name)
 
 
-def bring(machine: Machine, frames: Mapping[str, Node], span: Span) -> None:
+def import_frames(machine: Machine, frames: Mapping[str, Node], span: Span) -> None:
     """Put frames of an imported file where they stand, those aside that have a place already."""
     nodes = dict(machine.state.tree.nodes)
     waiting = {name: node for name, node in frames.items() if not machine.has_pose(name)}
