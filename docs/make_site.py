@@ -63,15 +63,15 @@ def api_page(folder: Path) -> str:
 def public_page() -> str:
     """Return the page of what can be had from the package and its namespaces."""
     lines = ["# armwright\n", armwright.__doc__ or ""]
-    doors = [armwright, *(thing for name in armwright.__all__ if ismodule(thing := getattr(armwright, name)))]
-    for door in doors:
+    namespaces = [armwright, *(thing for name in armwright.__all__ if ismodule(thing := getattr(armwright, name)))]
+    for namespace in namespaces:
         lines += [
-            f"\n## {door.__name__}\n",
-            door.__doc__ or "" if door is not armwright else "",
+            f"\n## {namespace.__name__}\n",
+            namespace.__doc__ or "" if namespace is not armwright else "",
             "\n| Name | What |\n|---|---|",
         ]
-        for name in getattr(door, "__all__", []):
-            thing = getattr(door, name)
+        for name in getattr(namespace, "__all__", []):
+            thing = getattr(namespace, name)
             if not name.startswith("_") and not ismodule(thing):
                 what = (thing.__doc__ or "").strip().partition("\n")[0].replace("|", "\\|")
                 lines.append(f"| [`{name}`][{thing.__module__}.{thing.__qualname__}] | {what} |")

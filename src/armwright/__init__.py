@@ -10,6 +10,6 @@ Each folder is a namespace with its functions, types and errors, imported when i
     recording = aw.program.run("stacking.rlo", cell="stanford_cell.toml")
 """
 
-from armwright.doors import attach
+from armwright.lazy_namespace import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

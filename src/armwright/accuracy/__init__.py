@@ -1,5 +1,5 @@
 """Pose and path characteristics of ISO 9283, from measured positions."""
 
-from armwright.doors import attach
+from armwright.lazy_namespace import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,5 +1,5 @@
 """What a program acts on: frames, arms, devices, camera; cell files; the kinematic simulator."""
 
-from armwright.doors import attach
+from armwright.lazy_namespace import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,5 +1,5 @@
 """Linkages with joint clearance: simulate, estimate, correct."""
 
-from armwright.doors import attach
+from armwright.lazy_namespace import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,5 +1,5 @@
 """Simulation of arms: plant with friction and stops, integrators, controllers."""
 
-from armwright.doors import attach
+from armwright.lazy_namespace import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

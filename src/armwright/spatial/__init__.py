@@ -1,5 +1,5 @@
 """Positions and orientations: poses, rotations, Euler angles, quaternions."""
 
-from armwright.doors import attach
+from armwright.lazy_namespace import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Doors of packages: what the stub beside a package lists is imported when it is first asked for."""
+"""Lazy namespaces of packages: a public name listed in the stub beside a package is imported at its first use."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +12,7 @@ MAX_DEFAULT_LENGTH = 40
 
 
 def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package whose public names stand in a stub.
+    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package whose public names are listed in a stub.
 
     Args:
         package: its ``__name__``.
@@ -20,22 +20,22 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
     """
     load, list_names, names = lazy_loader.attach_stub(package, file)
 
-    def get(name: str) -> Any:
+    def get_attribute(name: str) -> Any:
         if name not in names:
             near = closest(name, names)
             hint = f"; did you mean {near!r}?" if near else ""
             raise AttributeError(f"module {package!r} has no attribute {name!r}{hint}", name=name)
-        return readable(load(name))
+        return with_short_signature(load(name))
 
-    return get, list_names, names
+    return get_attribute, list_names, names
 
 
-class _LongDefault:
+class _OmittedDefault:
     def __repr__(self) -> str:
         return "..."
 
 
-def readable(value: Any) -> Any:
+def with_short_signature(value: Any) -> Any:
     """Return a function or class whose signature ``help()`` prints in at most 200 characters.
 
     A longer signature loses its annotations, as in the help of NumPy and SciPy, where the docstring names the types;
@@ -43,17 +43,18 @@ def readable(value: Any) -> Any:
     """
     import inspect  # noqa: PLC0415 - not needed to import the package
 
-    if not inspect.isfunction(value) and not (inspect.isclass(value) and "__init__" in vars(value)):
+    is_class = inspect.isclass(value)
+    if not inspect.isfunction(value) and not (is_class and "__init__" in vars(value)):
         return value
-    shown_as: Any = value
-    signature = inspect.signature(value.__init__ if inspect.isclass(value) else value)
-    parameters = list(signature.parameters.values())[inspect.isclass(value) :]
+    signature = inspect.signature(value.__init__ if is_class else value)
+    parameters = list(signature.parameters.values())[is_class:]
     if len(str(signature.replace(parameters=parameters))) > MAX_SIGNATURE_LENGTH:
-        shown = [
-            p.replace(annotation=p.empty, default=_LongDefault() if _is_long(p.default, p.empty) else p.default)
-            for p in parameters
-        ]
-        shown_as.__signature__ = inspect.Signature(shown)
+        value.__signature__ = inspect.Signature(
+            [
+                p.replace(annotation=p.empty, default=_OmittedDefault() if _is_long(p.default, p.empty) else p.default)
+                for p in parameters
+            ]
+        )
     return value
 
 
