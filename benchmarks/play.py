@@ -12,10 +12,10 @@ from armwright.clearance.contact import stiffness
 from armwright.clearance.feature_sweep import FeatureSweep
 from armwright.clearance.paths import TEST_PATHS, thesis_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.rest import at_rest
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import simulate
+from armwright.clearance.static_equilibrium import find_static_equilibrium
 from clearance.exudyn_five_bar import simulated
 
 STEP = 1e-5
@@ -30,7 +30,7 @@ def steps_per_second() -> None:
     progress("steps per second")
     linkage = load_linkage("five-bar")
     tasks = {
-        kind: prepare(linkage, thesis_path("y1"), Settings(step=STEP, integrator=kind, sample=0.01))
+        kind: prepare_scenario(linkage, thesis_path("y1"), Settings(step=STEP, integrator=kind, sample=0.01))
         for kind in ("rk4", "semi-implicit")
     }
     clearances = np.linspace(0.1e-3, 0.5e-3, SIDE_BY_SIDE)[:, None] * np.ones(3)
@@ -38,7 +38,7 @@ def steps_per_second() -> None:
     pin = linkage.pins[0]
     K = float(stiffness(pin.clearance, pin.journal_radius, linkage.material.young, linkage.material.poisson))
     own = np.array([pin.clearance] * 3)
-    start = at_rest(linkage, rk4.ideal.q[0], own, contact_stiffness(linkage, own)).q
+    start = find_static_equilibrium(linkage, rk4.ideal.q[0], own, contact_stiffness(linkage, own)).q
     torque = rk4.table[0, 0]
 
     def peer() -> object:

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from armwright.clearance.equations import FrictionModel
-from armwright.clearance.estimation.static import rest_offsets
+from armwright.clearance.estimation.static_estimate import rest_offsets
 from armwright.clearance.paths import named_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 
@@ -39,7 +39,7 @@ def path_rows(rng: np.random.Generator) -> Iterator[str]:
     """Give the rows of the tip on its paths, one every millisecond."""
     yield "path,t_s,x_mm,y_mm"
     for name in PATHS:
-        run = simulate(prepare(load_linkage("five-bar"), named_path(name), SETTINGS), PLAY)
+        run = simulate(prepare_scenario(load_linkage("five-bar"), named_path(name), SETTINGS), PLAY)
         places = run.tip + rng.normal(scale=TRACK_NOISE, size=run.tip.shape)
         for moment, (x, y) in zip(run.time, places, strict=True):
             yield f"{name},{moment:.4f},{x * 1e3:.5f},{y * 1e3:.5f}"

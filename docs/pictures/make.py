@@ -13,11 +13,11 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.calibration.assessment import assess_calibration
 from armwright.calibration.measurements import read_measurements
-from armwright.clearance.ideal import point_of, tip_of
+from armwright.clearance.ideal import point_position, tip_position
 from armwright.clearance.linkage import BodyPoint
 from armwright.clearance.paths import thesis_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.simulation import Simulation as Rattling, simulate as simulate_play
 from armwright.kinematics import forward, inverse, link_poses
 from armwright.kinematics.inverse_kinematics.solution import Branch
@@ -352,10 +352,10 @@ def draw_linkage(axes: Axes, run: Rattling) -> None:
     corners = [BodyPoint("ground", "J1"), BodyPoint("link1", "J2"), BodyPoint("link2", "J3")]
     others = [BodyPoint("ground", "J5"), BodyPoint("link4", "J4"), BodyPoint("link3", "J3")]
     for way in (corners, others):
-        ends = np.array([point_of(linkage, place, q[0]) for place in way]) * 1e3
+        ends = np.array([point_position(linkage, place, q[0]) for place in way]) * 1e3
         axes.plot(*ends.T, color="#c3cad2", linewidth=7, solid_capstyle="round", zorder=1)
         axes.plot(*ends.T, "o", color="white", markeredgecolor=FAINT, markersize=5, zorder=2)
-    path = tip_of(linkage, q)[:: run.scenario.stride] * 1e3
+    path = tip_position(linkage, q)[:: run.scenario.stride] * 1e3
     axes.plot(*path.T, color=INK, linewidth=1.2, linestyle=(0, (4, 3)), label="without play", zorder=3)
     taken = path + MAGNIFIED * run.error * 1e3
     axes.plot(*taken.T, color=BY_HAND, linewidth=1.6, label=f"with play, error × {MAGNIFIED}", zorder=4)
@@ -380,7 +380,7 @@ def draw_bearing(axes: Axes, run: Rattling, number: int) -> None:
 
 def rattling() -> Figure:
     """Draw the five-bar with half a millimetre of play in three pins on its path y1."""
-    run = simulate_play(prepare(load_linkage("five-bar"), thesis_path("y1")))
+    run = simulate_play(prepare_scenario(load_linkage("five-bar"), thesis_path("y1")))
     figure = Figure(figsize=(7.4, 4.4), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(1, 1.1))
     draw_linkage(left.subplots(), run)

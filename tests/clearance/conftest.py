@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.kriging import Surrogate, learn
+from armwright.clearance.estimation.kriging import Surrogate, fit_surrogate
 from armwright.clearance.feature_sweep import FeatureSweep, feature_vector
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.reader import load_linkage
@@ -46,5 +46,5 @@ def swept(five_bar: Linkage) -> Swept:
     values = task(design.points)
     names = [f"{path}_{feature}" for path in PATHS for feature in FEATURES]
     table = feature_vector(values, PATHS, FEATURES)
-    surrogate = learn(task.parameters, design.points, names, table, ranges=[RANGE] * 3)
+    surrogate = fit_surrogate(task.parameters, design.points, names, table, ranges=[RANGE] * 3)
     return Swept(task, design.points, values, surrogate)

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike
-from armwright.clearance.five_bar import FiveBar, elbows
+from armwright.clearance.five_bar import FiveBar, elbow_positions
 
 # Which side of the line from the left elbow to the right elbow the tip is on.
 ASSEMBLIES = {"below": -1.0, "above": 1.0}
@@ -18,7 +18,7 @@ ASSEMBLIES = {"below": -1.0, "above": 1.0}
 def forward(bar: FiveBar, cranks: ArrayLike, assembly: Literal["below", "above"] = "below") -> tuple[Array, Array]:
     """Return positions of the tip (..., 2) and angles of all links (..., 4); NaN where the rods do not meet."""
     theta = np.asarray(cranks, dtype=np.float64)
-    left, right = np.moveaxis(elbows(bar, theta), -2, 0)
+    left, right = np.moveaxis(elbow_positions(bar, theta), -2, 0)
     base = right - left
     square = np.sum(base**2, axis=-1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.clearance.equations import Contact, ContactMemory, FrictionModel, State, rates
 from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Guide, Linkage, Material, Pin
 from armwright.clearance.paths import Path
-from armwright.clearance.scenario import Scenario, prepare
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation
 
@@ -76,7 +76,7 @@ def still(duration: float, *drives: float) -> Path:
 
 def thrown(linkage: Linkage, settings: Settings, duration: float, speeds: ArrayLike) -> Scenario:
     """A linkage that starts with given speeds where it stood still."""
-    task = prepare(linkage, still(duration, *([0.0] * len(linkage.drives))), settings)
+    task = prepare_scenario(linkage, still(duration, *([0.0] * len(linkage.drives))), settings)
     qd = np.zeros_like(task.ideal.qd)
     qd[0] = speeds
     return attrs.evolve(task, ideal=attrs.evolve(task.ideal, qd=qd))

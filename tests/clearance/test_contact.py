@@ -11,13 +11,13 @@ from armwright.clearance.contact import (
     IMPACT_LAWS,
     Bristles,
     damping,
-    deepest,
     elastic_force,
     exact_damping,
-    falling,
+    exp_negative,
+    largest_indentation,
     linear_slip,
     normal_force,
-    restitution_of,
+    restitution_of_damping,
     smooth_slip,
     stiffness,
 )
@@ -66,7 +66,7 @@ def blow(chi: float) -> tuple[float, float, float]:
 @pytest.mark.parametrize("law", IMPACT_LAWS)
 def test_laws_of_the_papers_give_back_what_the_table_says(law: str) -> None:
     """Asked for 0.1 to 0.95, the laws give back what the closed form says of their χ: some of them much more."""
-    result = [restitution_of(damping(law, e)) for e in REQUESTED]
+    result = [restitution_of_damping(damping(law, e)) for e in REQUESTED]
 
     np.testing.assert_allclose(result, GIVEN_BACK[law], rtol=0, atol=5.1e-4)
 
@@ -79,8 +79,8 @@ def test_closed_form_is_the_motion(law: str, restitution: float) -> None:
 
     e, depth, _ = blow(chi)
 
-    assert restitution_of(chi) == pytest.approx(e, rel=INTEGRATED)
-    assert deepest(MASS, K, SPEED, chi) == pytest.approx(depth, rel=INTEGRATED)
+    assert restitution_of_damping(chi) == pytest.approx(e, rel=INTEGRATED)
+    assert largest_indentation(MASS, K, SPEED, chi) == pytest.approx(depth, rel=INTEGRATED)
 
 
 def test_time_of_an_elastic_blow() -> None:
@@ -92,10 +92,10 @@ def test_time_of_an_elastic_blow() -> None:
 
 def test_damping_fades_smoothly() -> None:
     """A blow with next to no damping is as deep as one with none."""
-    without = deepest(MASS, K, SPEED, 0.0)
+    without = largest_indentation(MASS, K, SPEED, 0.0)
 
     for chi in (1e-9, 0.9e-6, 1.1e-6, 1e-5):
-        assert deepest(MASS, K, SPEED, chi) == pytest.approx(without, rel=chi + 1e-9)
+        assert largest_indentation(MASS, K, SPEED, chi) == pytest.approx(without, rel=chi + 1e-9)
 
 
 @pytest.mark.parametrize(
@@ -118,13 +118,13 @@ def test_exact_damping(restitution: float, chi: float) -> None:
 @pytest.mark.parametrize("chi", [0.0, 1e-15, 1e-9, 0.9e-6, 1.1e-6, 1e-5])
 def test_next_to_no_damping(chi: float) -> None:
     """A little damping takes two thirds of itself from the rebound."""
-    assert 1 - restitution_of(chi) == pytest.approx(2 * chi / 3, rel=1e-3, abs=1e-15)
+    assert 1 - restitution_of_damping(chi) == pytest.approx(2 * chi / 3, rel=1e-3, abs=1e-15)
 
 
 @pytest.mark.parametrize("restitution", [1e-3, 1e-2, 0.02, 0.03, 0.5, 0.999, 1 - 1e-6])
 def test_exact_damping_and_restitution_undo_one_another(restitution: float) -> None:
     """From a restitution to χ and back there is no loss, at the ends of the range too."""
-    assert restitution_of(exact_damping(restitution)) == pytest.approx(restitution, rel=1e-7)
+    assert restitution_of_damping(exact_damping(restitution)) == pytest.approx(restitution, rel=1e-7)
 
 
 def test_no_loss_needs_no_damping() -> None:
@@ -200,8 +200,8 @@ class TestSliding:
     def test_falling_exponential(self) -> None:
         """exp(-x) is good to 13 digits up to 20, and never a wild number beyond."""
         x = np.linspace(0.0, 20.0, 301)
-        np.testing.assert_allclose(falling(x), np.exp(-x), rtol=2e-13)
-        assert 0.0 <= falling(np.array([1e3, 1e300]))[0] < 1e-290
+        np.testing.assert_allclose(exp_negative(x), np.exp(-x), rtol=2e-13)
+        assert 0.0 <= exp_negative(np.array([1e3, 1e300]))[0] < 1e-290
 
 
 class TestBristles:

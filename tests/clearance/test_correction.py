@@ -8,20 +8,20 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.clearance.correction import (
-    contact_forces,
     correct_nodes,
     correct_path,
-    lost_contacts,
-    shifted,
-    tip_at,
+    ideal_contact_forces,
+    predict_contact_loss,
+    shift_path,
     tip_errors,
+    tip_positions,
 )
-from armwright.clearance.ideal import sensitivity
+from armwright.clearance.ideal import tip_sensitivity
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.paths import Path, PickAndPlace, named_path, straight
-from armwright.clearance.predictability import perturbed
+from armwright.clearance.paths import Path, PickAndPlace, named_path, straight_path
+from armwright.clearance.predictability import perturb_clearances
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import Scenario, prepare
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import InvalidValueError, ShapeError
@@ -48,12 +48,12 @@ def linkage() -> Linkage:
 
 @cache
 def y1(clearance: float = 0.5e-3, friction: float = 0.05) -> Simulation:
-    return simulate(prepare(linkage(), named_path("y1"), CENTRE), np.full(3, clearance), frictions=friction)
+    return simulate(prepare_scenario(linkage(), named_path("y1"), CENTRE), np.full(3, clearance), frictions=friction)
 
 
 def distances_from_goals(path: Path, clearances: Array, settings: Settings = CENTRE) -> Array:
     """How far the tip is from the three targets [m]."""
-    run = simulate(prepare(linkage(), path, settings), clearances)
+    run = simulate(prepare_scenario(linkage(), path, settings), clearances)
     return np.asarray(np.linalg.norm(tip_errors(run, PickAndPlace().nodes), axis=-1))
 
 
@@ -104,7 +104,7 @@ def test_whole_path() -> None:
     assert correction.history[0] == pytest.approx(0.45e-3, rel=0.05)
     assert correction.history[-1] < 0.1 * correction.history[0]
     # Up to where the acceleration turns round and throws the journals across, all of it.
-    run = simulate(prepare(linkage(), correction.path, CENTRE), ARM_A)
+    run = simulate(prepare_scenario(linkage(), correction.path, CENTRE), ARM_A)
     before = run.time < 0.195
     goal = named_path("y1").evaluate(run.time).position
     distance = np.linalg.norm(run.tip - goal, axis=-1)[before]
@@ -120,7 +120,7 @@ class TestShifted:
     def moved(self, rng: np.random.Generator) -> tuple[Path, Array]:
         """Path y1 shifted by a millimetre or so, at random, and the shifts."""
         shifts = rng.normal(0.0, 1e-3, (9, 2))
-        return shifted(named_path("y1"), self.TIMES, shifts), shifts
+        return shift_path(named_path("y1"), self.TIMES, shifts), shifts
 
     def test_exact_at_knots(self, rng: np.random.Generator) -> None:
         """At its knots the path is moved by just the shift, and it begins and ends at rest."""
@@ -146,7 +146,7 @@ class TestShifted:
 
     def test_no_shift(self) -> None:
         """A shift of nothing leaves the path as it is, accelerations too."""
-        path, same = named_path("y1"), shifted(named_path("y1"), self.TIMES, np.zeros((9, 2)))
+        path, same = named_path("y1"), shift_path(named_path("y1"), self.TIMES, np.zeros((9, 2)))
         times = np.linspace(0.001, 0.249, 117)
 
         for expected, result in zip(path.evaluate(times), same.evaluate(times), strict=True):
@@ -154,7 +154,7 @@ class TestShifted:
 
     def test_even_shift(self) -> None:
         """A path moved as a whole is the path elsewhere."""
-        moved = shifted(PickAndPlace().path(), np.array((0.0, 0.5)), np.full((2, 2), 1e-3))
+        moved = shift_path(PickAndPlace().path(), np.array((0.0, 0.5)), np.full((2, 2), 1e-3))
         times = np.linspace(0.0, 0.5, 60)
 
         np.testing.assert_allclose(
@@ -164,7 +164,7 @@ class TestShifted:
 
 def test_contacts_that_are_lost() -> None:
     """Up to where y1 brakes no contact is lost; there the force reverses, and all three journals fly."""
-    intervals = lost_contacts(linkage(), named_path("y1"))
+    intervals = predict_contact_loss(linkage(), named_path("y1"))
     run = y1()
 
     braking = run.time > 0.199
@@ -182,17 +182,17 @@ def test_contacts_that_are_lost() -> None:
 
 def test_weak_contacts() -> None:
     """A force that is asked to be larger is lost earlier and for longer, and none is lost where little is asked."""
-    path = straight("slow", (0.0, -0.6), (0.1, -0.6), speed=0.1, ramp=0.2)
+    path = straight_path("slow", (0.0, -0.6), (0.1, -0.6), speed=0.1, ramp=0.2)
 
-    assert lost_contacts(linkage(), path, least=0.1) == {"J2": [], "J3": [], "J4": []}
-    weak = lost_contacts(linkage(), path, least=1e3)
+    assert predict_contact_loss(linkage(), path, least=0.1) == {"J2": [], "J3": [], "J4": []}
+    weak = predict_contact_loss(linkage(), path, least=1e3)
     assert all(spans == [(0.0, pytest.approx(path.duration))] for spans in weak.values())
 
 
 def test_forces_of_the_ideal_arm() -> None:
     """The forces at the start of a slow path hold what hangs on the pins: 1.6 kg of rods and 0.98 N."""
-    path = straight("slow", (0.0, -0.6), (0.1, -0.6), speed=0.05, ramp=0.5)
-    times, forces = contact_forces(linkage(), path, samples=11)
+    path = straight_path("slow", (0.0, -0.6), (0.1, -0.6), speed=0.05, ramp=0.5)
+    times, forces = ideal_contact_forces(linkage(), path, samples=11)
 
     assert forces.shape == (11, 3, 2)
     assert times[-1] == path.duration
@@ -204,7 +204,7 @@ def leaning_error(task: Scenario, clearances: Array) -> Array:
     """Return (..., s, 2) errors of the tip while every journal is on its wall along the force without play [m]."""
     q, force = (x[:: task.stride] for x in (task.ideal.q, task.ideal.reactions))
     direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
-    return np.einsum("sapb,spb,...p->...sa", sensitivity(task.linkage, q), direction, clearances)
+    return np.einsum("sapb,spb,...p->...sa", tip_sensitivity(task.linkage, q), direction, clearances)
 
 
 def test_leaning_tip() -> None:
@@ -212,8 +212,8 @@ def test_leaning_tip() -> None:
 
     Later the cranks drift, which nothing but the ideal effort drives; the leaning knows nothing of that.
     """
-    path, play = straight("slow", (-0.15, -0.7), (-0.15, -0.697), speed=0.02, ramp=0.1), np.full(3, 0.5e-3)
-    run = simulate(prepare(linkage(), path, COARSE), play, frictions=0.0)
+    path, play = straight_path("slow", (-0.15, -0.7), (-0.15, -0.697), speed=0.02, ramp=0.1), np.full(3, 0.5e-3)
+    run = simulate(prepare_scenario(linkage(), path, COARSE), play, frictions=0.0)
     predicted = leaning_error(run.scenario, play)
 
     assert run.depths.min() > -1e-6
@@ -225,7 +225,7 @@ def test_leaning_tip() -> None:
 def test_leaning_grows_with_play() -> None:
     """Twice the play is twice the leaning, and the errors of the pins add up."""
     clearances = np.array([ARM_A, 2 * ARM_A, *(ARM_A * np.eye(3))])
-    predicted = leaning_error(prepare(linkage(), named_path("x2"), COARSE), clearances)
+    predicted = leaning_error(prepare_scenario(linkage(), named_path("x2"), COARSE), clearances)
 
     np.testing.assert_allclose(predicted[1], 2 * predicted[0], rtol=1e-12)
     np.testing.assert_allclose(predicted[2:].sum(axis=0), predicted[0], rtol=1e-9, atol=1e-15)
@@ -237,7 +237,7 @@ def test_between_samples() -> None:
     way = np.stack([np.sin(9 * run.time), np.cos(7 * run.time)], axis=-1)
     times = np.array([0.0, 0.033_333, 0.12345, run.time[-1]])
 
-    tips = tip_at(attrs.evolve(run, tip=way), times)
+    tips = tip_positions(attrs.evolve(run, tip=way), times)
 
     np.testing.assert_allclose(tips, np.stack([np.sin(9 * times), np.cos(7 * times)], axis=-1), rtol=0, atol=1e-9)
 
@@ -266,7 +266,7 @@ def test_too_much_play() -> None:
 
 def test_diverging() -> None:
     """A linkage whose simulation diverges has no path that puts it right."""
-    run = simulate(prepare(linkage(), named_path("y1"), CENTRE), ARM_A, frictions=1e4)
+    run = simulate(prepare_scenario(linkage(), named_path("y1"), CENTRE), ARM_A, frictions=1e4)
     with pytest.raises(InvalidValueError, match="the simulation diverged; the path cannot be corrected"):
         tip_errors(run, named_path("y1").evaluate([0.25]).position)
 
@@ -277,7 +277,9 @@ def test_best_round_is_kept() -> None:
 
     assert correction.best == int(np.argmin(correction.history))
     assert correction.after.mean() == min(correction.history)
-    run = simulate(prepare(linkage(), correction.path), perturbed(np.array((0.3e-3, 0.2e-3, 0.25e-3))))
+    run = simulate(
+        prepare_scenario(linkage(), correction.path), perturb_clearances(np.array((0.3e-3, 0.2e-3, 0.25e-3)))
+    )
     goals = named_path("y2").evaluate(np.array(correction.path.targets)).position
     assert np.linalg.norm(tip_errors(run, goals), axis=-1).mean() == min(correction.history)
 
@@ -292,7 +294,7 @@ def test_mean_over_runs_that_nobody_can_tell_apart() -> None:
 
     assert correction.before.shape == correction.after.shape == (16, 12)
     others = ARM_A + np.random.default_rng(3).uniform(-1e-9, 1e-9, (64, 3))
-    run = simulate(prepare(linkage(), correction.path, CENTRE), others)
+    run = simulate(prepare_scenario(linkage(), correction.path, CENTRE), others)
     away = np.linalg.norm(tip_errors(run, path.evaluate(np.array(correction.path.targets)).position), axis=-1)
     late = slice(6, None)
     assert correction.after.std(axis=0, ddof=1)[late].max() > 1e-6

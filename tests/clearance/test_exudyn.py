@@ -7,7 +7,7 @@ import pytest
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import thesis_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import simulate
 from clearance.arms import beginning
@@ -35,7 +35,7 @@ def linkage(request: pytest.FixtureRequest) -> Linkage:
 def test_up_to_the_impacts(linkage: Linkage) -> None:
     """Both tips follow the same path until they slow down, to 5 µm of 1 mm, and the nearer the finer its steps."""
     settings = Settings(step=2e-6, sample=EVERY, impact="carvalho-martins")
-    task = prepare(linkage, beginning(thesis_path("y1"), END + EVERY), settings)
+    task = prepare_scenario(linkage, beginning(thesis_path("y1"), END + EVERY), settings)
     run = simulate(task, [CLEARANCE] * 3)
     samples = round(END / EVERY) + 1
     efforts = task.ideal.efforts

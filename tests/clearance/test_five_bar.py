@@ -10,7 +10,7 @@ from hypothesis import assume, given, strategies as st
 
 from armwright.clearance import ideal
 from armwright.clearance.five_bar import MODES, FiveBar, arm_angles, inverse, inverse_all
-from armwright.clearance.five_bar_parts import configuration
+from armwright.clearance.five_bar_parts import five_bar_coordinates
 from armwright.clearance.five_bar_workspace import (
     boundary_distance,
     condition_number,
@@ -23,7 +23,7 @@ from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Gu
 from armwright.clearance.paths import thesis_path
 from armwright.clearance.placement import Vec2
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 from clearance.five_bar_motion import ASSEMBLIES, accelerations, forward, speeds
 
@@ -194,10 +194,10 @@ def test_newton_agrees(tip: tuple[float, float], mode: Any) -> None:
     assume(boundary_distance(bar, tip) > 0.01)
     angles = inverse(bar, tip, mode)
     assume(abs(singularity_sines(angles)[1]) > WELL)
-    q = configuration(linkage, angles)
+    q = five_bar_coordinates(linkage, angles)
 
-    np.testing.assert_allclose(ideal.closed(linkage, q, tip=tip), q, atol=ROUNDING)
-    np.testing.assert_allclose(ideal.gaps_of(linkage, q), 0.0, atol=ROUNDING)
+    np.testing.assert_allclose(ideal.close_pins(linkage, q, tip=tip), q, atol=ROUNDING)
+    np.testing.assert_allclose(ideal.pin_gaps(linkage, q), 0.0, atol=ROUNDING)
 
 
 @given(CRANKS, st.tuples(*[st.floats(-2, 2)] * 2), st.tuples(*[st.floats(-40, 40)] * 2))
@@ -208,7 +208,7 @@ def test_speeds_and_accelerations_agree(
     linkage = load_linkage("five-bar")
     bar = FiveBar.of(linkage)
     _, angles = well_posed(bar, cranks)
-    q = configuration(linkage, angles)
+    q = five_bar_coordinates(linkage, angles)
     names = [str(coordinate) for coordinate in linkage.coordinates]
     links = [names.index(f"link{i}.angle") for i in range(1, 5)]
 
@@ -224,7 +224,7 @@ def test_speeds_and_accelerations_agree(
 
 def test_along_a_test_path(linkage: Linkage, bar: FiveBar) -> None:
     """All along path x3 the closed form is the motion that the simulation was prepared with."""
-    task = prepare(linkage, thesis_path("x3"))
+    task = prepare_scenario(linkage, thesis_path("x3"))
     t = np.arange(task.steps + 1) * task.h
     state = task.path.evaluate(t)
 
@@ -238,12 +238,14 @@ def test_along_a_test_path(linkage: Linkage, bar: FiveBar) -> None:
 def test_configuration_chooses_the_mode(linkage: Linkage, bar: FiveBar, mode: Any) -> None:
     """A path can be prepared in any mode: the guess chooses it, and the path keeps it."""
     path = thesis_path("y4")
-    guess = configuration(linkage, inverse(bar, path.evaluate(0.0).position, mode))
+    guess = five_bar_coordinates(linkage, inverse(bar, path.evaluate(0.0).position, mode))
 
-    task = prepare(linkage, path, guess=guess)
+    task = prepare_scenario(linkage, path, guess=guess)
 
     angles = inverse(bar, path.evaluate(path.duration).position, mode)
-    np.testing.assert_allclose(np.sin(task.ideal.q[-1] - configuration(linkage, angles))[[0, 3, 6, 7]], 0, atol=1e-9)
+    np.testing.assert_allclose(
+        np.sin(task.ideal.q[-1] - five_bar_coordinates(linkage, angles))[[0, 3, 6, 7]], 0, atol=1e-9
+    )
 
 
 # ---- singularities and workspace -----------------------------------------------------------------------------------
@@ -472,9 +474,9 @@ def test_any_naming_and_axes(bar: FiveBar) -> None:
     for name in ("motors", "cranks", "rods"):
         np.testing.assert_allclose(getattr(recognised, name), getattr(bar, name), atol=ROUNDING)
     tip = np.array([-0.12, -0.63])
-    q = configuration(other, inverse(recognised, tip, "left"))
-    np.testing.assert_allclose(ideal.gaps_of(other, q), 0.0, atol=ROUNDING)
-    np.testing.assert_allclose(ideal.tip_of(other, q), tip, atol=ROUNDING)
+    q = five_bar_coordinates(other, inverse(recognised, tip, "left"))
+    np.testing.assert_allclose(ideal.pin_gaps(other, q), 0.0, atol=ROUNDING)
+    np.testing.assert_allclose(ideal.tip_position(other, q), tip, atol=ROUNDING)
 
 
 def test_guide_in_the_loop(linkage: Linkage) -> None:

@@ -11,19 +11,19 @@ from scipy.optimize import brentq
 from armwright.clearance.equations import kinetic_energy, potential_energy
 from armwright.clearance.ideal import (
     IdealMotion,
-    balance,
-    closed,
-    gaps_of,
+    close_pins,
     ideal_motion,
-    point_of,
-    sensitivity,
-    tip_of,
+    inverse_dynamics,
+    pin_gaps,
+    point_position,
+    tip_position,
+    tip_sensitivity,
 )
 from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Linkage, Pin
-from armwright.clearance.paths import Path, constant_speed_path, hermite, thesis_path
+from armwright.clearance.paths import Path, constant_speed_path, hermite_path, thesis_path
 from armwright.clearance.placement import Placement
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import assembly_guess, prepare
+from armwright.clearance.scenario import assembly_guess, prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.errors import InvalidValueError, ShapeError
 from clearance.mechanisms import axes
@@ -69,9 +69,9 @@ class TestSqueezer:
         """With the published angles all loops are closed, and from ten degrees beside Newton finds them."""
         linkage, q = squeezer(theirs[2]), ours(theirs)
 
-        assert np.abs(gaps_of(linkage, q)).max() < ROUNDING
+        assert np.abs(pin_gaps(linkage, q)).max() < ROUNDING
         beside = q + np.radians(10.0) * np.array((0, 1, -1, 1, 1, -1, 1)) * 0.2
-        np.testing.assert_allclose(closed(linkage, beside, drives=q[:1]), q, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(close_pins(linkage, beside, drives=q[:1]), q, rtol=0, atol=ROUNDING)
 
     def test_start(self) -> None:
         """At the start the motor speeds β up with 14222.44 rad/s², and the first loop carries 98.57 N."""
@@ -155,7 +155,7 @@ class TestTwoFourBars:
             atol=1e-11,
         )
 
-        tip = tip_of(bars(), np.array((*[done.y[0, -1]] * 3, 0.0, 0.0)))
+        tip = tip_position(bars(), np.array((*[done.y[0, -1]] * 3, 0.0, 0.0)))
         np.testing.assert_allclose(tip, (0.695287, 0.718733), rtol=0, atol=PRINTED)
 
 
@@ -177,7 +177,7 @@ class TestSliderCrank:
     def test_all_round(self) -> None:
         """The slider is at r cos θ + √(l² - r² sin² θ), all round."""
         linkage = load_linkage("slider-crank")
-        task = prepare(linkage, constant_speed_path("round", 0.0, self.SPEED, 0.012), Settings(step=1e-5))
+        task = prepare_scenario(linkage, constant_speed_path("round", 0.0, self.SPEED, 0.012), Settings(step=1e-5))
 
         crank = task.ideal.q[:, 0]
         np.testing.assert_allclose(crank, self.SPEED * np.linspace(0.0, 0.012, len(crank)), rtol=0, atol=1e-11)
@@ -190,37 +190,37 @@ class TestFiveBar:
 
     def test_start(self, linkage: Linkage) -> None:
         """At (-150, -700) mm its links stand at -1.252325, 0.369776, -0.756151 and 0.711901 rad, elbows out."""
-        q = closed(linkage, assembly_guess(linkage), tip=[-0.15, -0.7])
+        q = close_pins(linkage, assembly_guess(linkage), tip=[-0.15, -0.7])
 
         np.testing.assert_allclose(q[[0, 3, 6, 7]], (-1.252325, 0.369776, -0.756151, 0.711901), rtol=0, atol=PRINTED)
 
     def test_torques(self, linkage: Linkage) -> None:
         """On y1 its motors give -22.064347 and 15.470070 N m at the start, -8.049372 and 5.194691 N m at 0.1 s."""
-        task = prepare(linkage, thesis_path("y1"), Settings(step=1e-4))
+        task = prepare_scenario(linkage, thesis_path("y1"), Settings(step=1e-4))
 
         np.testing.assert_allclose(task.table[0, 0], (-22.064347, 15.470070), rtol=0, atol=PRINTED)
         np.testing.assert_allclose(task.table[1000, 0], (-8.049372, 5.194691), rtol=0, atol=PRINTED)
 
     def test_shift_of_the_tip(self, linkage: Linkage) -> None:
         """At (-180, -600) mm play shifts the tip by 0.65, 0.62 and -0.87 of it in x, -0.82, -0.77, -0.31 in y."""
-        q = closed(linkage, assembly_guess(linkage), tip=[-0.18, -0.6])
+        q = close_pins(linkage, assembly_guess(linkage), tip=[-0.18, -0.6])
         still = np.zeros_like(q)
-        _, reactions = balance(linkage, q, still, still)
+        _, reactions = inverse_dynamics(linkage, q, still, still)
 
         directions = reactions / np.linalg.norm(reactions, axis=-1, keepdims=True)
-        B = np.einsum("apb,pb->ap", sensitivity(linkage, q), directions)
+        B = np.einsum("apb,pb->ap", tip_sensitivity(linkage, q), directions)
         np.testing.assert_allclose(
             B, ((0.6545, 0.6187, -0.8721), (-0.8197, -0.7748, -0.3134)), rtol=0, atol=OVER_A_PLAY
         )
 
     def test_shift_is_the_slope_of_the_closure(self, linkage: Linkage) -> None:
         """Opening one pin by a micrometre shifts the tip as the sensitivity says, in every direction."""
-        q = closed(linkage, assembly_guess(linkage), tip=[0.1, -0.55])
-        slope, small = sensitivity(linkage, q), 1e-6
+        q = close_pins(linkage, assembly_guess(linkage), tip=[0.1, -0.55])
+        slope, small = tip_sensitivity(linkage, q), 1e-6
         for pin, axis in np.ndindex(3, 2):
             gaps = np.zeros((2, 3, 2))
             gaps[:, pin, axis] = small, -small
-            up, down = tip_of(linkage, closed(linkage, q, drives=q[[0, 7]], gaps=gaps))
+            up, down = tip_position(linkage, close_pins(linkage, q, drives=q[[0, 7]], gaps=gaps))
             np.testing.assert_allclose((up - down) / (2 * small), slope[:, pin, axis], rtol=0, atol=1e-7)
 
 
@@ -229,7 +229,7 @@ def four_bar_path() -> Path:
 
 
 def five_bar_path() -> Path:
-    return hermite("bend", [0.0, 0.3], [(-0.1, -0.7), (0.1, -0.5)], [(1, 0), (0, 1)], [1])
+    return hermite_path("bend", [0.0, 0.3], [(-0.1, -0.7), (0.1, -0.5)], [(1, 0), (0, 1)], [1])
 
 
 @pytest.mark.parametrize(
@@ -244,7 +244,7 @@ def five_bar_path() -> Path:
 def test_drives_give_the_energy(name: str, path: Path) -> None:
     """What the drives of a linkage give is what its energy grows by, to the last joule: reactions do no work."""
     linkage = load_linkage(name)
-    task = prepare(linkage, path, Settings(step=1e-4))
+    task = prepare_scenario(linkage, path, Settings(step=1e-4))
     ideal = task.ideal
 
     placement = Placement(linkage, axes(ideal.q), axes(ideal.qd))
@@ -261,11 +261,11 @@ def test_many_as_one(name: str, rng: np.random.Generator) -> None:
     """A batch of configurations gives what each of them gives alone, to rounding."""
     linkage = load_linkage(name)
     guess = assembly_guess(linkage)
-    start = closed(linkage, guess, drives=guess[list(linkage.driven)])
+    start = close_pins(linkage, guess, drives=guess[list(linkage.driven)])
     drives = start[list(linkage.driven)] + rng.uniform(-0.1, 0.1, (2, 3, len(linkage.drives)))
     speeds, pulls = rng.uniform(-1, 1, (2, *drives.shape))
 
-    q = closed(linkage, start, drives=drives)
+    q = close_pins(linkage, start, drives=drives)
     many = ideal_motion(linkage, q, speeds, pulls, by_tip=False)
 
     assert many.reactions.shape == (2, 3, len(linkage.pins), 2)
@@ -278,7 +278,7 @@ def test_many_as_one(name: str, rng: np.random.Generator) -> None:
 def test_tip_or_drives_lead_alike() -> None:
     """Led by its tip or by its drives the five-bar moves alike and needs the same torques."""
     linkage = load_linkage("five-bar")
-    q = closed(linkage, assembly_guess(linkage), tip=[0.05, -0.62])
+    q = close_pins(linkage, assembly_guess(linkage), tip=[0.05, -0.62])
 
     by_tip = ideal_motion(linkage, q, [0.7, -0.4], [3.0, 20.0], by_tip=True)
     driven = list(linkage.driven)
@@ -291,7 +291,7 @@ def test_tip_or_drives_lead_alike() -> None:
 def test_speeds_and_accelerations_are_slopes() -> None:
     """Speeds and accelerations along a path are the slopes of its coordinates in time."""
     linkage = load_linkage("four-bar")
-    task = prepare(linkage, constant_speed_path("round", 1.0, 5.0, 0.02), Settings(step=1e-5))
+    task = prepare_scenario(linkage, constant_speed_path("round", 1.0, 5.0, 0.02), Settings(step=1e-5))
     q, qd, qdd = task.ideal.q, task.ideal.qd, task.ideal.qdd
 
     np.testing.assert_allclose((q[2:] - q[:-2]) / (2 * task.h), qd[1:-1], rtol=0, atol=1e-7)
@@ -304,7 +304,7 @@ def test_rocker_of_a_crank_rocker() -> None:
     guess = assembly_guess(linkage)
 
     def rocker_speed(crank: float) -> float:
-        q = closed(linkage, guess, drives=[crank])
+        q = close_pins(linkage, guess, drives=[crank])
         return float(ideal_motion(linkage, q, [1.0], [0.0], by_tip=False).qd[2])
 
     crank = brentq(rocker_speed, 0.2, 1.2)
@@ -316,7 +316,9 @@ def test_places_of_points() -> None:
     """A point is where its body is: the elbow of a crank that hangs down is 0.3 m below its pin."""
     linkage = load_linkage("five-bar")
 
-    np.testing.assert_allclose(point_of(linkage, BodyPoint("link1", "J2"), np.zeros(8)), (-0.1, -0.3), atol=ROUNDING)
+    np.testing.assert_allclose(
+        point_position(linkage, BodyPoint("link1", "J2"), np.zeros(8)), (-0.1, -0.3), atol=ROUNDING
+    )
 
 
 class TestRefused:
@@ -326,14 +328,14 @@ class TestRefused:
         """A point two metres away cannot be reached by arms of a metre."""
         linkage = load_linkage("five-bar")
         with pytest.raises(InvalidValueError, match=r"five-bar: the path cannot be followed.*out of reach"):
-            closed(linkage, assembly_guess(linkage), tip=[0.0, -2.0])
+            close_pins(linkage, assembly_guess(linkage), tip=[0.0, -2.0])
 
     def test_path_that_leaves(self) -> None:
         """Of a path that leaves the reach halfway the message says where it is lost."""
         linkage = load_linkage("five-bar")
-        path = hermite("away", [0.0, 1.0], [(0.0, -0.7), (0.0, -1.4)], [(0, 0), (0, 0)], [1])
+        path = hermite_path("away", [0.0, 1.0], [(0.0, -0.7), (0.0, -1.4)], [(0, 0), (0, 0)], [1])
         with pytest.raises(InvalidValueError, match="five-bar: the path cannot be followed"):
-            prepare(linkage, path, Settings(step=1e-4))
+            prepare_scenario(linkage, path, Settings(step=1e-4))
 
     def test_crank_that_cannot_turn(self) -> None:
         """A rod shorter than the crank locks it."""
@@ -343,7 +345,7 @@ class TestRefused:
             for body in linkage.bodies
         ]
         with pytest.raises(InvalidValueError, match="four-bar: the drives cannot be followed"):
-            prepare(
+            prepare_scenario(
                 attrs.evolve(linkage, bodies=long), constant_speed_path("round", 1.0, 20.0, 0.3), Settings(step=1e-3)
             )
 
@@ -352,29 +354,29 @@ class TestRefused:
         linkage = load_linkage("five-bar")
         for goals in ({}, {"tip": [0.0, -0.6], "drives": [0.0, 0.0]}):
             with pytest.raises(ShapeError, match="expected either the position of the tip, or the driven coordinates"):
-                closed(linkage, assembly_guess(linkage), **goals)
+                close_pins(linkage, assembly_guess(linkage), **goals)
 
     def test_wrong_number_of_drives(self) -> None:
         """The five-bar has two drives."""
         linkage = load_linkage("five-bar")
         with pytest.raises(ShapeError, match=r"drives: expected a shape ending in \(2,\), got \(3,\)"):
-            closed(linkage, assembly_guess(linkage), drives=[0.0, 0.0, 0.0])
+            close_pins(linkage, assembly_guess(linkage), drives=[0.0, 0.0, 0.0])
 
     def test_too_few_drives(self) -> None:
         """With one motor the five-bar's two freedoms are not determined."""
         linkage = load_linkage("five-bar")
         lame = attrs.evolve(linkage, drives=linkage.drives[:1])
-        q = closed(linkage, assembly_guess(linkage), tip=[0.0, -0.6])
+        q = close_pins(linkage, assembly_guess(linkage), tip=[0.0, -0.6])
         with pytest.raises(InvalidValueError, match="one drive for each freedom, got 1 drives for 2 freedoms"):
-            balance(lame, q, np.zeros(8), np.zeros(8))
+            inverse_dynamics(lame, q, np.zeros(8), np.zeros(8))
         with pytest.raises(InvalidValueError, match="it has 2 freedoms, and its drives fix 1; expected as many"):
-            closed(lame, q, drives=[0.0])
+            close_pins(lame, q, drives=[0.0])
 
     def test_tip_of_one_drive(self) -> None:
         """A slider-crank cannot lead its tip through the plane."""
         linkage = load_linkage("slider-crank")
         with pytest.raises(InvalidValueError, match="it has 1 freedom, and a position of the tip fixes 2"):
-            closed(linkage, assembly_guess(linkage), tip=[0.17, 0.0])
+            close_pins(linkage, assembly_guess(linkage), tip=[0.17, 0.0])
 
     def test_singular(self) -> None:
         """A parallelogram that lies flat can continue in two assemblies."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from armwright.clearance.contact import IMPACT_LAWS, SLOWEST_IMPACT, ImpactLaw, damping, restitution_of
+from armwright.clearance.contact import IMPACT_LAWS, SLOWEST_IMPACT, ImpactLaw, damping, restitution_of_damping
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation, simulate
 from clearance.mechanisms import block, imbalance, thrown
@@ -59,7 +59,7 @@ def test_blows_rebound_by_the_closed_form(law: ImpactLaw, restitution: float) ->
         assert e == pytest.approx(1.0, abs=AT_FINE)
     else:
         assert math.log((1 + chi) / (1 - chi * e)) / chi == pytest.approx(1 + e, rel=3 * AT_FINE)
-    assert e == pytest.approx(restitution_of(chi), rel=AT_FINE)
+    assert e == pytest.approx(restitution_of_damping(chi), rel=AT_FINE)
 
 
 @pytest.mark.parametrize("restitution", [0.6, 0.75, 0.9])
@@ -98,7 +98,7 @@ def test_blows_lose_what_the_ledger_says() -> None:
     """A blow at 1 m/s on 1 kg loses (1 - e²) / 2 joule, and the ledger closes at every moment."""
     run = struck(0.8, impact="hu-guo")
 
-    e = restitution_of(damping("hu-guo", 0.8))
+    e = restitution_of_damping(damping("hu-guo", 0.8))
     assert run.works["impact loss"][-1] == pytest.approx((1 - e * e) / 2, rel=2 * AT_FINE)
     assert np.abs(imbalance(run)).max() < LEAK
 
@@ -112,7 +112,7 @@ def test_slow_blows_count_as_blows_of_a_millimetre_a_second() -> None:
 
     chi = damping("hu-guo", 0.6) * speed / SLOWEST_IMPACT
     assert run.impacts.tolist() == [1]
-    assert rebound(run) == pytest.approx(restitution_of(chi), rel=AT_FINE)
+    assert rebound(run) == pytest.approx(restitution_of_damping(chi), rel=AT_FINE)
 
 
 def test_side_wall_is_struck_by_both_masses() -> None:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 
-from armwright.clearance.paths import straight
+from armwright.clearance.paths import straight_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 from clearance.arms import beginning
@@ -22,7 +22,7 @@ PRINTED = 6e-7
 def swung(integrator: str, step: float, duration: float = 1.0) -> np.ndarray:
     """(s, 2) where the pendulum's bob is each second, released from the level on the left."""
     settings = Settings(step=step, sample=1.0, integrator=integrator)  # type: ignore[arg-type]
-    return simulate(left_alone(prepare(pendulum(), still(duration, -np.pi), settings))).tip
+    return simulate(left_alone(prepare_scenario(pendulum(), still(duration, -np.pi), settings))).tip
 
 
 def bob(t: float) -> np.ndarray:
@@ -78,7 +78,7 @@ def test_ledger_on_the_wall() -> None:
 def test_controller_brings_it_to_its_goal() -> None:
     """A pendulum that is held with 200 N m/rad and 10 N m s/rad swings into its goal as a linear one does."""
     settings = Settings(step=1e-4, sample=1e-2, control="pd+ff", gains=(200.0, 10.0))
-    task = prepare(pendulum(), still(0.3, -np.pi / 2), settings)
+    task = prepare_scenario(pendulum(), still(0.3, -np.pi / 2), settings)
     displaced = task.ideal.q.copy()
     displaced[0] += 1e-3
     run = simulate(attrs.evolve(task, ideal=attrs.evolve(task.ideal, q=displaced)))
@@ -94,13 +94,13 @@ def test_controller_brings_it_to_its_goal() -> None:
 def test_order_across_a_jump_within_a_step(part: float) -> None:
     """Where the acceleration jumps within a step, Runge-Kutta keeps its order 4: the step is cut at the jump."""
     linkage, clearances = load_linkage("five-bar"), np.full(3, 0.3e-3)
-    line = straight("diagonal", (-0.12, -0.68), (0.11, -0.47))
+    line = straight_path("diagonal", (-0.12, -0.68), (0.11, -0.47))
     # Up to 10 ms beyond the jump at 50 ms, before a journal comes down for the first time; the jump is off the steps.
     knots = np.array([0.0, 0.05, 0.05 + 0.05 * 20 / (100 + part)])
     path = attrs.evolve(line, knots=knots, pieces=line.pieces[:2], targets=())
     errors = []
     for steps in (3000, 6000, 12000, 24000):
-        task = prepare(linkage, path, Settings(step=path.duration / steps, sample=path.duration / 4))
+        task = prepare_scenario(linkage, path, Settings(step=path.duration / steps, sample=path.duration / 4))
         assert len(task.table) == task.steps + 1
         assert task.lengths.sum() == pytest.approx(path.duration, abs=1e-15)
         errors.append(simulate(task, clearances, frictions=0.0).error[-1])
@@ -112,12 +112,12 @@ def test_order_across_a_jump_within_a_step(part: float) -> None:
 def test_located_impacts_in_parted_steps() -> None:
     """Cutting steps at impacts as well as at jumps comes to the same position as a quarter of the step."""
     linkage, clearances = load_linkage("five-bar"), np.full(3, 0.3e-3)
-    path = straight("diagonal", (-0.12, -0.68), (0.11, -0.47))
+    path = straight_path("diagonal", (-0.12, -0.68), (0.11, -0.47))
     # Beyond the jump; later impacts differ.
     start = beginning(path, path.duration / 4)
     settings = Settings(sample=path.duration / 20, located=True)
     runs = [
-        simulate(prepare(linkage, start, attrs.evolve(settings, step=path.duration / n)), clearances)
+        simulate(prepare_scenario(linkage, start, attrs.evolve(settings, step=path.duration / n)), clearances)
         for n in (12880, 51520)
     ]
 

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import thesis_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import Scenario, prepare
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation, simulate
 from clearance.arms import beginning
@@ -50,7 +50,7 @@ def cartesian(q: np.ndarray, speeds_at: np.ndarray | None = None) -> np.ndarray:
 def test_without_contact(five_bar: Linkage) -> None:
     """While journals fly, links tied by multipliers follow the same path as links that hang in trees."""
     settings = Settings(step=1e-5, sample=2e-3, start="centred")
-    task = prepare(five_bar, beginning(thesis_path("y1"), 0.04), settings)
+    task = prepare_scenario(five_bar, beginning(thesis_path("y1"), 0.04), settings)
     run = simulate(task, [0.1] * 3)
 
     assert run.depths.max() < -0.03
@@ -64,7 +64,7 @@ def test_without_contact(five_bar: Linkage) -> None:
 def test_in_contact(five_bar: Linkage, friction: float) -> None:
     """With journals on their walls and friction, both follow the same path too: the levers and signs are right."""
     settings = Settings(step=2e-6, sample=1e-3)
-    task = prepare(five_bar, beginning(thesis_path("y1"), 0.006), settings)
+    task = prepare_scenario(five_bar, beginning(thesis_path("y1"), 0.006), settings)
     run = simulate(task, frictions=friction)
 
     K = float(contact_stiffness(five_bar, np.full(3, 5e-4))[0])

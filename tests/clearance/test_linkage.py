@@ -17,7 +17,7 @@ from armwright.clearance.linkage import (
     Load,
     Material,
     Pin,
-    exact,
+    round_to_right_angle,
 )
 from armwright.clearance.reader import load_linkage
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
@@ -68,8 +68,8 @@ class TestWhatItIs:
 
     def test_right_angles_are_exact(self) -> None:
         """The cosine of a right angle is 0, not 6e-17."""
-        assert [exact(float(np.cos(k * np.pi / 2))) for k in range(4)] == [1.0, 0.0, -1.0, 0.0]
-        assert exact(0.5) == 0.5
+        assert [round_to_right_angle(float(np.cos(k * np.pi / 2))) for k in range(4)] == [1.0, 0.0, -1.0, 0.0]
+        assert round_to_right_angle(0.5) == 0.5
 
 
 def changed(linkage: Linkage, what: str, number: int, **changes: Any) -> Linkage:

@@ -10,9 +10,9 @@ from armwright.clearance.paths import (
     TOP_SPEED,
     PickAndPlace,
     constant_speed_path,
-    hermite,
+    hermite_path,
     named_path,
-    straight,
+    straight_path,
     thesis_path,
 )
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
@@ -58,7 +58,7 @@ class TestStraight:
 
     def test_shortest(self) -> None:
         """Where there is just room to speed up and slow down, nothing is left between."""
-        path = straight("short", (0, 0), (TOP_SPEED * RAMP, 0))
+        path = straight_path("short", (0, 0), (TOP_SPEED * RAMP, 0))
 
         assert len(path.pieces) == 2
         assert path.duration == pytest.approx(2 * RAMP)
@@ -67,20 +67,20 @@ class TestStraight:
     def test_too_short(self) -> None:
         """10 mm are not enough to reach 1.5 m/s in 0.05 s: 75 mm are."""
         with pytest.raises(InvalidValueError, match=r"path dash: 10 mm are too short .* at least 75 mm are needed"):
-            straight("dash", (0, 0), (0.01, 0))
+            straight_path("dash", (0, 0), (0.01, 0))
         with pytest.raises(InvalidValueError, match="too short"):
-            straight("dash", (0.1, 0), (0.1, 0))
+            straight_path("dash", (0.1, 0), (0.1, 0))
 
     @pytest.mark.parametrize("wrong", [{"speed": 0.0}, {"speed": -1.0}, {"ramp": 0.0}, {"ramp": -0.1}])
     def test_speeds_that_lead_nowhere(self, wrong: dict[str, float]) -> None:
         """Speed and ramp are above 0."""
         with pytest.raises(InvalidValueError, match="speed and ramp must be above 0"):
-            straight("back", (0, 0), (1, 0), **wrong)
+            straight_path("back", (0, 0), (1, 0), **wrong)
 
     def test_three_numbers(self) -> None:
         """The plane has two axes."""
         with pytest.raises(ShapeError, match=r"start: expected a shape ending in \(2,\), got \(3,\)"):
-            straight("up", (0, 0, 0), (1, 0))
+            straight_path("up", (0, 0, 0), (1, 0))
 
 
 class TestHermite:
@@ -91,7 +91,7 @@ class TestHermite:
     def test_scipy(self, rng: np.random.Generator) -> None:
         """They are SciPy's cubic Hermite spline, with its slopes."""
         positions, velocities = rng.uniform(-1, 1, (2, 4, 2))
-        path = hermite("curve", self.TIMES, positions, velocities, (1, 3))
+        path = hermite_path("curve", self.TIMES, positions, velocities, (1, 3))
         spline = CubicHermiteSpline(self.TIMES, positions, velocities)
         t = np.linspace(0.0, 0.4, 83)
 
@@ -106,12 +106,12 @@ class TestHermite:
     def test_times_that_do_not_pass(self, times: tuple[float, float]) -> None:
         """Time begins at 0 and goes on."""
         with pytest.raises(InvalidValueError, match="path x: times must increase from 0"):
-            hermite("x", times, np.zeros((2, 2)), np.zeros((2, 2)), ())
+            hermite_path("x", times, np.zeros((2, 2)), np.zeros((2, 2)), ())
 
     def test_places_without_times(self) -> None:
         """There are as many positions as times."""
         with pytest.raises(ShapeError, match=r"expected \(m \+ 1\) times and \(m \+ 1, 2\) positions and velocities"):
-            hermite("x", (0, 1), np.zeros((3, 2)), np.zeros((3, 2)), ())
+            hermite_path("x", (0, 1), np.zeros((3, 2)), np.zeros((3, 2)), ())
 
     def test_pick_and_place(self) -> None:
         """It picks at (-180, -600), passes (0, -575) at 1.5 m/s, and ends at (180, -600) mm, 0.25 s apart."""

@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.clearance.ideal import closed
+from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Guide, Linkage, Pin
 from armwright.clearance.reader import linkage_names, load_linkage, read_linkage
 from armwright.clearance.scenario import assembly_guess
@@ -38,7 +38,7 @@ def test_catalogue_can_be_put_together(name: str) -> None:
     linkage = load_linkage(name)
     guess = assembly_guess(linkage)
 
-    q = closed(linkage, guess, drives=guess[list(linkage.driven)])
+    q = close_pins(linkage, guess, drives=guess[list(linkage.driven)])
 
     angles = [i for i, coordinate in enumerate(linkage.coordinates) if coordinate.kind == "angle"]
     assert np.abs(q - guess)[angles].max() < np.pi / 2

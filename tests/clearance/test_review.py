@@ -9,16 +9,20 @@ import pytest
 
 from armwright.clearance import simulation
 from armwright.clearance.assessment import ClearanceRun
-from armwright.clearance.correction import correct_nodes, tip_at
-from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement, read_measured
-from armwright.clearance.estimation.static import estimate_at_rest, rest_matrix
+from armwright.clearance.correction import correct_nodes, tip_positions
+from armwright.clearance.estimation.measurement_file import (
+    PathMeasurement,
+    RestMeasurement,
+    read_clearance_measurements,
+)
+from armwright.clearance.estimation.static_estimate import estimate_at_rest, rest_matrix
 from armwright.clearance.feature_sweep import FeatureSweep, is_sweep_of
 from armwright.clearance.features import spectrum
-from armwright.clearance.ideal import sensitivity
+from armwright.clearance.ideal import tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import PickAndPlace, thesis_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Status, simulate
 from armwright.errors import FileFormatError, InvalidValueError
@@ -34,7 +38,7 @@ class TestSamples:
     @pytest.mark.parametrize("sample", [1e-4, 3.3e-4, 7e-3, 0.13, 10.0])
     def test_end(self, five_bar: Linkage, sample: float) -> None:
         """Whatever time lies between samples, the steps are no longer than asked for and the last ends the path."""
-        task = prepare(five_bar, thesis_path("y1"), Settings(step=2e-5, sample=sample))
+        task = prepare_scenario(five_bar, thesis_path("y1"), Settings(step=2e-5, sample=sample))
 
         assert task.steps % task.stride == 0
         assert task.h <= 2e-5 * (1 + ROUNDING)
@@ -44,12 +48,12 @@ class TestSamples:
         """Two samples of a run are its first and its last: the tip ends where it does with many."""
         path = thesis_path("y1")
         often, seldom = (
-            simulate(prepare(five_bar, path, Settings(step=2e-5, sample=target))) for target in (2e-5, 10.0)
+            simulate(prepare_scenario(five_bar, path, Settings(step=2e-5, sample=target))) for target in (2e-5, 10.0)
         )
 
         np.testing.assert_array_equal(seldom.time, [0.0, often.time[-1]])
         np.testing.assert_array_equal(seldom.tip, often.tip[[0, -1]])
-        np.testing.assert_allclose(tip_at(seldom, np.array([0.0, 0.25])), seldom.tip, atol=ROUNDING)
+        np.testing.assert_allclose(tip_positions(seldom, np.array([0.0, 0.25])), seldom.tip, atol=ROUNDING)
         assert [target["time"] for target in ClearanceRun.of(seldom).as_data()["targets"]] == pytest.approx(
             [0.0, 0.25], abs=ROUNDING
         )
@@ -61,7 +65,7 @@ class TestDiverging:
     def test_numbers(self, five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
         """With a step ten times too long a run diverges without a warning; what is shown of it is finite."""
         monkeypatch.setattr(simulation, "check_step", lambda *_: None)
-        run = simulate(prepare(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=2e-4)), [1e-4] * 3)
+        run = simulate(prepare_scenario(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=2e-4)), [1e-4] * 3)
         data = ClearanceRun.of(run).as_data()
 
         assert run.status == Status.DIVERGED
@@ -71,7 +75,7 @@ class TestDiverging:
     def test_advice(self, five_bar: Linkage) -> None:
         """The step that is advised instead of one that is too long is one that is accepted."""
         for clearance in np.geomspace(1e-6, 1e-2, 9):
-            task = prepare(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=0.1))
+            task = prepare_scenario(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=0.1))
             with pytest.raises(InvalidValueError, match="too long") as error:
                 simulate(task, [clearance] * 3)
             advised = float(str(error.value).split("at most ")[1].split(" ")[0])
@@ -98,7 +102,7 @@ class TestNothingToLean:
         q = np.zeros(len(five_bar.coordinates))
 
         with pytest.raises(InvalidValueError, match="singular"):
-            sensitivity(five_bar, q)
+            tip_sensitivity(five_bar, q)
 
     @pytest.mark.parametrize(("name", "freedoms"), [("four-bar", "1 freedom,"), ("slider-crank", "1 freedom,")])
     def test_freedoms(self, name: str, freedoms: str) -> None:
@@ -130,13 +134,13 @@ def test_dwell(tmp_path: Path) -> None:
         file.write_text("\n".join(["path,t_s,x_mm,y_mm", *rows]), encoding="utf-8")
         return file
 
-    short, long = (read_measured(written(end)) for end in (0.2505, 2.0))
+    short, long = (read_clearance_measurements(written(end)) for end in (0.2505, 2.0))
     assert isinstance(short, PathMeasurement)
     assert isinstance(long, PathMeasurement)
     assert len(short.times["y1"]) == 251
     np.testing.assert_array_equal(long.features()["y1"], short.features()["y1"])
     with pytest.raises(FileFormatError, match=r"path y1 takes 0\.25 s; got 0 to 0\.229 s"):
-        read_measured(written(0.23))
+        read_clearance_measurements(written(0.23))
 
 
 def test_absurd_reading(tmp_path: Path) -> None:
@@ -145,7 +149,7 @@ def test_absurd_reading(tmp_path: Path) -> None:
     file.write_text("pose,commanded_x_mm,commanded_y_mm,x_mm,y_mm\na,0,-700,1e307,-700\n", encoding="utf-8")
 
     with pytest.raises(FileFormatError, match="every number must be finite and no larger than"):
-        read_measured(file)
+        read_clearance_measurements(file)
 
 
 def test_gains() -> None:
@@ -180,7 +184,7 @@ def test_uneven_readings(tmp_path: Path) -> None:
         lines += [f"{name},0,-700,{x:.9f},{y:.9f}" for x, y in (0.01 * rng.standard_normal((count, 2)) + (0, -700))]
     file = tmp_path / "rest.csv"
     file.write_text("\n".join(lines), encoding="utf-8")
-    measurement = read_measured(file)
+    measurement = read_clearance_measurements(file)
 
     assert isinstance(measurement, RestMeasurement)
     # The deviation of 8000 numbers is told to about a hundredth.

@@ -9,7 +9,7 @@ import pytest
 from armwright.clearance.equations import FrictionModel
 from armwright.clearance.paths import constant_speed_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings, check_step, contact_stiffness
 from armwright.clearance.simulation import Status, simulate
 from armwright.errors import InvalidValueError, UnknownNameError
@@ -117,4 +117,4 @@ def test_paths_without_time(duration: float) -> None:
     """A path that takes next to no time is refused."""
     crank = load_linkage("slider-crank")
     with pytest.raises(InvalidValueError, match="expected a duration from 1e-09 s, got "):
-        prepare(crank, constant_speed_path("short", 0.0, 30.0, duration))
+        prepare_scenario(crank, constant_speed_path("short", 0.0, 30.0, duration))

@@ -12,7 +12,7 @@ from armwright.clearance.equations import FrictionModel
 from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.paths import constant_speed_path, thesis_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import Scenario, prepare
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import InvalidValueError, ShapeError
@@ -31,7 +31,7 @@ def five_bar() -> Linkage:
 
 @pytest.fixture(scope="module")
 def y1(five_bar: Linkage) -> Scenario:
-    return prepare(five_bar, thesis_path("y1"), Settings(sample=1e-3))
+    return prepare_scenario(five_bar, thesis_path("y1"), Settings(sample=1e-3))
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ class TestFiveBar:
     def test_intercepts_of_arm_a(self, five_bar: Linkage, path: str, thesis: float) -> None:
         """With friction of the centres' speed arm A's straight parts begin within 3 % of where the thesis' do."""
         settings = Settings(friction=FrictionModel(velocity="centre"), threshold=1e-2)
-        run = simulate(prepare(five_bar, thesis_path(path), settings), np.array((0.328, 0.171, 0.483)) * 1e-3)
+        run = simulate(prepare_scenario(five_bar, thesis_path(path), settings), np.array((0.328, 0.171, 0.483)) * 1e-3)
 
         part = (run.time > 0.07 - 1e-9) & (run.time < 0.12 + 1e-9)
         intercept = np.polyfit(run.time[part], run.distance[part] * 1e3, 1)[1]
@@ -95,7 +95,7 @@ class TestFiveBar:
         """At the start journals lie on elastic walls, on rigid ones, or in the middle of their bearings."""
         for start, low, high in (("rest", 1e-8, 1e-6), ("rigid", -1e-12, 1e-12), ("centred", -5e-4, -5e-4)):
             settings = Settings(start=start, sample=1e-2)  # type: ignore[arg-type]
-            task = prepare(five_bar, thesis_path("y1"), settings)
+            task = prepare_scenario(five_bar, thesis_path("y1"), settings)
             depths = simulate(task).depths[0]
             assert np.all((depths >= low - 1e-15) & (depths <= high + 1e-15))
 
@@ -109,7 +109,7 @@ CLEARANCES = np.array((5e-4, 2e-4, 1e-4, 5e-5))
 def run() -> Simulation:
     """Two revolutions of the slider-crank."""
     settings = Settings(step=2e-6, sample=1e-5, start="centred")
-    task = prepare(load_linkage("slider-crank"), constant_speed_path("round", 0.0, SPEED, 0.024), settings)
+    task = prepare_scenario(load_linkage("slider-crank"), constant_speed_path("round", 0.0, SPEED, 0.024), settings)
     return simulate(task, CLEARANCES[:, None])
 
 
@@ -212,7 +212,7 @@ def test_samples() -> None:
 
 def test_what_lies_has_not_struck(five_bar: Linkage) -> None:
     """Journals that lie on their walls from the start have not come down on them."""
-    task = prepare(five_bar, thesis_path("y1"), Settings(sample=1e-2))
+    task = prepare_scenario(five_bar, thesis_path("y1"), Settings(sample=1e-2))
     short = attrs.evolve(task, steps=100, table=task.table[:100])
 
     assert simulate(attrs.evolve(short, settings=attrs.evolve(task.settings, sample=1e-3))).impacts.tolist() == [
@@ -240,7 +240,9 @@ def test_names_of_points_count() -> None:
 
 def test_no_play_at_all() -> None:
     """A linkage without any pin that has play is simulated like any other; there is nothing in its pins."""
-    run = simulate(left_alone(prepare(pendulum(), still(0.1, 0.0), Settings(step=1e-3, sample=1e-2))), frictions=[0, 1])
+    run = simulate(
+        left_alone(prepare_scenario(pendulum(), still(0.1, 0.0), Settings(step=1e-3, sample=1e-2))), frictions=[0, 1]
+    )
 
     assert run.gaps.shape == (2, 11, 0, 2)
     assert run.forces.shape == (2, 11, 0)
@@ -276,23 +278,23 @@ class TestRefused:
     def test_step(self, five_bar: Linkage) -> None:
         """A step that cannot follow the contacts is refused before the run."""
         with pytest.raises(InvalidValueError, match=r"step: 0\.0001 s is too long for contacts"):
-            simulate(prepare(five_bar, thesis_path("y1"), Settings(step=1e-4)))
+            simulate(prepare_scenario(five_bar, thesis_path("y1"), Settings(step=1e-4)))
 
     def test_path_for_other_axes(self, five_bar: Linkage) -> None:
         """A path for one drive does not lead an arm with two."""
         with pytest.raises(ShapeError, match="path round: expected 2 axes for the drives, got 1"):
-            prepare(five_bar, constant_speed_path("round", 0.0, 1.0, 0.1))
+            prepare_scenario(five_bar, constant_speed_path("round", 0.0, 1.0, 0.1))
 
     def test_path_out_of_reach(self, five_bar: Linkage) -> None:
         """A path in millimetres, read as metres, leads nowhere."""
         path = attrs.evolve(thesis_path("y1"), pieces=thesis_path("y1").pieces * 1e3)
         with pytest.raises(InvalidValueError, match=r"five-bar: the path cannot be followed.*out of reach"):
-            prepare(five_bar, path)
+            prepare_scenario(five_bar, path)
 
     def test_no_assembly(self, five_bar: Linkage) -> None:
         """Where nothing says how the arm is put together, all its links hang down, and it may go to either side."""
         with pytest.raises(InvalidValueError, match="singular configuration"):
-            prepare(attrs.evolve(five_bar, assembly={}), thesis_path("y1"), Settings(step=1e-3))
+            prepare_scenario(attrs.evolve(five_bar, assembly={}), thesis_path("y1"), Settings(step=1e-3))
 
 
 def test_other_assembly(five_bar: Linkage) -> None:
@@ -300,7 +302,7 @@ def test_other_assembly(five_bar: Linkage) -> None:
     settings = Settings(step=1e-3)
     inside = attrs.evolve(five_bar, assembly={"link1": 0.9, "link2": -1.0, "link3": -0.75, "link4": 0.7})
 
-    own, other = (prepare(linkage, thesis_path("y1"), settings).ideal.q for linkage in (five_bar, inside))
+    own, other = (prepare_scenario(linkage, thesis_path("y1"), settings).ideal.q for linkage in (five_bar, inside))
 
     assert np.abs(other[:, 0] - own[:, 0]).min() > 1.0
     np.testing.assert_allclose(other[:, 4:], own[:, 4:], rtol=0, atol=1e-10)
@@ -308,7 +310,7 @@ def test_other_assembly(five_bar: Linkage) -> None:
 
 def test_called_off(five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
     """A simulation that is called off comes back from compiled code without a result."""
-    task = prepare(five_bar, thesis_path("y1"), Settings(sample=1e-3))
+    task = prepare_scenario(five_bar, thesis_path("y1"), Settings(sample=1e-3))
     monkeypatch.setattr(
         simulation, "on_cores_for_long", lambda work, runs, _threads: work(0, runs, np.ones(1, dtype=np.int64))
     )

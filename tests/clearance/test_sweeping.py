@@ -9,12 +9,12 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.clearance.feature_sweep import FeatureSweep, feature_vector, is_chance
-from armwright.clearance.features import Features, features
+from armwright.clearance.feature_sweep import FeatureSweep, feature_vector, is_random
+from armwright.clearance.features import Features, simulation_features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
-from armwright.clearance.predictability import APART, perturbed
-from armwright.clearance.scenario import prepare
+from armwright.clearance.predictability import MAX_DISTANCE, perturb_clearances
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.simulation import simulate
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.sweep.designs import Design, latin_hypercube
@@ -48,8 +48,8 @@ def test_features_of_the_simulation(five_bar: Linkage, task: FeatureSweep) -> No
     """Without runs beside it a row has the features of the simulation with those clearances, bit for bit."""
     rows = attrs.evolve(task, replicates=0)(np.array([ARM_B, ARM_A]))
 
-    alone = simulate(prepare(five_bar, named_path("y1"), CENTRE), ARM_A)
-    for name, value in features(alone)._asdict().items():
+    alone = simulate(prepare_scenario(five_bar, named_path("y1"), CENTRE), ARM_A)
+    for name, value in simulation_features(alone)._asdict().items():
         assert rows[f"y1_{name}"][1] == value, name
     assert rows["y1_peak"][1] == alone.peaks.max()
     assert rows["failure"] == ["", ""]
@@ -61,12 +61,12 @@ def test_means_and_spreads_over_runs_that_nobody_can_tell_apart(five_bar: Linkag
 
     rows = task(np.array([ARM_B, ARM_A]))
 
-    runs = simulate(prepare(five_bar, named_path("y9"), CENTRE), perturbed(ARM_A, 3))
-    for name, values in {**features(runs)._asdict(), "peak": runs.peaks.max(axis=-1)}.items():
+    runs = simulate(prepare_scenario(five_bar, named_path("y9"), CENTRE), perturb_clearances(ARM_A, 3))
+    for name, values in {**simulation_features(runs)._asdict(), "peak": runs.peaks.max(axis=-1)}.items():
         assert rows[f"y9_{name}"][1] == pytest.approx(values.mean(), rel=1e-12), name
         assert rows[f"y9_{name}_spread"][1] == pytest.approx(values.std(ddof=1), rel=1e-9), name
     apart = np.linalg.norm(runs.error - runs.error[0], axis=-1).max(axis=0)
-    assert apart[runs.time <= rows["y9_until"][1]].max() <= APART < apart.max()
+    assert apart[runs.time <= rows["y9_until"][1]].max() <= MAX_DISTANCE < apart.max()
     # The journals rattle from the start: its slope is chance, and where it begins is not.
     assert rows["y9_slope_spread"][1] > 1e-4
     assert rows["y9_offset_y_spread"][1] < 1e-9
@@ -78,7 +78,7 @@ def test_chance_is_told_from_what_a_design_changes(five_bar: Linkage) -> None:
     rows = task(latin_hypercube(dict.fromkeys(task.parameters, RANGE), 32, 7).points)
 
     names = [f"{path}_{name}" for path in task.paths for name in Features._fields]
-    chance = {name for name in names if is_chance(rows[name], rows[f"{name}_spread"], 4)}
+    chance = {name for name in names if is_random(rows[name], rows[f"{name}_spread"], 4)}
 
     assert chance == {"y13_slope", "y13_intercept"}
     assert rows["y13_until"].max() < 0.1 < rows["y1_until"].min()
@@ -89,9 +89,9 @@ def test_chance_that_is_left_in_means(rng: np.random.Generator) -> None:
     runs = rng.normal(0.0, 1.0, (400, 4))
     means = rng.normal(0.0, 1.1, 400)[:, None]
 
-    assert is_chance(runs.mean(axis=1), runs.std(axis=1, ddof=1), 4)
-    assert is_chance((0.7 * means + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
-    assert not is_chance((1.2 * means + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
+    assert is_random(runs.mean(axis=1), runs.std(axis=1, ddof=1), 4)
+    assert is_random((0.7 * means + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
+    assert not is_random((1.2 * means + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
 
 
 def test_friction_is_a_parameter(five_bar: Linkage, task: FeatureSweep) -> None:

@@ -11,11 +11,11 @@ import pytest
 
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.five_bar import FiveBar
-from armwright.clearance.ideal import tip_of
+from armwright.clearance.ideal import tip_position
 from armwright.clearance.linkage import BodyPoint, Pin
 from armwright.clearance.paths import constant_speed_path, thesis_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.scenario import Scenario, prepare
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import ShapeError
@@ -33,7 +33,7 @@ MEGABYTE = 1e6
 
 @pytest.fixture(scope="module")
 def task() -> Scenario:
-    return prepare(load_linkage("five-bar"), thesis_path("y1"))
+    return prepare_scenario(load_linkage("five-bar"), thesis_path("y1"))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def cranked() -> dict[str, ClearanceRun]:
         linkage = load_linkage(name)
         at = linkage.assembly[linkage.drives[0].body]
         path = constant_speed_path("half a turn", at, speed, np.pi / speed)
-        found[name] = ClearanceRun.of(simulate(prepare(linkage, path, Settings(start="centred"))))
+        found[name] = ClearanceRun.of(simulate(prepare_scenario(linkage, path, Settings(start="centred"))))
     return found
 
 
@@ -260,7 +260,7 @@ def test_other_linkages(cranked: dict[str, ClearanceRun], name: str) -> None:
     assert shown["motors"] == [[0.0, 0.0]]
     assert len(shown["pins"]) == 1
     task = run.simulation.scenario
-    ideal = tip_of(task.linkage, task.ideal.q)[:: task.stride]
+    ideal = tip_position(task.linkage, task.ideal.q)[:: task.stride]
     np.testing.assert_allclose(shown["path_m"][[0, -1]], ideal[[0, -1]], atol=1e-12)
     # Its path has no goal of the tip but the start.
     assert [one["time"] for one in run.as_data()["targets"]] == [0.0]
@@ -274,7 +274,7 @@ def test_bearing_in_the_ground() -> None:
     other = attrs.evolve(linkage, joints=joints, pins=[pin])
     path = constant_speed_path("a little", linkage.assembly["crank"], 12.0, 0.05)
 
-    run = ClearanceRun.of(simulate(prepare(other, path, Settings(start="centred"))))
+    run = ClearanceRun.of(simulate(prepare_scenario(other, path, Settings(start="centred"))))
 
     (shown,) = film(run)["pins"]
     assert shown["bearing"] == [0.3, 0.0]

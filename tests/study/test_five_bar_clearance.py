@@ -109,7 +109,7 @@ def test_targets(estimates: list[EstimateRow]) -> None:
 
 def test_printed_estimates_at_the_first_target() -> None:
     """With the thesis' own estimates the arms hang 0.560 and 0.912 mm off, as it prints."""
-    from armwright.clearance.estimation.static import rest_offsets
+    from armwright.clearance.estimation.static_estimate import rest_offsets
 
     for arm, printed in (("A", 0.560), ("B", 0.912)):
         clearances = np.array(study.PRINTED_ESTIMATES[arm, "intercept"]) * 1e-3

@@ -10,10 +10,10 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.clearance.contact import damping, restitution_of
+from armwright.clearance.contact import damping, restitution_of_damping
 from armwright.clearance.energy_balance import EnergyBalance, energy_balance
 from armwright.clearance.features import spectrum
-from armwright.clearance.predictability import APART, FINER, Predictability
+from armwright.clearance.predictability import DISTANCE_DIVISOR, MAX_DISTANCE, Predictability
 from armwright.clearance.simulation import Simulation, Status
 from armwright.errors import ShapeError
 from armwright.files.result_table import ResultTable
@@ -122,7 +122,7 @@ class ClearanceRun:
             "status": Status(int(simulation.status)).name.lower(),
             "sound_until": float(self.time[-1]),
             "predictable_until": None if self.predictability is None else self.predictability.until,
-            "pins": {pin.name: _pin(self, i) for i, pin in enumerate(scenario.linkage.pins)},
+            "pins": {pin.name: _pin_data(self, i) for i, pin in enumerate(scenario.linkage.pins)},
             "error": {
                 "largest": float(self.distance.max()),
                 "mean": float(self.distance.mean()),
@@ -131,7 +131,7 @@ class ClearanceRun:
                 "amp_dc": float(amplitudes[0]),
                 "amp_ac": float(amplitudes[1:].max(initial=0.0)),
             },
-            "targets": targets(self),
+            "targets": target_errors(self),
             "energy": {
                 "driven": float(energy.driven[last]),
                 "kinetic_change": float(energy.kinetic[last] - energy.kinetic[0]),
@@ -141,7 +141,7 @@ class ClearanceRun:
                 "friction_loss": float(energy.friction_loss[last]),
                 "imbalance": float(np.abs(energy.imbalance[: self.rows]).max()),
             },
-            "settings": settings(self),
+            "settings": settings_data(self),
             "versions": {"armwright": __version__, "python": platform.python_version(), "numpy": np.__version__},
         }
 
@@ -199,11 +199,11 @@ class ClearanceRun:
         )
 
 
-def _pin(run: ClearanceRun, i: int) -> dict[str, Any]:
+def _pin_data(run: ClearanceRun, i: int) -> dict[str, Any]:
     forces, depths = run.simulation.forces[: run.rows, i], run.depths[: run.rows, i]
     return {
         "clearance": float(run.simulation.clearances[i]),
-        "peak_force": _finite(run.simulation.peaks[i]),
+        "peak_force": _finite_or_none(run.simulation.peaks[i]),
         "mean_force": float(forces.mean()),
         "impacts": int(run.simulation.impacts[i]),
         "flight": float((depths < 0).mean()),
@@ -211,12 +211,12 @@ def _pin(run: ClearanceRun, i: int) -> dict[str, Any]:
     }
 
 
-def _finite(x: float) -> float | None:
+def _finite_or_none(x: float) -> float | None:
     """Return a number as JSON knows it: what is infinite is none."""
     return float(x) if np.isfinite(x) else None
 
 
-def targets(run: ClearanceRun) -> list[dict[str, Any]]:
+def target_errors(run: ClearanceRun) -> list[dict[str, Any]]:
     """Return the error at the start and where the path has its goals, at their time and at the nearest approach [m]."""
     scenario, path = run.simulation.scenario, run.simulation.scenario.path
     rows = []
@@ -231,7 +231,7 @@ def targets(run: ClearanceRun) -> list[dict[str, Any]]:
             target["nearest"] = float(distance.min())
         if run.predictability is not None:
             target["mean_x"], target["mean_y"], target["spread_x"], target["spread_y"] = (
-                _finite(np.interp(t, run.simulation.time, values[:, i]))
+                _finite_or_none(np.interp(t, run.simulation.time, values[:, i]))
                 for values in (run.predictability.mean, run.predictability.spread)
                 for i in range(2)
             )
@@ -240,7 +240,7 @@ def targets(run: ClearanceRun) -> list[dict[str, Any]]:
     return rows
 
 
-def settings(run: ClearanceRun) -> dict[str, Any]:
+def settings_data(run: ClearanceRun) -> dict[str, Any]:
     """Return how a run was simulated, as plain data in SI units."""
     scenario, material = run.simulation.scenario, run.simulation.scenario.linkage.material
     how = scenario.settings
@@ -254,7 +254,7 @@ def settings(run: ClearanceRun) -> dict[str, Any]:
         "located": how.located,
         "impact_law": how.impact,
         "restitution_asked": material.restitution,
-        "restitution_given": restitution_of(chi),
+        "restitution_given": restitution_of_damping(chi),
         "friction": float(run.simulation.frictions),
         "friction_law": how.friction.law,
         "friction_velocity": how.friction.velocity,
@@ -273,8 +273,10 @@ def _predictability_notes(run: ClearanceRun) -> Iterator[str]:
     predictability = run.predictability
     if predictability is None:
         return
-    what = f"clearances a nanometre away{' or a smaller step' if predictability.finer else ''}"
-    apart = f"{APART * 1e6:g} µm{f' ({APART / FINER * 1e6:g} µm for a smaller step)' if predictability.finer else ''}"
+    what, apart = "clearances a nanometre away", f"{MAX_DISTANCE * 1e6:g} µm"
+    if predictability.finer:
+        what += " or a smaller step"
+        apart += f" ({MAX_DISTANCE / DISTANCE_DIVISOR * 1e6:g} µm for a smaller step)"
     if predictability.to_the_end:
         yield f"predictable to the end: runs with {what} stay within {apart}"
         return
@@ -282,7 +284,7 @@ def _predictability_notes(run: ClearanceRun) -> Iterator[str]:
         f"predictable until t = {predictability.until:.4g} s: then a run with {what} is more than {apart} away; "
         f"what comes later is one of many indistinguishable runs"
     )
-    for target in targets(run):
+    for target in target_errors(run):
         if not target["predictable"] and target["spread_x"] is not None:
             means = (f"{target[f'mean_{axis}'] * 1e3:z.4f} ± {target[f'spread_{axis}'] * 1e3:.4f}" for axis in "xy")
             yield f"at {target['time']:.4g} s the error is x {' mm, y '.join(means)} mm over these runs (mean ± spread)"

@@ -32,7 +32,7 @@ FRICTION_LAWS: tuple[FrictionLaw, ...] = ("linear", "tanh", "lugre")
 # The lower limit of the impact speed, by which the law divides [m/s].
 SLOWEST_IMPACT = 1e-3
 # A χ below which rounding makes the closed forms useless.
-_NEGLIGIBLE = 1e-6
+_MIN_DAMPING = 1e-6
 
 
 def exact_damping(restitution: float) -> float:
@@ -82,9 +82,9 @@ def damping(law: str, restitution: float) -> float:
     return _LAWS[one_of("law of impact", law, _LAWS)](restitution)
 
 
-def restitution_of(chi: float) -> float:
+def restitution_of_damping(chi: float) -> float:
     """Return the restitution of an impact: the root e of 1 + e = ln[(1 + χ) / (1 - χ e)] / χ."""
-    if chi < _NEGLIGIBLE:
+    if chi < _MIN_DAMPING:
         # Rounding spoils the equation, but not its series.
         return 1.0 - chi * 2 / 3
 
@@ -96,7 +96,7 @@ def restitution_of(chi: float) -> float:
     return largest if excess(largest) > 0 else float(brentq(excess, 0.0, largest, xtol=1e-15))
 
 
-def deepest(mass: float, stiffness: float, speed: float, chi: float) -> float:
+def largest_indentation(mass: float, stiffness: float, speed: float, chi: float) -> float:
     """Return the largest indentation of an impact [m].
 
     Args:
@@ -105,7 +105,7 @@ def deepest(mass: float, stiffness: float, speed: float, chi: float) -> float:
         speed: of the impact [m/s].
         chi: see ``damping``.
     """
-    part = 0.5 if chi < _NEGLIGIBLE else (chi - math.log1p(chi)) / chi**2
+    part = 0.5 if chi < _MIN_DAMPING else (chi - math.log1p(chi)) / chi**2
     return float((2.5 * mass * speed**2 / stiffness * part) ** 0.4)
 
 
@@ -161,12 +161,12 @@ def linear_slip(speed: Scalar, threshold: Scalar) -> Scalar:
 def smooth_slip(speed: Scalar, threshold: Scalar) -> Scalar:
     """Return tanh(speed / threshold)."""
     x = abs(speed) / threshold
-    decay = falling(2.0 * x)
+    decay = exp_negative(2.0 * x)
     size = (1.0 - decay) / (1.0 + decay)
     return select(speed < 0.0, -size, size)
 
 
-def falling(x: Scalar) -> Scalar:
+def exp_negative(x: Scalar) -> Scalar:
     """Return exp(-x) of an x that is not negative, to 13 digits; 0 beyond 700.
 
     The power series of exp(-x / 1024), and ten squarings: a processor does many at once.
@@ -211,7 +211,7 @@ class Bristles:
             friction: coefficient of sliding.
         """
         ratio = speed / cls.stribeck
-        limit = friction * (1.0 + (cls.static_ratio - 1.0) * falling(ratio * ratio))
+        limit = friction * (1.0 + (cls.static_ratio - 1.0) * exp_negative(ratio * ratio))
         # Without friction the deflection has no limit to refer to.
         divisor = select(limit > 0.0, limit, 1.0)
         rate = speed - cls.stiffness * abs(speed) * deflection / divisor

@@ -20,15 +20,15 @@ import numpy as np
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.ideal import ideal_motion
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.paths import Path, PickAndPlace, hermite
-from armwright.clearance.predictability import perturbed
-from armwright.clearance.scenario import assembly_guess, closed_along, prepare
+from armwright.clearance.paths import Path, PickAndPlace, hermite_path
+from armwright.clearance.predictability import perturb_clearances
+from armwright.clearance.scenario import assembly_guess, close_pins_along, prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import InvalidValueError, ShapeError
 
 # Larger corrections have another cause than clearance [m].
-_LARGEST = 0.02
+_MAX_CORRECTION = 0.02
 # Knots of the shift of a path: more would be closer together than the samples of a simulation.
 _MAX_KNOTS = 1000
 # Three rounds reduce the error to a millionth; the remainder is chance.
@@ -83,7 +83,7 @@ def correct_nodes(
     def commanded(nodes: Array) -> Path:
         return attrs.evolve(goal, nodes=nodes).path()
 
-    return _corrected(linkage, commanded, np.array(goal.nodes), clearances, settings, rounds, progress)
+    return _correct_iteratively(linkage, commanded, np.array(goal.nodes), clearances, settings, rounds, progress)
 
 
 def correct_path(
@@ -117,12 +117,12 @@ def correct_path(
     goals = goal.evaluate(times).position
 
     def commanded(nodes: Array) -> Path:
-        return shifted(timed, times, nodes - goals)
+        return shift_path(timed, times, nodes - goals)
 
-    return _corrected(linkage, commanded, goals, clearances, settings, rounds, progress)
+    return _correct_iteratively(linkage, commanded, goals, clearances, settings, rounds, progress)
 
 
-def shifted(path: Path, times: Array, shifts: Array) -> Path:
+def shift_path(path: Path, times: Array, shifts: Array) -> Path:
     """Return a path to which a smooth shift is added.
 
     Args:
@@ -135,29 +135,29 @@ def shifted(path: Path, times: Array, shifts: Array) -> Path:
     knots = np.union1d(path.knots, times)
     # Times that differ by rounding are equal.
     knots = knots[np.append(True, np.diff(knots) > 1e-12)]
-    extra = hermite(path.name, times.tolist(), shifts, slopes, ())
+    extra = hermite_path(path.name, times.tolist(), shifts, slopes, ())
     middle = (knots[:-1] + knots[1:]) / 2
     size = max(path.pieces.shape[-1], 4)
     pieces = np.zeros((len(middle), 2, size))
     for part in (path, extra):
         number = np.searchsorted(part.knots, middle, side="right") - 1
-        pieces += _delayed(part.pieces[number], knots[:-1] - part.knots[number], size)
+        pieces += _delay_polynomials(part.pieces[number], knots[:-1] - part.knots[number], size)
     return attrs.evolve(path, knots=knots, pieces=pieces)
 
 
-def contact_forces(linkage: Linkage, path: Path, samples: int = 201) -> tuple[Array, Array]:
+def ideal_contact_forces(linkage: Linkage, path: Path, samples: int = 201) -> tuple[Array, Array]:
     """Return times (s,) and the forces (s, p, 2) on the bearings without clearance [N].
 
-    Where a force is small or reverses its direction, the journal leaves its wall: see ``lost_contacts``.
+    Where a force is small or reverses its direction, the journal leaves its wall: see ``predict_contact_loss``.
     """
     times = np.linspace(0.0, path.duration, samples)
     state = path.evaluate(times)
     by_tip = path.follower == "tip"
-    q = closed_along(linkage, state.position, assembly_guess(linkage), by_tip=by_tip)
+    q = close_pins_along(linkage, state.position, assembly_guess(linkage), by_tip=by_tip)
     return times, ideal_motion(linkage, q, state.velocity, state.acceleration, by_tip=by_tip).reactions
 
 
-def lost_contacts(
+def predict_contact_loss(
     linkage: Linkage, path: Path, least: float = 1.0, samples: int = 2001
 ) -> dict[str, list[tuple[float, float]]]:
     """Return by pin the intervals in which its journal may leave the wall: its force is small, or reverses quickly.
@@ -168,7 +168,7 @@ def lost_contacts(
         least: force that keeps a journal on its wall [N].
         samples: number of times at which the force is evaluated.
     """
-    times, forces = contact_forces(linkage, path, samples)
+    times, forces = ideal_contact_forces(linkage, path, samples)
     intervals = {}
     for i, pin in enumerate(linkage.pins):
         force = forces[:, i]
@@ -184,7 +184,7 @@ def lost_contacts(
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _corrected(  # noqa: PLR0917 - the inputs that both kinds of correction share
+def _correct_iteratively(  # noqa: PLR0917 - the inputs that both kinds of correction share
     linkage: Linkage,
     commanded: Callable[[Array], Path],
     goals: Array,
@@ -199,12 +199,12 @@ def _corrected(  # noqa: PLR0917 - the inputs that both kinds of correction shar
     c = floats(clearances, "clearances")
     if c.ndim not in (1, 2):
         raise ShapeError(f"clearances: expected one row or several, got shape {c.shape}")
-    runs = perturbed(c) if c.ndim == 1 else c
+    runs = perturb_clearances(c) if c.ndim == 1 else c
     nodes = goals
     tried: list[tuple[Array, Array]] = []
     history: list[float] = []
     for round_number in range(rounds + 1):
-        errors = tip_errors(simulate(prepare(linkage, commanded(nodes), settings), runs), goals)
+        errors = tip_errors(simulate(prepare_scenario(linkage, commanded(nodes), settings), runs), goals)
         tried.append((nodes, np.asarray(np.linalg.norm(errors, axis=-1), dtype=np.float64)))
         history.append(float(tried[-1][1].mean()))
         if progress is not None:
@@ -212,10 +212,10 @@ def _corrected(  # noqa: PLR0917 - the inputs that both kinds of correction shar
         if round_number < rounds:
             nodes = nodes - errors.mean(axis=0)
             largest = np.abs(nodes - goals).max()
-            if largest > _LARGEST:
+            if largest > _MAX_CORRECTION:
                 raise InvalidValueError(
                     f"{linkage.name}: a correction of {largest * 1e3:.1f} mm would be needed; "
-                    f"more than {_LARGEST * 1e3:g} mm is no clearance"
+                    f"more than {_MAX_CORRECTION * 1e3:g} mm is no clearance"
                 )
     # Where impacts change from round to round the last is not the best.
     best = int(np.argmin(history))
@@ -238,10 +238,10 @@ def tip_errors(simulation: Simulation, goals: Array) -> Array:
         raise InvalidValueError(
             f"{simulation.scenario.linkage.name}: the simulation diverged; the path cannot be corrected"
         )
-    return np.asarray(tip_at(simulation, times) - goals, dtype=np.float64)
+    return np.asarray(tip_positions(simulation, times) - goals, dtype=np.float64)
 
 
-def tip_at(simulation: Simulation, times: Array) -> Array:
+def tip_positions(simulation: Simulation, times: Array) -> Array:
     """Return (..., j, 2) positions of the tip at times (j,), by cubic interpolation of the samples [m]."""
     t, tip = simulation.time, simulation.tip
     step = t[1] - t[0]
@@ -253,7 +253,7 @@ def tip_at(simulation: Simulation, times: Array) -> Array:
     return np.asarray(a + u * (va + u * (3 * (b - a) - 2 * va - vb + u * (2 * (a - b) + va + vb))), dtype=np.float64)
 
 
-def _delayed(pieces: Array, delay: Array, size: int) -> Array:
+def _delay_polynomials(pieces: Array, delay: Array, size: int) -> Array:
     """Return polynomials (m, 2, k) in a time that begins later, by (m,), with room for ``size`` coefficients."""
     new = np.zeros((*pieces.shape[:2], size))
     for i in range(pieces.shape[-1]):

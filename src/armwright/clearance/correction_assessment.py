@@ -13,7 +13,7 @@ from armwright.clearance.correction import Correction, correct_nodes, correct_pa
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import PICK_AND_PLACE, PickAndPlace, named_path
 from armwright.clearance.predictability import simulate_with_predictability
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation
 from armwright.files.result_table import ResultTable
@@ -118,7 +118,7 @@ def assess_correction(
         goal = named_path(path)
         correction = correct_path(linkage, goal, clearances, settings, knots=knots, rounds=rounds, progress=progress)
     mean = np.atleast_2d(clearances).mean(axis=0)
-    run, predictability = simulate_with_predictability(prepare(linkage, correction.path, settings), mean)
+    run, predictability = simulate_with_predictability(prepare_scenario(linkage, correction.path, settings), mean)
     return CorrectionAssessment(
         linkage=linkage,
         path=path,

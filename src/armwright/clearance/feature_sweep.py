@@ -14,11 +14,11 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, Flags, integer
-from armwright.clearance.features import features
+from armwright.clearance.features import simulation_features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS, thesis_path
-from armwright.clearance.predictability import APART, MAX_REPLICATES, perturbed, together_until
-from armwright.clearance.scenario import Scenario, prepare
+from armwright.clearance.predictability import MAX_DISTANCE, MAX_REPLICATES, last_time_together, perturb_clearances
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Status, simulate
 from armwright.errors import InvalidValueError, one_of
@@ -38,7 +38,7 @@ _QUANTITIES = {
 DEFAULT_REPLICATES = 3
 
 
-class _Runs(NamedTuple):
+class _RunOutputs(NamedTuple):
     """The outputs of m runs: by name (m,) features, times (s,) [s], errors (m, s, 2) [m], which runs diverged."""
 
     features: dict[str, Array]
@@ -115,7 +115,7 @@ class FeatureSweep:
                     text = f"standard deviation over these runs: {what}"
                     outputs[f"{path}_{name}_spread"] = Output(description=text, units=unit)
             if self.replicates:
-                text = f"time until which these runs stay within {APART * 1e6:g} um of the first, path {path}"
+                text = f"time until which these runs stay within {MAX_DISTANCE * 1e6:g} um of the first, path {path}"
                 outputs[f"{path}_until"] = Output(description=text, units="s")
         return outputs
 
@@ -127,17 +127,17 @@ class FeatureSweep:
     @cached_property
     def tasks(self) -> tuple[Scenario, ...]:
         """The prepared paths, computed when they are first needed."""
-        return tuple(prepare(self.linkage, thesis_path(path), self.simulation_settings) for path in self.paths)
+        return tuple(prepare_scenario(self.linkage, thesis_path(path), self.simulation_settings) for path in self.paths)
 
     def __call__(self, points: Array) -> dict[str, Any]:
         """Return the outputs at (m, k) points, and which runs diverged."""
         pins = len(self.linkage.pins)
         frictions = points[:, pins] if self.with_friction else None
-        rows = perturbed(points[:, :pins], self.replicates)
+        rows = perturb_clearances(points[:, :pins], self.replicates)
         outputs: dict[str, Any] = {}
         diverged = np.zeros(len(points), dtype=bool)
         for path, task in zip(self.paths, self.tasks, strict=True):
-            runs = [_simulated(task, row, frictions) for row in rows]
+            runs = [_simulate_outputs(task, row, frictions) for row in rows]
             diverged |= np.any([run.diverged for run in runs], axis=0)
             for name in _QUANTITIES:
                 # The runs of a point are adjacent in memory: their sums then round alike, whatever the other points.
@@ -147,7 +147,9 @@ class FeatureSweep:
                     if self.replicates:
                         outputs[f"{path}_{name}_spread"] = values.std(axis=-1, ddof=1)
             if self.replicates:
-                outputs[f"{path}_until"] = together_until(runs[0].time, np.stack([run.error for run in runs]), APART)
+                outputs[f"{path}_until"] = last_time_together(
+                    runs[0].time, np.stack([run.error for run in runs]), MAX_DISTANCE
+                )
         outputs[FAILURE] = ["the simulation diverged" if failed else "" for failed in diverged]
         return outputs
 
@@ -156,7 +158,7 @@ class FeatureSweep:
         return {key: value for key, value in self.__dict__.items() if key != "tasks"}
 
 
-def is_chance(values: Array, spreads: Array, runs: int) -> bool:
+def is_random(values: Array, spreads: Array, runs: int) -> bool:
     """Whether a feature is chance alone: it varies more between indistinguishable runs than over the design.
 
     Args:
@@ -188,9 +190,9 @@ def is_sweep_of(settings: Mapping[str, Any], linkage: Linkage) -> bool:
     return swept == own
 
 
-def _simulated(task: Scenario, clearances: Array, frictions: Array | None) -> _Runs:
+def _simulate_outputs(task: Scenario, clearances: Array, frictions: Array | None) -> _RunOutputs:
     """Simulate (m, p) clearances [m] and return the outputs of the sweep."""
     # One core: the sweep occupies the others.
     run = simulate(task, clearances, frictions=frictions, threads=1)
-    values = {**features(run)._asdict(), "peak": run.peaks.max(axis=-1)}
-    return _Runs(values, run.time, run.error, np.asarray(run.status != Status.FINISHED))
+    values = {**simulation_features(run)._asdict(), "peak": run.peaks.max(axis=-1)}
+    return _RunOutputs(values, run.time, run.error, np.asarray(run.status != Status.FINISHED))

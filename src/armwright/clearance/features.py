@@ -39,12 +39,12 @@ class Features(NamedTuple):
     offset_y: Array
 
 
-def features(simulation: Simulation) -> Features:
-    """Return the features of the error curves of a simulation; see ``features_of``."""
-    return features_of(simulation.time, simulation.error)
+def simulation_features(simulation: Simulation) -> Features:
+    """Return the features of the error curves of a simulation; see ``error_curve_features``."""
+    return error_curve_features(simulation.time, simulation.error)
 
 
-def features_of(time: Array, error: Array, window: tuple[float, float] = WINDOW) -> Features:
+def error_curve_features(time: Array, error: Array, window: tuple[float, float] = WINDOW) -> Features:
     """Return the features of error curves.
 
     Args:

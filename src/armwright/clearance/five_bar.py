@@ -17,7 +17,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, of_shape, positive
-from armwright.clearance.five_bar_parts import parts_of
+from armwright.clearance.five_bar_parts import five_bar_links
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.placement import Vec2
 from armwright.errors import InvalidValueError, one_of
@@ -70,7 +70,7 @@ class FiveBar:
         Raises:
             InvalidValueError: it is no five-bar; the text says why.
         """
-        parts = parts_of(linkage)
+        parts = five_bar_links(linkage)
         lengths = [link.length for link in parts.links]
         return cls(motors=parts.motors, cranks=[lengths[0], lengths[3]], rods=lengths[1:3])
 
@@ -136,7 +136,7 @@ def inverse(bar: FiveBar, tip: ArrayLike, mode: Mode = "out") -> Array:
     signs = MODES[one_of("assembly mode", mode, MODES)]  # type: ignore[index]
     points = of_shape(tip, (2,), "tip", LARGEST)
     _check_reach(bar, points)
-    return _stacked(
+    return _stack_angles(
         [
             arm_angles(_vector(points - motor), float(crank), float(rod), sign)
             for motor, crank, rod, sign in zip(bar.motors, bar.cranks, bar.rods, signs, strict=True)
@@ -149,7 +149,7 @@ def inverse_all(bar: FiveBar, tip: ArrayLike) -> dict[Mode, Array]:
     return {mode: inverse(bar, tip, mode) for mode in MODES}
 
 
-def elbows(bar: FiveBar, cranks: ArrayLike) -> Array:
+def elbow_positions(bar: FiveBar, cranks: ArrayLike) -> Array:
     """Return (..., 2, 2) positions of the left and the right elbow [m] for angles (..., 2) of the cranks [rad]."""
     theta = of_shape(cranks, (2,), "cranks", LARGEST)
     directions = np.stack([np.sin(theta), -np.cos(theta)], axis=-1)
@@ -164,7 +164,7 @@ def _vector(points: Array) -> Vec2:
     return Vec2(np.asarray(points[..., 0]), np.asarray(points[..., 1]))
 
 
-def _stacked(arms: list[ArmAngles]) -> Array:
+def _stack_angles(arms: list[ArmAngles]) -> Array:
     """Return (..., 4) the angles or rates of the links of the left and the right arm."""
     left, right = arms
     parts = np.broadcast_arrays(left.crank, left.rod, right.rod, right.crank)
@@ -197,8 +197,8 @@ def _check_reach(bar: FiveBar, points: Array) -> None:
 
 def _point_text(points: Array, row: tuple[Any, ...]) -> str:
     x, y = points[row] * 1e3
-    return f"tip{_index(row)}: ({x:g}, {y:g}) mm"
+    return f"tip{_index_text(row)}: ({x:g}, {y:g}) mm"
 
 
-def _index(row: tuple[Any, ...]) -> str:
+def _index_text(row: tuple[Any, ...]) -> str:
     return f" {', '.join(str(int(i)) for i in row)}" if row else ""

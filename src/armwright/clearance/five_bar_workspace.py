@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import LARGEST, Array, ArrayLike, Flags, of_shape
-from armwright.clearance.five_bar import MODES, FiveBar, elbows
+from armwright.clearance.five_bar import MODES, FiveBar, elbow_positions
 from armwright.errors import InvalidValueError
 
 CurveKind: TypeAlias = Literal["serial", "parallel"]
@@ -31,7 +31,7 @@ _IN_LINE = 1e-12
 _MAX_CELLS = 4000
 
 
-class Curve(NamedTuple):
+class SingularCurve(NamedTuple):
     """A curve of positions at which a five-bar is singular.
 
     Attributes:
@@ -77,7 +77,7 @@ def boundary_distance(bar: FiveBar, tip: ArrayLike) -> Array:
         (...) distances [m], below 0 for points out of reach; minus infinity for an empty workspace.
     """
     points = of_shape(tip, (2,), "tip", LARGEST)
-    distances = np.array(_margin(bar, points))
+    distances = np.array(_reach_margin(bar, points))
     outside = distances < 0
     if np.any(outside):
         distances[outside] = -_outside_distance(bar, points[outside])
@@ -162,28 +162,30 @@ def condition_number(bar: FiveBar, angles: ArrayLike) -> Array:
         return np.asarray(gains[..., 0] / gains[..., 1], dtype=np.float64)
 
 
-def singular_curves(bar: FiveBar) -> list[Curve]:
+def singular_curves(bar: FiveBar) -> list[SingularCurve]:
     """Return the curves of positions of the tip at which the five-bar is singular.
 
     Serial ones are the borders of the reach of each arm, as far as the other arm reaches them. Parallel ones are inside
     the workspace; which of them a motion passes depends on its assembly mode.
     """
     angles = np.linspace(0, 2 * math.pi, _POINTS + 1)
-    corners = np.array(_corners(bar)).reshape(-1, 2)
-    curves: list[Curve] = []
+    corners = np.array(_reach_corners(bar)).reshape(-1, 2)
+    curves: list[SingularCurve] = []
     for motor, reaches in zip(bar.motors, bar.reaches, strict=True):
         # Where circles of both arms intersect, one border ends and another begins.
         ends = np.arctan2(*(corners - motor).T[::-1]) % (2 * math.pi)
         for reach in reaches[reaches > 0]:
-            circle = _circle(motor, reach, np.sort(np.concatenate([angles, ends])))
+            circle = _circle_points(motor, reach, np.sort(np.concatenate([angles, ends])))
             curves += _split_curve("serial", circle, _is_reachable(bar, circle), np.full(len(circle), ""))
     lines = [float(bar.rods.sum())]
     if bar.rods[0] == bar.rods[1]:
         # Equal rods fold where the elbows coincide, and then rotate about them.
         for elbow in _circle_intersections(bar.motors, float(bar.cranks[0]), float(bar.cranks[1])):
-            circle = _circle(elbow, bar.rods[0], angles)
+            circle = _circle_points(elbow, bar.rods[0], angles)
             ends = np.broadcast_to(elbow, circle.shape)
-            curves += _split_curve("parallel", circle, np.full(len(circle), True), _modes(bar, circle, ends, ends))
+            curves += _split_curve(
+                "parallel", circle, np.full(len(circle), True), _assembly_modes(bar, circle, ends, ends)
+            )
     else:
         lines.append(float(bar.rods[0] - bar.rods[1]))
     for length in lines:
@@ -195,7 +197,7 @@ def singular_curves(bar: FiveBar) -> list[Curve]:
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _circle(centre: Array, radius: float, angles: Array) -> Array:
+def _circle_points(centre: Array, radius: float, angles: Array) -> Array:
     return centre + radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
@@ -205,7 +207,7 @@ def _angles_between_links(angles: ArrayLike) -> Array:
     return np.asarray(theta[..., [1, 1, 2]] - theta[..., [0, 2, 3]], dtype=np.float64)
 
 
-def _margin(bar: FiveBar, points: Array) -> Array:
+def _reach_margin(bar: FiveBar, points: Array) -> Array:
     """Return (...) the distance of points (..., 2) from the nearest circle of a reach, below 0 out of reach [m]."""
     distances = np.linalg.norm(points[..., None, :] - bar.motors, axis=-1)
     margins = np.concatenate([distances - bar.reaches[:, 0], bar.reaches[:, 1] - distances], axis=-1)
@@ -214,10 +216,10 @@ def _margin(bar: FiveBar, points: Array) -> Array:
 
 def _is_reachable(bar: FiveBar, points: Array) -> Flags:
     """Return (...) whether points (..., 2) are in reach, or on its border but for rounding."""
-    return np.asarray(_margin(bar, points) >= -_ON_CIRCLE)
+    return np.asarray(_reach_margin(bar, points) >= -_ON_CIRCLE)
 
 
-def _corners(bar: FiveBar) -> list[Array]:
+def _reach_corners(bar: FiveBar) -> list[Array]:
     """Return the intersections of circles of both arms that both arms reach."""
     points = [
         point
@@ -239,7 +241,7 @@ def _outside_distance(bar: FiveBar, points: Array) -> Array:
             near = motor + reach * outward
             nearer = np.minimum(best, np.linalg.norm(points - near, axis=-1))
             best = np.where(_is_reachable(bar, near), nearer, best)
-    for corner in _corners(bar):
+    for corner in _reach_corners(bar):
         best = np.minimum(best, np.linalg.norm(points - corner, axis=-1))
     return best
 
@@ -250,7 +252,7 @@ def _extreme_point(bar: FiveBar, axis: int, sign: int) -> Array:
     circles = [
         motor + reach * direction for motor, reaches in zip(bar.motors, bar.reaches, strict=True) for reach in reaches
     ]
-    points = [point for point in circles if _is_reachable(bar, point)] + _corners(bar)
+    points = [point for point in circles if _is_reachable(bar, point)] + _reach_corners(bar)
     if not points:
         near, far = bar.reaches.T
         raise InvalidValueError(
@@ -275,7 +277,7 @@ def _circle_intersections(centres: Array, radius_a: float, radius_b: float) -> l
     return [foot + across, foot - across] if square > 0 else [foot]
 
 
-def _modes(bar: FiveBar, tips: Array, left: Array, right: Array) -> npt.NDArray[np.str_]:
+def _assembly_modes(bar: FiveBar, tips: Array, left: Array, right: Array) -> npt.NDArray[np.str_]:
     """Return (k,) the assembly modes for positions of tip and elbows."""
     signs = []
     for motor, elbow in zip(bar.motors, (left, right), strict=True):
@@ -287,7 +289,7 @@ def _modes(bar: FiveBar, tips: Array, left: Array, right: Array) -> npt.NDArray[
     return names
 
 
-def _parallel_curves(bar: FiveBar, angles: Array, length: float, branch: float) -> list[Curve]:
+def _parallel_curves(bar: FiveBar, angles: Array, length: float, branch: float) -> list[SingularCurve]:
     """Return the curves on which the rods are in one line.
 
     Args:
@@ -303,7 +305,7 @@ def _parallel_curves(bar: FiveBar, angles: Array, length: float, branch: float) 
         for point in _circle_intersections(bar.motors, float(bar.cranks[0]), float(reach))
     ]
     angles = np.sort(np.concatenate([angles, [math.atan2(x, -y) % (2 * math.pi) for x, y in ends]]))
-    left = elbows(bar, np.stack([angles, angles], axis=-1))[:, 0]
+    left = elbow_positions(bar, np.stack([angles, angles], axis=-1))[:, 0]
     base = bar.motors[1] - left
     distance = np.linalg.norm(base, axis=-1)
     divisor = np.where(distance > 0, distance, 1.0)
@@ -314,10 +316,10 @@ def _parallel_curves(bar: FiveBar, angles: Array, length: float, branch: float) 
     across = np.sqrt(np.maximum(square, 0.0))[:, None] * np.stack([-unit[:, 1], unit[:, 0]], axis=-1)
     right = left + along[:, None] * unit + branch * across
     tips = left + (right - left) * (bar.rods[0] / length)
-    return _split_curve("parallel", tips, valid, _modes(bar, tips, left, right))
+    return _split_curve("parallel", tips, valid, _assembly_modes(bar, tips, left, right))
 
 
-def _split_curve(kind: CurveKind, points: Array, valid: Flags, modes: npt.NDArray[np.str_]) -> list[Curve]:
+def _split_curve(kind: CurveKind, points: Array, valid: Flags, modes: npt.NDArray[np.str_]) -> list[SingularCurve]:
     """Split a row of points at invalid ones, and at changes of the mode, where the next curve continues."""
     cuts = np.flatnonzero((valid[1:] != valid[:-1]) | (modes[1:] != modes[:-1])) + 1
     curves = []
@@ -326,5 +328,5 @@ def _split_curve(kind: CurveKind, points: Array, valid: Flags, modes: npt.NDArra
         if valid[last]:
             numbers = np.append(row, last + 1) if last + 1 < len(points) and valid[last + 1] else row
             if len(numbers) > 1:
-                curves.append(Curve(kind, points[numbers], modes[numbers]))
+                curves.append(SingularCurve(kind, points[numbers], modes[numbers]))
     return curves

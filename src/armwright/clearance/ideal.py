@@ -47,7 +47,7 @@ class IdealMotion:
     reactions: Array
 
 
-def closed(
+def close_pins(
     linkage: Linkage,
     guess: ArrayLike,
     *,
@@ -70,7 +70,7 @@ def closed(
     Raises:
         InvalidValueError: the position cannot be reached, or only through a singular configuration.
     """
-    goal = _goal(linkage, tip=tip, drives=drives)
+    goal = _goal_array(linkage, tip=tip, drives=drives)
     start = floats(guess, "guess")
     lead = np.broadcast_shapes(start.shape[:-1], goal.shape[:-1], np.shape(gaps)[:-2])
     n, p = len(linkage.coordinates), len(linkage.pins)
@@ -78,7 +78,7 @@ def closed(
     goals = np.broadcast_to(goal, (*lead, goal.shape[-1])).reshape(len(q), goal.shape[-1])
     apart = np.broadcast_to(gaps, (*lead, p, 2)).reshape(len(q), 2 * p)
     for block in _blocks(len(q)):
-        worst = _close(linkage, q[block], goals[block], apart[block], by_tip=tip is not None)
+        worst = _close_loops(linkage, q[block], goals[block], apart[block], by_tip=tip is not None)
         if worst is not None:
             what = "the path" if tip is not None else "the drives"
             raise InvalidValueError(
@@ -88,15 +88,15 @@ def closed(
     return q.reshape(*lead, n)
 
 
-def _close(linkage: Linkage, q: Array, goal: Array, apart: Array, *, by_tip: bool) -> int | None:
+def _close_loops(linkage: Linkage, q: Array, goal: Array, apart: Array, *, by_tip: bool) -> int | None:
     """Close the loops of configurations (s, n) in place; return the index of the worst, if any stays open."""
     done = np.zeros((len(q), 1), dtype=bool)
     for _ in range(_MAX_ITERATIONS):
-        placement = _placed(linkage, q)
+        placement = _place_bodies(linkage, q)
         residuals = _residuals(placement, goal, by_tip=by_tip)
         residuals[..., : apart.shape[-1]] -= apart
         with np.errstate(invalid="ignore"):
-            step = _solved(_closure(placement, by_tip), -residuals)
+            step = _solve(_closure(placement, by_tip), -residuals)
         size = np.abs(step).max(axis=-1, keepdims=True, initial=0.0)
         step *= np.minimum(1.0, _MAX_STEP / np.maximum(size, 1e-300))
         q += np.where(done, 0.0, step)
@@ -139,19 +139,19 @@ def _block_motion(
     """Return the parts of ``IdealMotion`` for configurations (s, n)."""
     lead = q.shape[:-1]
     still = [np.zeros((*lead, 2 * len(linkage.pins)))]
-    A = _closure(_placed(linkage, q), by_tip)
-    qd = _solved(A, np.concatenate([*still, speeds], axis=-1))
-    moving = _placed(linkage, q, qd)
+    A = _closure(_place_bodies(linkage, q), by_tip)
+    qd = _solve(A, np.concatenate([*still, speeds], axis=-1))
+    moving = _place_bodies(linkage, q, qd)
     bias = [_gap(moving, i).bias for i in range(len(linkage.pins))] + (
         [moving.point(linkage.tip).bias] if by_tip else []
     )
     biases = [x for pair in bias for x in pair] + [0.0] * (0 if by_tip else len(linkage.drives))
-    qdd = _solved(A, np.concatenate([*still, accelerations], axis=-1) - _stacked(lead, biases))
-    efforts, reactions = balance(linkage, q, qd, qdd)
+    qdd = _solve(A, np.concatenate([*still, accelerations], axis=-1) - _stack(lead, biases))
+    efforts, reactions = inverse_dynamics(linkage, q, qd, qdd)
     return q, qd, qdd, efforts, reactions
 
 
-def balance(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
+def inverse_dynamics(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
     """Return the efforts and reactions that belong to a motion.
 
     Args:
@@ -172,8 +172,8 @@ def balance(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple[Array, A
             f"{linkage.name}: expected one drive for each freedom, got {d} drives for {n - 2 * p} freedoms"
         )
     lead = q.shape[:-1]
-    moving = _placed(linkage, q, qd)
-    need = -_stacked(lead, free_forces(moving))
+    moving = _place_bodies(linkage, q, qd)
+    need = -_stack(lead, free_forces(moving))
     for (i, j), entry in mass_matrix(moving).items():
         need[..., i] += entry * qdd[..., j]
         if i != j:
@@ -186,28 +186,28 @@ def balance(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple[Array, A
         for i, partial in _gap(moving, k).partials.items():
             A[..., i, d + 2 * k] = -partial.x
             A[..., i, d + 2 * k + 1] = -partial.y
-    solution = _solved(A, need)
+    solution = _solve(A, need)
     return solution[..., :d], solution[..., d:].reshape(*lead, p, 2)
 
 
-def tip_of(linkage: Linkage, q: Array) -> Array:
+def tip_position(linkage: Linkage, q: Array) -> Array:
     """Return (..., 2) the position of the tip [m] at coordinates (..., n)."""
-    return point_of(linkage, linkage.tip, q)
+    return point_position(linkage, linkage.tip, q)
 
 
-def point_of(linkage: Linkage, point: BodyPoint, q: Array) -> Array:
+def point_position(linkage: Linkage, point: BodyPoint, q: Array) -> Array:
     """Return (..., 2) the position of a point of a body [m] at coordinates (..., n)."""
-    return _stacked(q.shape[:-1], _placed(linkage, q).point(point).position)
+    return _stack(q.shape[:-1], _place_bodies(linkage, q).point(point).position)
 
 
-def gaps_of(linkage: Linkage, q: Array) -> Array:
+def pin_gaps(linkage: Linkage, q: Array) -> Array:
     """Return (..., p, 2) from the centre of each bearing to that of its journal [m] at coordinates (..., n)."""
-    placement, p = _placed(linkage, q), len(linkage.pins)
+    placement, p = _place_bodies(linkage, q), len(linkage.pins)
     gaps = [x for i in range(p) for x in _gap(placement, i).position]
-    return _stacked(q.shape[:-1], gaps).reshape(*q.shape[:-1], p, 2)
+    return _stack(q.shape[:-1], gaps).reshape(*q.shape[:-1], p, 2)
 
 
-def sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
+def tip_sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
     """Return the derivative of the tip position with respect to the gaps of the pins, with locked drives.
 
     Args:
@@ -225,9 +225,9 @@ def sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
     """
     q = floats(q, "q")
     lead, p = q.shape[:-1], len(linkage.pins)
-    placement = _placed(linkage, q)
+    placement = _place_bodies(linkage, q)
     A = _closure(placement, by_tip=False)
-    inverse = _divided(A, np.eye(q.shape[-1])[:, : 2 * p])
+    inverse = _solve_columns(A, np.eye(q.shape[-1])[:, : 2 * p])
     tip = _jacobian(lead, [placement.point(linkage.tip)], q.shape[-1])
     return (tip @ inverse).reshape(*lead, 2, p, 2)
 
@@ -240,7 +240,7 @@ def _blocks(count: int) -> list[slice]:
     return [slice(start, min(start + _BLOCK, count)) for start in range(0, max(count, 1), _BLOCK)]
 
 
-def _placed(linkage: Linkage, q: Array, qd: Array | None = None) -> Placement:
+def _place_bodies(linkage: Linkage, q: Array, qd: Array | None = None) -> Placement:
     """Return the bodies in many configurations at once, at rest without speeds."""
     speeds = [0.0] * q.shape[-1] if qd is None else list(np.moveaxis(qd, -1, 0))
     return Placement(linkage, list(np.moveaxis(q, -1, 0)), speeds)
@@ -261,7 +261,7 @@ def _gap(placement: Placement, number: int) -> Point:
     )
 
 
-def _goal(linkage: Linkage, *, tip: ArrayLike | None, drives: ArrayLike | None) -> Array:
+def _goal_array(linkage: Linkage, *, tip: ArrayLike | None, drives: ArrayLike | None) -> Array:
     """Return the goal: (..., 2) position of the tip, or (..., d) driven coordinates."""
     if drives is not None and tip is None:
         return of_shape(drives, (len(linkage.drives),), "drives")
@@ -276,7 +276,7 @@ def _residuals(placement: Placement, goal: Array, *, by_tip: bool) -> Array:
     reached = placement.point(linkage.tip).position if by_tip else [placement.q[i] for i in linkage.driven]
     residuals = [x for i in range(len(linkage.pins)) for x in _gap(placement, i).position]
     residuals += [x - goal[..., i] for i, x in enumerate(reached)]
-    return _stacked(np.shape(placement.q[0]), residuals)
+    return _stack(np.shape(placement.q[0]), residuals)
 
 
 def _closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of two kinds of equations
@@ -306,7 +306,7 @@ def _jacobian(lead: tuple[int, ...], points: Sequence[Point], n: int) -> Array:
     return J
 
 
-def _stacked(lead: tuple[int, ...], numbers: Sequence[Scalar]) -> Array:
+def _stack(lead: tuple[int, ...], numbers: Sequence[Scalar]) -> Array:
     """Return numbers and arrays, broadcast to the leading axes, along a last axis."""
     stacked = np.zeros((*lead, len(numbers)))
     for i, x in enumerate(numbers):
@@ -314,12 +314,12 @@ def _stacked(lead: tuple[int, ...], numbers: Sequence[Scalar]) -> Array:
     return stacked
 
 
-def _solved(A: Array, right: Array) -> Array:
-    """Return A⁻¹ b of many systems; errors as of ``_divided``."""
-    return np.asarray(_divided(A, right[..., None])[..., 0], dtype=np.float64)
+def _solve(A: Array, right: Array) -> Array:
+    """Return A⁻¹ b of many systems; errors as of ``_solve_columns``."""
+    return np.asarray(_solve_columns(A, right[..., None])[..., 0], dtype=np.float64)
 
 
-def _divided(A: Array, columns: Array) -> Array:
+def _solve_columns(A: Array, columns: Array) -> Array:
     """Return A⁻¹ B of many systems.
 
     Raises:

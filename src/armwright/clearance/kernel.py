@@ -137,9 +137,9 @@ class Layout:
 
 def emit_simulation(layout: Layout, integrator: Integrator) -> str:
     """Write the source of a simulation: its sizes, its equations, and the functions of the loop as they stand."""
-    sizes = _sizes(layout, integrator)
+    sizes = _layout_sizes(layout, integrator)
     body = kernel_body(layout.rates, sizes["INPUTS"])
-    events = _sources(event_location, _COMPILED) if layout.located else []
+    events = _function_sources(event_location, _COMPILED) if layout.located else []
     equations = textwrap.indent(body.lines, " " * 8)
     return "\n\n".join(
         [
@@ -147,7 +147,7 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
             "\n".join(f"{name} = {value!r}" for name, value in {**sizes, "OUTPUTS": body.outputs}.items()),
             f"{_COMPILED if layout.located else _INLINED}\ndef rates(x, y):\n    for k in range({LANES}):\n{equations}",
             *events,
-            *_sources(simulation_loop, _INLINED),
+            *_function_sources(simulation_loop, _INLINED),
             _SIGNATURE.format(matrix='types.Array(float64, 2, "C", readonly=True)'),
             function_source(simulation_loop.simulate),
             "",
@@ -155,13 +155,13 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
     )
 
 
-def _sources(module: ModuleType, decorator: str) -> list[str]:
+def _function_sources(module: ModuleType, decorator: str) -> list[str]:
     """Return the sources of the functions of a module in their order, but for the loop, which calls them."""
     functions = (x for x in vars(module).values() if isfunction(x) and x.__module__ == module.__name__)
     return [function_source(x, decorator) for x in functions if x is not simulation_loop.simulate]
 
 
-def _sizes(layout: Layout, integrator: Integrator) -> dict[str, int]:
+def _layout_sizes(layout: Layout, integrator: Integrator) -> dict[str, int]:
     """Return the sizes of a simulation, by their names in ``lane_layout``."""
     memory, parameters = 2 * layout.pins, len(Contact._fields) * layout.pins
     first_parameter = layout.states + memory

@@ -27,7 +27,7 @@ DriveKind: TypeAlias = Literal["effort", "motion"]
 CoordinateKind: TypeAlias = Literal["angle", "slide", "x", "y"]
 
 
-def _pair(value: ArrayLike) -> Array:
+def _vector2(value: ArrayLike) -> Array:
     return exact_shape(value, (2,), "point", LARGEST)
 
 
@@ -35,7 +35,7 @@ def _points(value: Mapping[str, ArrayLike]) -> dict[str, Array]:
     return {name: exact_shape(point, (2,), f"point {name}", LARGEST) for name, point in value.items()}
 
 
-def _parts(value: Iterable[Any]) -> tuple[Any, ...]:
+def _as_tuple(value: Iterable[Any]) -> tuple[Any, ...]:
     return tuple(value)
 
 
@@ -65,7 +65,7 @@ class Body:
     name: str
     mass: float = 0.0
     inertia: float = 0.0
-    centre: Array = attrs.field(converter=_pair, default=(0.0, 0.0))
+    centre: Array = attrs.field(converter=_vector2, default=(0.0, 0.0))
     points: Mapping[str, Array] = attrs.field(converter=_points, factory=dict)
 
     def __attrs_post_init__(self) -> None:
@@ -155,7 +155,7 @@ class Load:
     """
 
     point: BodyPoint
-    force: Array = attrs.field(converter=_pair)
+    force: Array = attrs.field(converter=_vector2)
 
 
 @attrs.frozen(kw_only=True)
@@ -224,14 +224,14 @@ class Linkage:
     """
 
     name: str
-    bodies: tuple[Body, ...] = attrs.field(converter=_parts)
+    bodies: tuple[Body, ...] = attrs.field(converter=_as_tuple)
     ground: Body
-    joints: tuple[Pin | Guide, ...] = attrs.field(converter=_parts)
-    pins: tuple[ClearancePin, ...] = attrs.field(converter=_parts)
-    drives: tuple[Drive, ...] = attrs.field(converter=_parts)
-    loads: tuple[Load, ...] = attrs.field(converter=_parts, default=())
+    joints: tuple[Pin | Guide, ...] = attrs.field(converter=_as_tuple)
+    pins: tuple[ClearancePin, ...] = attrs.field(converter=_as_tuple)
+    drives: tuple[Drive, ...] = attrs.field(converter=_as_tuple)
+    loads: tuple[Load, ...] = attrs.field(converter=_as_tuple, default=())
     tip: BodyPoint
-    gravity: Array = attrs.field(converter=_pair, default=GRAVITY)
+    gravity: Array = attrs.field(converter=_vector2, default=GRAVITY)
     zero: float = 0.0
     material: Material = attrs.field(factory=Material)
     assembly: Mapping[str, float] = attrs.field(factory=dict)
@@ -367,7 +367,7 @@ def _check_unique(kind: str, names: list[str]) -> None:
             raise InvalidValueError(f"{kind} '{name}' is defined twice")
 
 
-def exact(x: float) -> float:
+def round_to_right_angle(x: float) -> float:
     """Return a sine or cosine, exactly 0 or ±1 at the multiples of a right angle."""
     near = float(round(x))
     return near if math.isclose(x, near, abs_tol=1e-12) else x

@@ -126,7 +126,9 @@ def constant_speed_path(name: str, start: float, speed: float, duration: float) 
     return Path(name=name, knots=np.array([0.0, duration]), pieces=pieces, follower="drives")
 
 
-def straight(name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP_SPEED, ramp: float = RAMP) -> Path:
+def straight_path(
+    name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP_SPEED, ramp: float = RAMP
+) -> Path:
     """Return a straight path with a trapezoid of speed.
 
     Args:
@@ -161,7 +163,7 @@ def straight(name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP
     )
 
 
-def hermite(
+def hermite_path(
     name: str, times: Sequence[float], positions: ArrayLike, velocities: ArrayLike, targets: Sequence[int]
 ) -> Path:
     """Return a path of cubic pieces through positions with specified velocities.
@@ -231,7 +233,7 @@ class PickAndPlace:
         positions = [first, first + lift, middle, last + lift, last]
         velocities = [(0, 0), (0, self.lift_speed), (self.speed, 0), (0, -self.lift_speed), (0, 0)]
         times: list[float] = np.cumsum([0.0, self.lift_time, self.rise_time, self.fall_time, self.lift_time]).tolist()
-        return hermite(PICK_AND_PLACE, times, positions, velocities, (0, 2, 4))
+        return hermite_path(PICK_AND_PLACE, times, positions, velocities, (0, 2, 4))
 
 
 def thesis_path(name: str) -> Path:
@@ -240,7 +242,7 @@ def thesis_path(name: str) -> Path:
     Raises:
         UnknownNameError: there is none of that name.
     """
-    return straight(name, *TEST_PATHS[one_of("test path", name, TEST_PATHS)])
+    return straight_path(name, *TEST_PATHS[one_of("test path", name, TEST_PATHS)])
 
 
 def named_path(name: str) -> Path:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from armwright.clearance.linkage import GROUND, Body, BodyPoint, Guide, Linkage, Pin, exact
+from armwright.clearance.linkage import GROUND, Body, BodyPoint, Guide, Linkage, Pin, round_to_right_angle
 from armwright.tracing.scalar import Scalar, cos, sin
 
 
@@ -147,14 +147,14 @@ class Placement:
         return self.frames[body.name].point(*map(float, body.centre))
 
     def _rotating(self, number: int, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Frame:
-        axis = _rotated(Vec2(cos(q[number]), sin(q[number])), self.linkage.zero)
+        axis = _rotate(Vec2(cos(q[number]), sin(q[number])), self.linkage.zero)
         return Frame(axis, {number: 1.0}, qd[number], Point(NOWHERE, {}, NOWHERE, NOWHERE))
 
     def _sliding(self, guide: Guide, number: int, q: Sequence[Scalar], qd: Sequence[Scalar]) -> tuple[Frame, Point]:
         """Return the frame of a body that slides along a guide, and its point on the line."""
         carrier, line = self.frames[guide.on.body], self.point(guide.on)
-        along = _rotated(carrier.axis, guide.direction)
-        frame = carrier._replace(axis=_rotated(carrier.axis, guide.angle))
+        along = _rotate(carrier.axis, guide.direction)
+        frame = carrier._replace(axis=_rotate(carrier.axis, guide.angle))
         point = carrier.shifted(line, along.times(q[number]))
         point.partials[number] = along
         velocity = point.velocity.plus(along.times(qd[number]))
@@ -162,5 +162,7 @@ class Placement:
         return frame, point._replace(velocity=velocity, bias=bias)
 
 
-def _rotated(axis: Vec2, angle: float) -> Vec2:
-    return axis.times(exact(math.cos(angle))).plus(axis.perpendicular().times(exact(math.sin(angle))))
+def _rotate(axis: Vec2, angle: float) -> Vec2:
+    return axis.times(round_to_right_angle(math.cos(angle))).plus(
+        axis.perpendicular().times(round_to_right_angle(math.sin(angle)))
+    )

@@ -16,7 +16,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.clearance.scenario import Scenario, prepare
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import InvalidValueError
 
@@ -25,7 +25,7 @@ PERTURBATION, MAX_REPLICATES = 1e-9, 15
 # Runs that are farther from one another have diverged [m]. With smaller steps they must be nearer by a factor: after an
 # impact the error of a step is of first order, half as much again as what a third of it changes, and chance more than
 # doubles that. One of them may meet an impact at the same part of its step as the whole one, and hardly both.
-APART, PARTS, FINER = 1e-5, (2, 3), 4.0
+MAX_DISTANCE, STEP_DIVISORS, DISTANCE_DIVISOR = 1e-5, (2, 3), 4.0
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -33,8 +33,8 @@ class Predictability:
     """The time until which a run is a prediction, and the scatter of its repetitions.
 
     Attributes:
-        until: the last time at which all repetitions are within ``APART`` of it, and those with smaller steps within a
-            quarter of that [s].
+        until: the last time at which all repetitions are within ``MAX_DISTANCE`` of it, and those with smaller steps
+            within a quarter of that [s].
         mean: (s, 2) mean error of the tip over all of them [m].
         spread: (s, 2) its standard deviation over them [m].
         to_the_end: whether the whole run is a prediction.
@@ -48,7 +48,7 @@ class Predictability:
     finer: bool
 
 
-def perturbed(clearances: Array, count: int = MAX_REPLICATES) -> Array:
+def perturb_clearances(clearances: Array, count: int = MAX_REPLICATES) -> Array:
     """Return (count + 1, ..., p) clearances: the original ones, then the same others at most a nanometre away."""
     shifts = np.random.default_rng(0).uniform(-PERTURBATION, PERTURBATION, (count, clearances.shape[-1]))
     lead = (count, *(1,) * (clearances.ndim - 1), clearances.shape[-1])
@@ -71,16 +71,18 @@ def simulate_with_predictability(
     Raises:
         InvalidValueError: see ``simulate``.
     """
-    rows = perturbed(np.asarray(clearances, dtype=np.float64))
+    rows = perturb_clearances(np.asarray(clearances, dtype=np.float64))
     own = simulate(scenario, rows, frictions=friction, threads=threads)
     smaller_steps = []
-    for parts in PARTS:
+    for parts in STEP_DIVISORS:
         settings = attrs.evolve(scenario.settings, step=scenario.h / parts, sample=scenario.stride * scenario.h)
         # The steps may be more than the limit.
         with contextlib.suppress(InvalidValueError):
-            again = prepare(scenario.linkage, scenario.path, settings, guess=scenario.ideal.q[0])
+            again = prepare_scenario(scenario.linkage, scenario.path, settings, guess=scenario.ideal.q[0])
             smaller_steps.append(simulate(again, rows, frictions=friction, threads=threads).error[:, : len(own.time)])
-    complete = len(smaller_steps) == len(PARTS) and all(error.shape == own.error.shape for error in smaller_steps)
+    complete = len(smaller_steps) == len(STEP_DIVISORS) and all(
+        error.shape == own.error.shape for error in smaller_steps
+    )
     finer = np.concatenate(smaller_steps) if complete else None
     return select_run(own, 0), _predictability(own.time, own.error, finer)
 
@@ -95,7 +97,7 @@ def select_run(simulation: Simulation, number: int) -> Simulation:
     )
 
 
-def together_until(time: Array, errors: Array, within: float) -> Array:
+def last_time_together(time: Array, errors: Array, within: float) -> Array:
     """Return (...) the last time up to which runs stay together [s].
 
     Args:
@@ -113,10 +115,12 @@ def together_until(time: Array, errors: Array, within: float) -> Array:
 
 def _predictability(time: Array, own: Array, finer: Array | None) -> Predictability:
     """Return the predictability of the first of r runs (r, s, 2), compared with the others and with smaller steps."""
-    until, all_of_them = together_until(time, own, APART), own
+    until, all_of_them = last_time_together(time, own, MAX_DISTANCE), own
     if finer is not None:
         all_of_them = np.concatenate([own, finer])
-        until = np.minimum(until, together_until(time, np.concatenate([own[:1], finer]), APART / FINER))
+        until = np.minimum(
+            until, last_time_together(time, np.concatenate([own[:1], finer]), MAX_DISTANCE / DISTANCE_DIVISOR)
+        )
     with np.errstate(invalid="ignore", over="ignore"):
         mean, spread = all_of_them.mean(axis=0), all_of_them.std(axis=0)
     return Predictability(

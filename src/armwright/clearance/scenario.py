@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.clearance.ideal import IdealMotion, closed, ideal_motion
+from armwright.clearance.ideal import IdealMotion, close_pins, ideal_motion
 from armwright.clearance.linkage import Coordinate, Linkage
 from armwright.clearance.paths import ROUNDING, Path
 from armwright.clearance.placement import Placement
@@ -55,7 +55,7 @@ class Scenario:
     ideal: IdealMotion
 
 
-def prepare(
+def prepare_scenario(
     linkage: Linkage, path: Path, settings: Settings | None = None, *, guess: ArrayLike | None = None
 ) -> Scenario:
     """Determine the commands of the drives that follow a path without clearance.
@@ -83,16 +83,16 @@ def prepare(
     steps = -(-steps // stride) * stride
     after, before = path.halves(steps)
     start = assembly_guess(linkage) if guess is None else floats(guess, "guess")
-    q = closed_along(linkage, after.position, start, by_tip=by_tip)
+    q = close_pins_along(linkage, after.position, start, by_tip=by_tip)
     ideal = ideal_motion(linkage, q, after.velocity, after.acceleration, by_tip=by_tip)
-    commands = _commands(linkage, settings, ideal)
+    commands = _drive_commands(linkage, settings, ideal)
     table = np.stack([commands[:-1:2], commands[1::2], commands[2::2]], axis=1)
     # A step that ends where the acceleration jumps ends with the command before the jump.
     jumps = np.flatnonzero(np.any(after.acceleration != before.acceleration, axis=-1))
     jumps = jumps[(jumps > 0) & (jumps % 2 == 0)]
     if len(jumps):
         came = ideal_motion(linkage, q[jumps], before.velocity[jumps], before.acceleration[jumps], by_tip=by_tip)
-        table[jumps // 2 - 1, 2] = _commands(linkage, settings, came)
+        table[jumps // 2 - 1, 2] = _drive_commands(linkage, settings, came)
     table, lengths, marks = _split_at_jumps(linkage, path, settings, q[::2], table)
     return Scenario(
         linkage=linkage,
@@ -133,7 +133,7 @@ def assembly_guess(linkage: Linkage) -> Array:
     return q
 
 
-def closed_along(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bool) -> Array:
+def close_pins_along(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bool) -> Array:
     """Return (s, n) closed coordinates along a path (s, 2) of the tip, or (s, d) of the drives, without a jump.
 
     Raises:
@@ -141,7 +141,7 @@ def closed_along(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bool) 
     """
 
     def closed_at(start: Array, goal: Array) -> Array:
-        return closed(linkage, start, tip=goal) if by_tip else closed(linkage, start, drives=goal)
+        return close_pins(linkage, start, tip=goal) if by_tip else close_pins(linkage, start, drives=goal)
 
     picks = np.unique(np.linspace(0, len(goals) - 1, min(_COARSE, len(goals))).astype(int))
     coarse = [closed_at(guess, goals[0])]
@@ -185,13 +185,13 @@ def _split_at_jumps(
         moment = path.evaluate(times, np.broadcast_to(piece[:, None], times.shape))
         by_tip = path.follower == "tip"
         near = np.broadcast_to(q[number[parts], None], (*times.shape, q.shape[1]))
-        there = closed(linkage, near, **{"tip" if by_tip else "drives": moment.position})
+        there = close_pins(linkage, near, **{"tip" if by_tip else "drives": moment.position})
         ideal = ideal_motion(linkage, there, moment.velocity, moment.acceleration, by_tip=by_tip)
-        rows[parts] = _commands(linkage, settings, ideal)
+        rows[parts] = _drive_commands(linkage, settings, ideal)
     return rows, lengths, marks
 
 
-def _commands(linkage: Linkage, settings: Settings, ideal: IdealMotion) -> Array:
+def _drive_commands(linkage: Linkage, settings: Settings, ideal: IdealMotion) -> Array:
     """Return the commands of the drives: efforts or prescribed accelerations; for a controller also goals."""
     driven = list(linkage.driven)
     prescribed = np.array([drive.kind == "motion" for drive in linkage.drives])

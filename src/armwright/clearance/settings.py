@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, not_negative, positive
-from armwright.clearance.contact import FRICTION_LAWS, IMPACT_LAWS, ImpactLaw, deepest, stiffness
+from armwright.clearance.contact import FRICTION_LAWS, IMPACT_LAWS, ImpactLaw, largest_indentation, stiffness
 from armwright.clearance.equations import SLIP_SPEEDS, FrictionModel
 from armwright.clearance.kernel import CONTROLS, INTEGRATORS, Control, Integrator
 from armwright.clearance.linkage import Linkage
@@ -117,15 +117,15 @@ def check_step(linkage: Linkage, settings: Settings, K: Array) -> None:
     slope = 1.5 * float(K.max()) ** (2 / 3) * _USUAL_FORCE ** (1 / 3)
     longest = _LARGEST_PART / np.sqrt(slope / lightest)
     if settings.step > longest:
-        depth = deepest(lightest, float(K.max()), 1.0, 0.0)
+        depth = largest_indentation(lightest, float(K.max()), 1.0, 0.0)
         raise InvalidValueError(
             f"step: {settings.step:g} s is too long for contacts of {K.max():.3g} N/m^1.5, which oscillate in "
             f"{2 * np.pi * np.sqrt(lightest / slope):.2g} s and stop a blow of 1 m/s within {depth * 1e6:.0f} µm; "
-            f"expected at most {_shorter(float(longest)):g} s"
+            f"expected at most {_round_down(float(longest)):g} s"
         )
 
 
-def _shorter(seconds: float) -> float:
+def _round_down(seconds: float) -> float:
     """Return a time with two digits that is not longer than another."""
     unit = 10.0 ** (np.floor(np.log10(seconds)) - 1)
     return float(np.floor(seconds / unit) * unit)

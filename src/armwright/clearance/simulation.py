@@ -17,12 +17,12 @@ import numpy.typing as npt
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.contact import damping
 from armwright.clearance.equations import WORKS
-from armwright.clearance.ideal import gaps_of, tip_of
+from armwright.clearance.ideal import pin_gaps, tip_position
 from armwright.clearance.kernel import Integrator, Layout, emit_simulation
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.rest import at_rest
 from armwright.clearance.scenario import Scenario
 from armwright.clearance.settings import check_step, contact_stiffness
+from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.cache import compiled
 from armwright.tracing.kernel import on_cores_for_long
@@ -81,7 +81,7 @@ class Simulation:
     @property
     def gaps(self) -> Array:
         """(..., s, p, 2) from the middle of each bearing to that of its journal [m]."""
-        return gaps_of(self.scenario.linkage, self.q)
+        return pin_gaps(self.scenario.linkage, self.q)
 
     @property
     def depths(self) -> Array:
@@ -118,7 +118,7 @@ def simulate(
         ShapeError: the clearances are not one per pin, or the leading axes do not fit.
     """
     linkage, settings = scenario.linkage, scenario.settings
-    c, mu = _parameters(linkage, clearances, frictions)
+    c, mu = _broadcast_parameters(linkage, clearances, frictions)
     lead = mu.shape
     K = contact_stiffness(linkage, c)
     check_step(linkage, settings, K)
@@ -129,8 +129,8 @@ def simulate(
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
-    record = _run(scenario, layout, start.reshape(mu.size, layout.states), contacts, threads)
-    return _simulation(scenario, layout, c, mu, record)
+    record = _run_lanes(scenario, layout, start.reshape(mu.size, layout.states), contacts, threads)
+    return _unpack_record(scenario, layout, c, mu, record)
 
 
 def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Array:
@@ -145,10 +145,12 @@ def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Arra
     if scenario.settings.start == "centred":
         return np.broadcast_to(ideal, (*clearances.shape[:-1], len(ideal)))
     elastic = None if scenario.settings.start == "rigid" else K
-    return at_rest(scenario.linkage, ideal, clearances, elastic).q
+    return find_static_equilibrium(scenario.linkage, ideal, clearances, elastic).q
 
 
-def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: ArrayLike | None) -> tuple[Array, Array]:
+def _broadcast_parameters(
+    linkage: Linkage, clearances: ArrayLike | None, frictions: ArrayLike | None
+) -> tuple[Array, Array]:
     """Return clearances (..., p) and frictions (...), broadcast together."""
     c = linkage.clearance_array(clearances)
     if not np.all(c > 0):
@@ -163,7 +165,7 @@ def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: Array
     return np.broadcast_to(c, (*lead, c.shape[-1])), np.broadcast_to(mu, lead)
 
 
-def _run(scenario: Scenario, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
+def _run_lanes(scenario: Scenario, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
     """Run the compiled simulation, blocks of lanes on several cores."""
     runs, pins, rows = len(start), layout.pins, len(scenario.table)
     marks = scenario.marks[: rows + 1]
@@ -174,7 +176,7 @@ def _run(scenario: Scenario, layout: Layout, start: Array, contacts: Array, thre
         peaks=np.zeros((runs, pins)),
     )
     gains = np.tile(scenario.settings.gains, (runs, len(scenario.linkage.drives) if layout.gains else 0))
-    run = _compiled(layout, scenario.settings.integrator)
+    run = _compiled_kernel(layout, scenario.settings.integrator)
     lengths = scenario.lengths[:rows]
     inputs = (start, contacts, gains, scenario.table, lengths, samples, *record)
     on_cores_for_long(lambda first, last, cancelled: run(first, last, *inputs, cancelled), runs, threads)
@@ -182,11 +184,11 @@ def _run(scenario: Scenario, layout: Layout, start: Array, contacts: Array, thre
 
 
 @cache
-def _compiled(layout: Layout, integrator: Integrator) -> Any:
+def _compiled_kernel(layout: Layout, integrator: Integrator) -> Any:
     return compiled(emit_simulation(layout, integrator), "simulate", f"the simulation of {layout.linkage.name}")
 
 
-def _simulation(scenario: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
+def _unpack_record(scenario: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
     """Return a record as motion, forces and works of the linkage."""
     n, lead, linkage = layout.n, mu.shape, scenario.linkage
     samples = record.samples.reshape(*lead, *record.samples.shape[1:])
@@ -194,8 +196,8 @@ def _simulation(scenario: Scenario, layout: Layout, c: Array, mu: Array, record:
     number = np.arange(samples.shape[-2]) * scenario.stride
     # Diverged coordinates are infinite and have no sine.
     with np.errstate(invalid="ignore", over="ignore"):
-        tip = tip_of(linkage, q)
-        error = tip - tip_of(linkage, scenario.ideal.q[number])
+        tip = tip_position(linkage, q)
+        error = tip - tip_position(linkage, scenario.ideal.q[number])
         diverged = ~np.all(np.abs(error) < _DIVERGED, axis=(-1, -2))
     first = 2 * n + layout.deflections
     return Simulation(

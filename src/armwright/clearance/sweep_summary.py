@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.clearance.feature_sweep import FeatureSweep, is_chance
+from armwright.clearance.feature_sweep import FeatureSweep, is_random
 from armwright.clearance.features import Features
 from armwright.clearance.paths import thesis_path
 from armwright.files.result_table import ResultTable
@@ -76,7 +76,7 @@ def sweep_summary(task: FeatureSweep, results: Dataset, folder: Path) -> SweepSu
             "chance": [
                 name
                 for name in Features._fields
-                if is_chance(numbers(f"{path}_{name}"), numbers(f"{path}_{name}_spread"), task.replicates + 1)
+                if is_random(numbers(f"{path}_{name}"), numbers(f"{path}_{name}_spread"), task.replicates + 1)
             ],
         }
         for path in paths

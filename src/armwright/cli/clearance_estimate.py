@@ -40,13 +40,13 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright clearance estimate five-bar examples/five_bar_rest.csv`
     """
     from armwright.clearance.estimation.assessment import assess_rest
-    from armwright.clearance.estimation.measurement_file import RestMeasurement, read_measured
+    from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
     from armwright.clearance.reader import load_linkage
     from armwright.cli.results import warn_of_stray
 
     warn_of_stray(measured)
     model = load_linkage(linkage)
-    measurement = read_measured(measured, columns=columns_of(columns), skip_incomplete=skip_incomplete)
+    measurement = read_clearance_measurements(measured, columns=columns_of(columns), skip_incomplete=skip_incomplete)
     noise = None if noise_um is None else noise_um * 1e-6
     if isinstance(measurement, RestMeasurement):
         assessment = assess_rest(model, measurement, noise)

@@ -162,8 +162,8 @@ def _simulated(
     import numpy as np
 
     from armwright.clearance.predictability import simulate_with_predictability
-    from armwright.clearance.scenario import prepare
+    from armwright.clearance.scenario import prepare_scenario
 
     with waiting(f"{model.name}: the first run compiles it", quiet=not watched):
-        task: Scenario = prepare(model, path, settings)
+        task: Scenario = prepare_scenario(model, path, settings)
         return simulate_with_predictability(task, np.array(list(model.clearances.values())), friction=friction)

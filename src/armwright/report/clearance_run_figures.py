@@ -13,7 +13,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.features import spectrum
-from armwright.clearance.ideal import tip_of
+from armwright.clearance.ideal import tip_position
 from armwright.report.figures import Drawing, empty_figure, literal, plain_axes, spread, svg_text
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
 
 def magnification(run: ClearanceRun) -> float:
     """Return a round number by which errors are magnified so that one sees them beside the path."""
-    path = tip_of(run.simulation.scenario.linkage, run.simulation.scenario.ideal.q)
+    path = tip_position(run.simulation.scenario.linkage, run.simulation.scenario.ideal.q)
     return magnified(path, run.error, _SHOWN)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from armwright.clearance.assessment import ClearanceRun
-from armwright.clearance.ideal import point_of
+from armwright.clearance.ideal import point_position
 from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage, Pin
 from armwright.report.clearance_run_figures import magnified
 from armwright.report.elements import badge, facts, figures, notes as shown_notes, pairs, table
@@ -54,8 +54,8 @@ def film(run: ClearanceRun) -> dict[str, Any]:
     points = [BodyPoint(body.name, point) for body in linkage.bodies for point in body.points]
     q = simulation.q[rows]
     ideal_q = simulation.scenario.ideal.q[rows * simulation.scenario.stride]
-    actual = np.stack([point_of(linkage, point, q) for point in points], axis=1)
-    ideal = np.stack([point_of(linkage, point, ideal_q) for point in points], axis=1)
+    actual = np.stack([point_position(linkage, point, q) for point in points], axis=1)
+    ideal = np.stack([point_position(linkage, point, ideal_q) for point in points], axis=1)
     energy = run.energy
     tracks = (energy.driven, energy.kinetic, energy.potential, energy.impact_loss, energy.friction_loss)
     return {

@@ -6,7 +6,7 @@ import numpy as np
 
 from armwright.clearance.correction_assessment import CorrectionAssessment
 from armwright.clearance.paths import named_path
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.simulation import simulate
 from armwright.report.clearance_figures import paths
 
@@ -17,7 +17,7 @@ def correction_files(assessment: CorrectionAssessment) -> dict[str, str | bytes]
     """Return the files of a corrected path by name."""
     linkage, path, goal = assessment.linkage, assessment.correction.path, named_path(assessment.path)
     run = assessment.run
-    original = simulate(prepare(linkage, goal, run.scenario.settings), run.clearances)
+    original = simulate(prepare_scenario(linkage, goal, run.scenario.settings), run.clearances)
     times = np.linspace(0.0, path.duration, 1001)
     rows = np.column_stack([times, *(x * 1e3 for x in path.evaluate(times))])
     lines = (",".join(f"{x:z.9g}" for x in row) for row in rows)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.clearance.five_bar import MODES, FiveBar, Mode, elbows, inverse, inverse_all
-from armwright.clearance.five_bar_parts import configuration
+from armwright.clearance.five_bar import MODES, FiveBar, Mode, elbow_positions, inverse, inverse_all
+from armwright.clearance.five_bar_parts import five_bar_coordinates
 from armwright.clearance.five_bar_workspace import (
     Workspace,
     condition_number,
@@ -15,7 +15,7 @@ from armwright.clearance.five_bar_workspace import (
     singularity_sines,
     workspace,
 )
-from armwright.clearance.ideal import tip_of
+from armwright.clearance.ideal import tip_position
 from armwright.clearance.scenario import Scenario
 from armwright.errors import InvalidValueError, one_of
 from armwright.report.figures import Drawing, empty_figure, svg_text
@@ -74,9 +74,9 @@ def workspace_of(scenario: Scenario) -> Drawing | None:
         bar = FiveBar.of(scenario.linkage)
     except InvalidValueError:
         return None
-    tips = tip_of(scenario.linkage, scenario.ideal.q)
+    tips = tip_position(scenario.linkage, scenario.ideal.q)
     for mode, angles in inverse_all(bar, tips[0]).items():
-        if np.abs(np.sin((configuration(scenario.linkage, angles) - scenario.ideal.q[0]) / 2)).max() < _SAME:
+        if np.abs(np.sin((five_bar_coordinates(scenario.linkage, angles) - scenario.ideal.q[0]) / 2)).max() < _SAME:
             return workspace_figure(bar, mode, [tips[:: max(1, len(tips) // _DRAWN)]])
     raise AssertionError("a five-bar has four assembly modes")
 
@@ -109,7 +109,7 @@ def _draw_curves(axis: "Axes", bar: FiveBar, mode: Mode) -> None:
 
 
 def _draw_arm(axis: "Axes", bar: FiveBar, angles: Array, tip: Array) -> None:
-    elbow_0, elbow_1 = elbows(bar, angles[[0, 3]]) * 1e3
+    elbow_0, elbow_1 = elbow_positions(bar, angles[[0, 3]]) * 1e3
     points = np.stack([bar.motors[0] * 1e3, elbow_0, np.asarray(tip) * 1e3, elbow_1, bar.motors[1] * 1e3])
     axis.plot(*points.T, "-", color="0.25", linewidth=3.2, solid_capstyle="round", zorder=5)
     axis.plot(*points.T, "o", color="w", markeredgecolor="0.25", markersize=6, zorder=6)

@@ -20,18 +20,18 @@ from armwright.accuracy.pose import pose_repeatability
 from armwright.arrays import Array
 from armwright.clearance.correction import Correction, correct_nodes, tip_errors
 from armwright.clearance.equations import FrictionModel
-from armwright.clearance.estimation.kriging import Surrogate, check_extra, learn, solve_features
-from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
+from armwright.clearance.estimation.kriging import Surrogate, check_extra, fit_surrogate, solve_features
+from armwright.clearance.estimation.static_estimate import estimate_at_rest, rest_offsets
 from armwright.clearance.feature_sweep import FeatureSweep, feature_vector
-from armwright.clearance.features import Features, features
-from armwright.clearance.ideal import closed, tip_of
+from armwright.clearance.features import Features, simulation_features
+from armwright.clearance.ideal import close_pins, tip_position
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path, PickAndPlace, named_path
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.rest import at_rest
-from armwright.clearance.scenario import Scenario, assembly_guess, prepare
+from armwright.clearance.scenario import Scenario, assembly_guess, prepare_scenario
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation, simulate
+from armwright.clearance.static_equilibrium import find_static_equilibrium
 
 # The two arms: clearances of the pins J2, J3, J4 [m].
 ARMS: Mapping[str, tuple[float, float, float]] = {
@@ -167,7 +167,7 @@ def run_sweep(progress: Callable[[str, float], None] | None = None, *, levels: S
         report("learning nine features", names.index(name) / len(names))
 
     table = feature_vector(values, PATHS, FEATURES)
-    surrogate = learn(task.parameters, points, names, table, progress=report_feature)
+    surrogate = fit_surrogate(task.parameters, points, names, table, progress=report_feature)
     report("learning nine features", 1.0)
     return SweepResult(points=points, values=values, surrogate=surrogate)
 
@@ -179,7 +179,7 @@ def feature_table() -> list[FeatureRow]:
     """Return table 5.4: arm A on its three paths."""
     rows = []
     for path in PATHS:
-        both = [_in_print(features(run_of("A", path, settings))) for settings in (SETTINGS, SURFACE)]
+        both = [_in_print(simulation_features(run_of("A", path, settings))) for settings in (SETTINGS, SURFACE)]
         rows.append(FeatureRow(path, PRINTED_FEATURES[path], *both))
     return rows
 
@@ -252,7 +252,7 @@ def repeat_table(seed: int = 0) -> list[RepeatRow]:
 @cache
 def run_of(name: str, path: str, settings: Settings = SETTINGS) -> Simulation:
     """Return the run of an arm on a path."""
-    return simulate(prepare(arm(), named_path(path), settings), ARMS[name])
+    return simulate(prepare_scenario(arm(), named_path(path), settings), ARMS[name])
 
 
 def target_errors(path: Path, clearances: tuple[float, ...] | Array) -> tuple[float, ...]:
@@ -265,27 +265,27 @@ def target_errors(path: Path, clearances: tuple[float, ...] | Array) -> tuple[fl
 @lru_cache(maxsize=8)
 def _ready(path: Path) -> Scenario:
     """Return the scenario of a path, which several arms share."""
-    return prepare(arm(), path, SETTINGS)
+    return prepare_scenario(arm(), path, SETTINGS)
 
 
 def _cycles(clearances: Array, rng: np.random.Generator) -> Array:
     """Return (30, 2) positions at which an arm comes to rest at the first target [m]."""
     linkage = arm()
-    ideal = closed(linkage, assembly_guess(linkage), tip=PickAndPlace().nodes[0])
-    equilibrium = at_rest(linkage, ideal, clearances, contact_stiffness(linkage, clearances))
+    ideal = close_pins(linkage, assembly_guess(linkage), tip=PickAndPlace().nodes[0])
+    equilibrium = find_static_equilibrium(linkage, ideal, clearances, contact_stiffness(linkage, clearances))
     cone = np.arctan(linkage.material.friction)
     angle = cone * rng.uniform(-1.0, 1.0, (CYCLES, len(clearances)))
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y = equilibrium.gaps[:, 0], equilibrium.gaps[:, 1]
     gaps = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
     drives = ideal[list(linkage.driven)] + ENCODER * rng.standard_normal((CYCLES, len(linkage.drives)))
-    return tip_of(linkage, closed(linkage, equilibrium.q, drives=drives, gaps=gaps))
+    return tip_position(linkage, close_pins(linkage, equilibrium.q, drives=drives, gaps=gaps))
 
 
 def _measured_features(name: str, selected: Iterable[str]) -> Array:
     """Return features of an arm by ``path_feature``, SI."""
     parts = (feature.split("_", 1) for feature in selected)
-    return np.array([float(getattr(features(run_of(name, path)), feature)) for path, feature in parts])
+    return np.array([float(getattr(simulation_features(run_of(name, path)), feature)) for path, feature in parts])
 
 
 def _estimate(name: str, method: str, ours: Array) -> EstimateRow:

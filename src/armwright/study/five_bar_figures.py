@@ -6,9 +6,9 @@ from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.correction import Correction
 from armwright.clearance.features import WINDOW, spectrum
-from armwright.clearance.ideal import tip_of
+from armwright.clearance.ideal import tip_position
 from armwright.clearance.paths import Path, PickAndPlace, named_path
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.report.clearance_figures import lines_of_spectrum, paths, surface
 from armwright.report.clearance_run_figures import clearance_run_figures
@@ -114,8 +114,8 @@ def _corrected(correction: Correction) -> dict[str, str | bytes]:
     both = {"path as it is": PickAndPlace().path(), "path corrected": correction.path}
     targets = np.array(PickAndPlace().nodes) * 1e3
     runs = {name: _simulated(path, study.ARMS["A"]) for name, path in both.items()}
-    wanted = tip_of(study.arm(), runs["path as it is"].scenario.ideal.q) * 1e3
-    told = {name: tip_of(study.arm(), run.scenario.ideal.q) * 1e3 for name, run in runs.items()}
+    wanted = tip_position(study.arm(), runs["path as it is"].scenario.ideal.q) * 1e3
+    told = {name: tip_position(study.arm(), run.scenario.ideal.q) * 1e3 for name, run in runs.items()}
     files: dict[str, str | bytes] = {
         "figure5.10.svg": paths(
             "Figure 5.10: the path, and the path corrected",
@@ -148,7 +148,7 @@ def _half(name: str) -> Simulation:
 
 
 def _simulated(path: Path, clearances: tuple[float, ...]) -> Simulation:
-    return simulate(prepare(study.arm(), path, study.SETTINGS), clearances)
+    return simulate(prepare_scenario(study.arm(), path, study.SETTINGS), clearances)
 
 
 def _fit(run: Simulation) -> tuple[Array, Array]:
@@ -159,7 +159,7 @@ def _fit(run: Simulation) -> tuple[Array, Array]:
 
 
 def _torques(title: str, path: Path) -> str:
-    task = prepare(study.arm(), path, study.SETTINGS)
+    task = prepare_scenario(study.arm(), path, study.SETTINGS)
     some = slice(None, None, 20)
     times = np.asarray(np.arange(len(task.ideal.q))[some] * task.h, dtype=np.float64)
     lines = {f"M{i + 1}": task.ideal.efforts[some, i] for i in range(2)}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.kriging import MAX_POINTS, Surrogate, learn, solve_features
+from armwright.clearance.estimation.kriging import MAX_POINTS, Surrogate, fit_surrogate, solve_features
 from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
 from armwright.sweep.designs import sobol
 from clearance.arms import ARM_A, ARM_B, PATHS, accuracy
@@ -36,7 +36,7 @@ def design(runs: int) -> Array:
 @pytest.fixture(scope="module")
 def known() -> Surrogate:
     points = design(64)
-    return learn(NAMES, points, ("f", "g"), smooth(points), ranges=[BOUNDS[name] for name in NAMES])
+    return fit_surrogate(NAMES, points, ("f", "g"), smooth(points), ranges=[BOUNDS[name] for name in NAMES])
 
 
 def test_smooth_function(known: Surrogate, rng: np.random.Generator) -> None:
@@ -67,7 +67,7 @@ def test_noise_is_told_from_the_surface(rng: np.random.Generator) -> None:
     points = design(256)
     shaken = smooth(points) + rng.normal(0.0, 0.05, (256, 2))
 
-    surrogate = learn(NAMES, points, ("f", "g"), shaken)
+    surrogate = fit_surrogate(NAMES, points, ("f", "g"), shaken)
     mean, deviation = surrogate.predict(np.array([[3e-4, 0.1]]))
 
     np.testing.assert_allclose(deviation, 0.05, rtol=0.2)
@@ -80,7 +80,7 @@ def test_what_surfaces_miss_together(rng: np.random.Generator) -> None:
     chance = 0.02 * rng.standard_normal(len(points))
     values = smooth(points) + np.stack([chance, -chance], axis=-1)
 
-    surrogate = learn(NAMES, points, ("f", "g"), values)
+    surrogate = fit_surrogate(NAMES, points, ("f", "g"), values)
 
     assert surrogate.correlation[0, 1] < -0.8
     np.testing.assert_allclose(np.diag(surrogate.correlation), 1.0)
@@ -93,14 +93,14 @@ def test_spread_of_single_runs_is_that_of_neighbours() -> None:
     late = points[:, 0] > 3e-4
     spreads = np.where(late, 0.1, 0.0)[:, None] * [1.0, 0.0]
 
-    surrogate = learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads)
+    surrogate = fit_surrogate(NAMES, points, ("f", "g"), smooth(points), spreads=spreads)
     _, deviation = surrogate.predict(np.array([[1e-4, 0.1], [5e-4, 0.1]]))
 
     np.testing.assert_allclose(deviation[1], (0.1, 0.0), rtol=0.05, atol=1e-3)
     assert deviation[0].max() < 0.02
     assert surrogate.select(("g",)).predict(points)[1].max() < 1e-3
     with pytest.raises(ShapeError, match=r"spreads: expected \(256, 2\), as the values, got \(256, 1\)"):
-        learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads[:, :1])
+        fit_surrogate(NAMES, points, ("f", "g"), smooth(points), spreads=spreads[:, :1])
 
 
 def test_inverse(known: Surrogate, rng: np.random.Generator) -> None:
@@ -128,8 +128,8 @@ def test_weights(known: Surrogate) -> None:
 def test_many_points() -> None:
     """Of more points than are needed some are taken, always the same, spread over all."""
     points = design(512)
-    surrogate = learn(NAMES, points, ("f",), smooth(points)[:, :1])
-    again = learn(NAMES, points, ("f",), smooth(points)[:, :1])
+    surrogate = fit_surrogate(NAMES, points, ("f",), smooth(points)[:, :1])
+    again = fit_surrogate(NAMES, points, ("f",), smooth(points)[:, :1])
 
     assert len(surrogate.processes[0].x) == MAX_POINTS
     np.testing.assert_array_equal(surrogate.processes[0].weights, again.processes[0].weights)
@@ -142,7 +142,7 @@ def test_failed_runs_are_left_out(known: Surrogate) -> None:
     values = smooth(points)
     more = np.vstack([points, [[2e-4, 0.1], [3e-4, 0.15]]])
 
-    surrogate = learn(
+    surrogate = fit_surrogate(
         NAMES, more, ("f", "g"), np.vstack([values, [[np.nan, 1.0], [np.nan, np.nan]]]), ranges=list(BOUNDS.values())
     )
 
@@ -153,7 +153,7 @@ def test_progress() -> None:
     """Each feature is announced before it is learnt."""
     points, names = design(16), []
 
-    learn(NAMES, points, ("f", "g"), smooth(points), progress=names.append)
+    fit_surrogate(NAMES, points, ("f", "g"), smooth(points), progress=names.append)
 
     assert names == ["f", "g"]
 
@@ -212,7 +212,7 @@ class TestFiveBar:
 
     def test_offsets_agree_with_rest(self, swept: Swept) -> None:
         """The offset that a sweep finds at the start of a path is that of the resting tip: no second law."""
-        from armwright.clearance.estimation.static import rest_offsets
+        from armwright.clearance.estimation.static_estimate import rest_offsets
         from clearance.arms import STARTS
 
         rested = rest_offsets(swept.task.linkage, STARTS, swept.points)
@@ -229,7 +229,7 @@ def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(
         MissingExtraError, match=r"needs scikit-learn; install it by: pip install 'armwright\[clearance\]'"
     ):
-        learn(NAMES, points, ("f", "g"), smooth(points))
+        fit_surrogate(NAMES, points, ("f", "g"), smooth(points))
 
 
 @pytest.mark.parametrize(
@@ -251,7 +251,9 @@ def test_bad_tables(change: dict[str, Any], error: type[Exception], message: str
     """Tables that do not fit, too few runs, and parameters that do not vary are named."""
     points = design(16)
     with pytest.raises(error, match=message):
-        learn(**{"parameters": NAMES, "points": points, "features": ("f", "g"), "values": smooth(points), **change})
+        fit_surrogate(
+            **{"parameters": NAMES, "points": points, "features": ("f", "g"), "values": smooth(points), **change}
+        )
 
 
 def test_features_that_do_not_fit(known: Surrogate) -> None:
@@ -265,7 +267,7 @@ def test_feature_of_chance_alone_teaches_nothing(rng: np.random.Generator) -> No
     x = rng.random((96, 3))
     values = np.column_stack([x @ [1.0, 0.5, 0.2], rng.standard_normal(96)])
 
-    surrogate = learn("pqr", x, ("smooth", "chance"), values, ranges=[(0, 1)] * 3)
+    surrogate = fit_surrogate("pqr", x, ("smooth", "chance"), values, ranges=[(0, 1)] * 3)
 
     new = rng.random((200, 3))
     mean, deviation = surrogate.predict(new)

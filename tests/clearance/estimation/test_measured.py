@@ -8,9 +8,13 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.clearance.estimation import measurement_file
-from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement, read_measured
-from armwright.clearance.estimation.static import rest_offsets
-from armwright.clearance.features import features_of
+from armwright.clearance.estimation.measurement_file import (
+    PathMeasurement,
+    RestMeasurement,
+    read_clearance_measurements,
+)
+from armwright.clearance.estimation.static_estimate import rest_offsets
+from armwright.clearance.features import error_curve_features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.clearance.reader import load_linkage
@@ -39,7 +43,7 @@ def test_rest_in_any_unit(unit: str, scale: float, tmp_path: Path, five_bar: Lin
     offsets = rest_offsets(five_bar, STARTS, ARM_A)
     path = rest_file(tmp_path / "rest.csv", unit, scale, offsets[:, None], lambda cells: cells[::-1])
 
-    measurement = read_measured(path)
+    measurement = read_clearance_measurements(path)
 
     assert isinstance(measurement, RestMeasurement)
     assert (measurement.names, measurement.readings, measurement.noise) == (("P0", "P1", "P2"), (1, 1, 1), None)
@@ -54,7 +58,7 @@ def test_repeated_readings(tmp_path: Path, five_bar: Linkage, rng: np.random.Gen
     noise = rng.normal(0.0, sigma, (3, count, 2))
     offsets = rest_offsets(five_bar, STARTS, ARM_A)[:, None] + noise
 
-    measurement = read_measured(rest_file(tmp_path / "rest.csv", "mm", 1e3, offsets, list))
+    measurement = read_clearance_measurements(rest_file(tmp_path / "rest.csv", "mm", 1e3, offsets, list))
 
     assert isinstance(measurement, RestMeasurement)
     assert measurement.readings == (count,) * 3
@@ -91,20 +95,20 @@ def test_paths(unit: str, seconds: str, tmp_path: Path) -> None:
         *path_rows(name="x2", unit=unit, seconds=seconds)[1:],
     ]
 
-    measurement = read_measured(written(tmp_path / "paths.csv", rows))
+    measurement = read_clearance_measurements(written(tmp_path / "paths.csv", rows))
 
     assert isinstance(measurement, PathMeasurement)
     assert list(measurement.errors) == ["y1", "x2"]
     np.testing.assert_allclose(measurement.errors["x2"], np.broadcast_to((3e-4, -4e-4), (291, 2)), rtol=0, atol=WRITTEN)
-    features = measurement.features()["y1"]
-    assert features.intercept == pytest.approx(5e-4, abs=WRITTEN)
-    assert features.amp_dc == pytest.approx(1e-3, abs=WRITTEN)
-    assert abs(features.slope) < 1e-7
+    simulation_features = measurement.features()["y1"]
+    assert simulation_features.intercept == pytest.approx(5e-4, abs=WRITTEN)
+    assert simulation_features.amp_dc == pytest.approx(1e-3, abs=WRITTEN)
+    assert abs(simulation_features.slope) < 1e-7
 
 
 def test_pick_and_place(tmp_path: Path) -> None:
     """The pick-and-place path can be measured too."""
-    measurement = read_measured(written(tmp_path / "paths.csv", path_rows(name="pick-and-place")))
+    measurement = read_clearance_measurements(written(tmp_path / "paths.csv", path_rows(name="pick-and-place")))
 
     assert isinstance(measurement, PathMeasurement)
     assert measurement.times["pick-and-place"][-1] == pytest.approx(0.5)
@@ -112,7 +116,7 @@ def test_pick_and_place(tmp_path: Path) -> None:
 
 def test_noise_of_features(tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     """What noise of the samples does to the features is what many noisy runs show."""
-    measurement = read_measured(written(tmp_path / "paths.csv", path_rows()))
+    measurement = read_clearance_measurements(written(tmp_path / "paths.csv", path_rows()))
     assert isinstance(measurement, PathMeasurement)
     names, noise = ("y1_intercept", "y1_slope", "y1_offset_x"), 10e-6
 
@@ -120,7 +124,7 @@ def test_noise_of_features(tmp_path: Path, rng: np.random.Generator, monkeypatch
     covariance = measurement.feature_covariance(names, noise)
 
     error = measurement.errors["y1"]
-    many = features_of(measurement.times["y1"], error + noise * rng.standard_normal((800, *error.shape)))
+    many = error_curve_features(measurement.times["y1"], error + noise * rng.standard_normal((800, *error.shape)))
     table = np.stack([many.intercept, many.slope, many.offset_x], axis=-1)
     # The standard deviation of a variance of 800 draws is 5 %.
     np.testing.assert_allclose(np.diag(covariance), table.var(axis=0, ddof=1), rtol=0.3)
@@ -180,7 +184,7 @@ def test_mistakes_at_rest(rows: list[str], message: str, tmp_path: Path) -> None
         # Metres by their names, millimetres by their numbers: half a millimetre has become half a metre.
         message = "the tip is 509.9 mm from its commanded position; are the units right"
     with pytest.raises(FileFormatError) as caught:
-        read_measured(written(tmp_path / "rest.csv", rows))
+        read_clearance_measurements(written(tmp_path / "rest.csv", rows))
     assert message in str(caught.value)
     assert str(caught.value).startswith(str(tmp_path / "rest.csv"))
 
@@ -219,21 +223,21 @@ def path_slip(change: Callable[[list[str]], list[str]]) -> list[str]:
 def test_mistakes_on_paths(rows: list[str], message: str, tmp_path: Path) -> None:
     """Every mistake in a file of runs is reported: gaps, repeats, wrong units, a part of a path, an unknown path."""
     with pytest.raises(FileFormatError) as caught:
-        read_measured(written(tmp_path / "paths.csv", rows))
+        read_clearance_measurements(written(tmp_path / "paths.csv", rows))
     assert message in str(caught.value)
 
 
 def test_no_such_file(tmp_path: Path) -> None:
     """A file that does not exist is said not to be."""
     with pytest.raises(FileFormatError, match="no such file"):
-        read_measured(tmp_path / "none.csv")
+        read_clearance_measurements(tmp_path / "none.csv")
 
 
 def test_bytes_that_are_no_text(tmp_path: Path) -> None:
     """A picture is no table."""
     (tmp_path / "rest.csv").write_bytes(b"\x89PNG\r\n\xff\xfe\x00")
     with pytest.raises(FileFormatError):
-        read_measured(tmp_path / "rest.csv")
+        read_clearance_measurements(tmp_path / "rest.csv")
 
 
 def test_spreadsheets(tmp_path: Path) -> None:
@@ -241,7 +245,7 @@ def test_spreadsheets(tmp_path: Path) -> None:
     text = "\ufeff" + "\r\n".join(["Pose , Commanded_X_mm,commanded_y_mm, X_MM,y_mm", *REST_ROWS[1:]])
     (tmp_path / "rest.csv").write_text(text, encoding="utf-8", newline="")
 
-    measurement = read_measured(tmp_path / "rest.csv")
+    measurement = read_clearance_measurements(tmp_path / "rest.csv")
 
     assert isinstance(measurement, RestMeasurement)
     np.testing.assert_allclose(measurement.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
@@ -255,7 +259,9 @@ def test_tracker_export(tmp_path: Path) -> None:
     with pytest.warns(
         IncompleteRowsWarning, match=r"1 row omitted because of empty cells, 2 read: X measured \[mm\] in line 4"
     ):
-        measurement = read_measured(written(tmp_path / "rest.csv", rows), columns={"pkt": "pose"}, skip_incomplete=True)
+        measurement = read_clearance_measurements(
+            written(tmp_path / "rest.csv", rows), columns={"pkt": "pose"}, skip_incomplete=True
+        )
 
     assert isinstance(measurement, RestMeasurement)
     assert measurement.names == ("P1", "P2")

@@ -7,11 +7,11 @@ import pytest
 from armwright.arrays import Array
 from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement
 from armwright.clearance.estimation.misfit import CONTRADICTION, p_value, refuse_contradiction, widening
-from armwright.clearance.estimation.posterior import posterior
-from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
+from armwright.clearance.estimation.posterior import sample_posterior
+from armwright.clearance.estimation.static_estimate import estimate_at_rest, rest_offsets
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
-from armwright.clearance.scenario import prepare
+from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.simulation import simulate
 from armwright.errors import ContradictionError
 from clearance.arms import ARM_A, CENTRE, PATHS, STARTS
@@ -106,7 +106,7 @@ def test_attacked_at_rest(five_bar: Linkage, fault: str, sample: Sample) -> None
 def measured_on_paths(linkage: Linkage, c: Array, noise: float, rng: np.random.Generator) -> PathMeasurement:
     times, errors = {}, {}
     for path in PATHS:
-        run = simulate(prepare(linkage, named_path(path), CENTRE), c)
+        run = simulate(prepare_scenario(linkage, named_path(path), CENTRE), c)
         times[path], errors[path] = run.time, run.error + noise * rng.standard_normal(run.error.shape)
     return PathMeasurement(times=times, errors=errors)
 
@@ -128,7 +128,9 @@ def test_attacked_on_paths(swept: Swept, five_bar: Linkage, fault: str, sample: 
         measured = attrs.evolve(measured, errors={name: turned(curve) for name, curve in measured.errors.items()})
         features = measured.features()
         values = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
-        distribution = posterior(swept.surrogate, values, measured.feature_covariance(swept.surrogate.features, 2e-6))
+        distribution = sample_posterior(
+            swept.surrogate, values, measured.feature_covariance(swept.surrogate.features, 2e-6)
+        )
         try:
             distribution.checked()
         except ContradictionError as error:
@@ -144,7 +146,9 @@ def test_beyond_the_sweep(swept: Swept, five_bar: Linkage, rng: np.random.Genera
     features = measured.features()
     values = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
 
-    distribution = posterior(swept.surrogate, values, measured.feature_covariance(swept.surrogate.features, 2e-6))
+    distribution = sample_posterior(
+        swept.surrogate, values, measured.feature_covariance(swept.surrogate.features, 2e-6)
+    )
 
     assert distribution.bounds == {"c_J4": 0.5e-3}
     assert distribution.identifiable["c_J4"] is False
@@ -156,7 +160,7 @@ def test_arm_of_the_model_is_not_refused(swept: Swept, five_bar: Linkage, rng: n
     features = measured.features()
     values = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
 
-    distribution = posterior(
+    distribution = sample_posterior(
         swept.surrogate, values, measured.feature_covariance(swept.surrogate.features, 2e-6)
     ).checked()
 

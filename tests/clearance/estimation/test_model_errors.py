@@ -10,7 +10,7 @@ from scipy.stats import binom
 from armwright.arrays import Array
 from armwright.clearance.estimation.measurement_file import RestMeasurement
 from armwright.clearance.estimation.model_errors import POWER, model_errors, offsets_of_wrong_model
-from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
+from armwright.clearance.estimation.static_estimate import estimate_at_rest, rest_offsets
 from armwright.clearance.linkage import Linkage
 from armwright.errors import ContradictionError
 from clearance.arms import ARM_A, STARTS

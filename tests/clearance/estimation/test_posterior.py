@@ -6,11 +6,11 @@ import pytest
 from scipy.stats import binom
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.kriging import Surrogate, learn
+from armwright.clearance.estimation.kriging import Surrogate, fit_surrogate
 from armwright.clearance.estimation.measurement_file import PathMeasurement
-from armwright.clearance.estimation.posterior import Posterior, posterior
+from armwright.clearance.estimation.posterior import Posterior, sample_posterior
 from armwright.clearance.feature_sweep import feature_vector
-from armwright.clearance.features import Features, features_of
+from armwright.clearance.features import Features, error_curve_features
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError
 from armwright.sweep.designs import sobol
@@ -72,7 +72,7 @@ class TestLinear:
         measured = J @ TRUE + noise * np.array((0.5, -1.0, 0.3, 0.8, -0.2))
         covariance = np.linalg.inv(J.T @ np.diag(noise**-2) @ J)
 
-        distribution = posterior(planes(J), measured, noise)
+        distribution = sample_posterior(planes(J), measured, noise)
 
         self.check(distribution, covariance @ J.T @ (measured / noise**2), covariance)
         assert distribution.identifiable == {"p": True, "q": True, "r": True}
@@ -85,7 +85,7 @@ class TestLinear:
         covariance = np.linalg.inv(J.T @ np.linalg.inv(common) @ J)
         measured = J @ TRUE
 
-        distribution = posterior(planes(J), measured, common)
+        distribution = sample_posterior(planes(J), measured, common)
 
         self.check(distribution, TRUE, covariance)
 
@@ -94,13 +94,13 @@ class TestLinear:
         measured = J @ TRUE
         covariance = (0.03**2 + 0.04**2) * np.linalg.inv(J.T @ J)
 
-        self.check(posterior(planes(J, 0.04), measured, np.full(5, 0.03)), TRUE, covariance)
+        self.check(sample_posterior(planes(J, 0.04), measured, np.full(5, 0.03)), TRUE, covariance)
 
     def test_flat_direction(self) -> None:
         """A parameter that no feature feels may be anything: uniform over its range, and told so."""
         flat = J * [1.0, 1.0, 0.0]
 
-        distribution = posterior(planes(flat), flat @ TRUE, np.full(5, 0.01))
+        distribution = sample_posterior(planes(flat), flat @ TRUE, np.full(5, 0.01))
 
         assert distribution.identifiable == {"p": True, "q": True, "r": False}
         assert distribution.deviations[2] == pytest.approx(1 / np.sqrt(12), rel=SPREAD)
@@ -110,7 +110,7 @@ class TestLinear:
         """Of two parameters that only their sum is seen of neither is identified, and they lean against one another."""
         sums = np.array([[1.0, 1.0], [2.0, 2.0]])
 
-        distribution = posterior(planes(sums), sums @ [0.5, 0.5], np.full(2, 0.01))
+        distribution = sample_posterior(planes(sums), sums @ [0.5, 0.5], np.full(2, 0.01))
 
         assert distribution.identifiable == {"p": False, "q": False}
         assert distribution.correlation[0, 1] < -0.99
@@ -118,7 +118,7 @@ class TestLinear:
 
     def test_at_the_edge(self) -> None:
         """A parameter seen below its range lies at its end, and no sample lies outside."""
-        distribution = posterior(planes(np.eye(3)), [0.5, -0.02, 0.5], np.full(3, 0.02))
+        distribution = sample_posterior(planes(np.eye(3)), [0.5, -0.02, 0.5], np.full(3, 0.02))
 
         assert distribution.samples.min() >= 0.0
         # Half a Gaussian whose middle lies a deviation outside: its mean is 0.525 deviations above the end.
@@ -130,15 +130,15 @@ class TestLinear:
         measured = J @ TRUE
         aside = np.linalg.svd(J)[0][:, -1]
 
-        assert posterior(planes(J), measured + 0.01 * aside, noise).misfit > 0.05
-        assert posterior(planes(J), measured + 0.1 * aside, noise).misfit < 1e-6
+        assert sample_posterior(planes(J), measured + 0.01 * aside, noise).misfit > 0.05
+        assert sample_posterior(planes(J), measured + 0.1 * aside, noise).misfit < 1e-6
 
     def test_valley_that_was_missed(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Where the search for the likeliest ends in a wrong valley the walkers leave it, and what they find counts."""
         corner = np.full(3, 0.99)
         monkeypatch.setattr("armwright.clearance.estimation.posterior.solve_features", lambda *_: corner)
 
-        distribution = posterior(planes(J), J @ TRUE, np.full(5, 0.01))
+        distribution = sample_posterior(planes(J), J @ TRUE, np.full(5, 0.01))
 
         np.testing.assert_allclose(distribution.best, TRUE, atol=0.05)
         assert distribution.misfit > 0.05
@@ -148,7 +148,7 @@ class TestLinear:
     def test_same_seed(self) -> None:
         """The same seed draws the same samples, another one others of the same distribution."""
         measured, noise = J @ TRUE, np.full(5, 0.01)
-        first, again, other = (posterior(planes(J), measured, noise, seed=seed) for seed in (1, 1, 2))
+        first, again, other = (sample_posterior(planes(J), measured, noise, seed=seed) for seed in (1, 1, 2))
 
         np.testing.assert_array_equal(first.samples, again.samples)
         np.testing.assert_allclose((first.mean - other.mean) / first.deviations, 0.0, rtol=0, atol=2 * MEAN)
@@ -156,15 +156,15 @@ class TestLinear:
     def test_bad_input(self) -> None:
         """Features and noise that do not fit are refused, and impossible probabilities."""
         with pytest.raises(ShapeError, match=r"expected 5 features and their noise, got shapes \(4,\) and \(5,\)"):
-            posterior(planes(J), np.zeros(4), np.ones(5))
+            sample_posterior(planes(J), np.zeros(4), np.ones(5))
         with pytest.raises(ShapeError, match=r"got shapes \(5,\) and \(4, 5\)"):
-            posterior(planes(J), np.zeros(5), np.ones((4, 5)))
+            sample_posterior(planes(J), np.zeros(5), np.ones((4, 5)))
         with pytest.raises(InvalidValueError, match="level: expected a probability between 0 and 1, got 1"):
-            posterior(planes(J), J @ TRUE, np.full(5, 0.1)).interval(1.0)
+            sample_posterior(planes(J), J @ TRUE, np.full(5, 0.1)).interval(1.0)
 
 
 def noisy(run: Simulation, noise: float, rng: np.random.Generator) -> Features:
-    return features_of(run.time, run.error + noise * rng.standard_normal(run.error.shape))
+    return error_curve_features(run.time, run.error + noise * rng.standard_normal(run.error.shape))
 
 
 def covariance_of(swept: Swept, names: tuple[str, ...], noise: float) -> Array:
@@ -188,7 +188,7 @@ def test_intervals_cover(swept: Swept, rng: np.random.Generator, sample: Sample)
     measured = feature_vector(values, PATHS, FEATURES)
     covariance = covariance_of(swept, swept.surrogate.features, noise)
 
-    known = [posterior(swept.surrogate, entry, covariance) for entry in measured]
+    known = [sample_posterior(swept.surrogate, entry, covariance) for entry in measured]
 
     ends = np.array([entry.interval(0.9) for entry in known])
     covered = int(((ends[..., 0] <= true) & (true <= ends[..., 1])).sum())
@@ -208,13 +208,13 @@ def test_unknown_friction(swept: Swept) -> None:
     names = tuple(name for name in swept.surrogate.features if "offset" not in name)
     points = sobol({**dict.fromkeys(swept.task.parameters, RANGE), "friction": (0.0, 0.1)}, 64, 0).points
     three = FEATURES[:3]
-    surrogate = learn(task.parameters, points, names, feature_vector(task(points), PATHS, three))
+    surrogate = fit_surrogate(task.parameters, points, names, feature_vector(task(points), PATHS, three))
     # An arm with more friction than its maker says, 0.08 and not 0.05.
     measured = feature_vector(task(np.array([[*ARM_A, 0.08]])), PATHS, three)[0]
     covariance = covariance_of(swept, names, 2e-6)
 
-    free = posterior(surrogate, measured, covariance)
-    sure = posterior(swept.surrogate.select(names), measured, covariance)
+    free = sample_posterior(surrogate, measured, covariance)
+    sure = sample_posterior(swept.surrogate.select(names), measured, covariance)
 
     low, high = free.interval(0.99).T
     truth = np.array([*ARM_A, 0.08])

@@ -15,9 +15,9 @@ from armwright.arrays import Array, positive
 from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement
 from armwright.clearance.estimation.misfit import refuse_contradiction
 from armwright.clearance.estimation.model_errors import ModelError, model_errors
-from armwright.clearance.estimation.on_paths import SweepSurrogate, surrogate_from_sweep
-from armwright.clearance.estimation.posterior import Posterior, posterior
-from armwright.clearance.estimation.static import Estimate
+from armwright.clearance.estimation.posterior import Posterior, sample_posterior
+from armwright.clearance.estimation.static_estimate import Estimate
+from armwright.clearance.estimation.sweep_surrogate import SweepSurrogate, learn_from_sweep
 from armwright.clearance.linkage import Linkage
 from armwright.errors import FileFormatError, TooFewError
 from armwright.files.inputs import read_text
@@ -29,9 +29,9 @@ _LEVEL = 0.9
 # How an error of the model is shown, by its SI unit: factor, unit, and a usual size.
 _SHOWN_UNITS = {"1": (1e2, "%", 10.0), "m": (1e3, "mm", 0.1), "rad": (180 / math.pi, "deg", 0.01)}
 # The least clearance drawn from an estimate: contact needs one [m].
-_SMALLEST = 1e-6
+_MIN_CLEARANCE = 1e-6
 # A larger number is no clearance and no coefficient of friction, but another unit or another file.
-_LARGEST = 10.0
+_MAX_VALUE = 10.0
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -202,13 +202,13 @@ def assess_paths(
         ContradictionError: no clearances explain the features.
     """
     positive(noise, "noise", "m")
-    sweep = surrogate_from_sweep(folder, linkage, tuple(measured.times), _FEATURES, progress)
+    sweep = learn_from_sweep(folder, linkage, tuple(measured.times), _FEATURES, progress)
     names = sweep.surrogate.features
     covariance = measured.feature_covariance(names, noise)
-    distribution = posterior(sweep.surrogate, measured.feature_values(names), covariance).checked()
+    distribution = sample_posterior(sweep.surrogate, measured.feature_values(names), covariance).checked()
     notes = [
         f"{len(names)} features of {len(measured.times)} paths, learnt from {sweep.runs} simulations",
-        *_chance_notes(sweep),
+        *_predictability_notes(sweep),
         *_fit_notes(distribution.misfit, distribution.widening),
     ]
     for name, end in distribution.bounds.items():
@@ -245,7 +245,7 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
         columns = [list(parameters).index(name) for name in linkage.clearances]
         identifiable = [parameters[name]["identifiable"] for name in linkage.clearances]
         # NaN is refused, too.
-        if not (np.abs([mean, deviation]) <= _LARGEST).all():
+        if not (np.abs([mean, deviation]) <= _MAX_VALUE).all():
             raise ValueError  # noqa: TRY301 - turned into a FileFormatError below
         covariance = correlation * np.outer(deviation, deviation)
         draws = np.random.default_rng(0).multivariate_normal(mean, covariance, count, check_valid="raise")[:, columns]
@@ -259,7 +259,7 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
             f"{path}: the measurement does not identify {', '.join(unknown)}; a path cannot be corrected for an "
             f"unknown clearance: measure more poses or paths, or give --clearance"
         )
-    return np.maximum(draws, _SMALLEST)
+    return np.maximum(draws, _MIN_CLEARANCE)
 
 
 def _parameters(fit: Estimate | Posterior, mean: Array, identifiable: Mapping[str, bool]) -> dict[str, dict[str, Any]]:
@@ -288,7 +288,7 @@ def _fit_notes(misfit: float, widening: float) -> Iterator[str]:
         yield f"residuals are {widening:.3g} times the noise: deviations and intervals are widened by that factor"
 
 
-def _chance_notes(sweep: SweepSurrogate) -> Iterator[str]:
+def _predictability_notes(sweep: SweepSurrogate) -> Iterator[str]:
     """Give the notes on predictability, and on features that are chance."""
     if not sweep.predictable_until:
         yield "the sweep has no replicates (--replicates 0): chance is estimated from the scatter of its runs"

@@ -140,7 +140,7 @@ class Surrogate:
         )
 
 
-def learn(
+def fit_surrogate(
     parameters: Sequence[str],
     points: ArrayLike,
     features: Sequence[str],
@@ -185,7 +185,7 @@ def learn(
     for i, name in enumerate(features):
         if progress is not None:
             progress(name)
-        processes.append(_fitted(unit, y[rows, i]))
+        processes.append(_fit_process(unit, y[rows, i]))
     correlation = np.atleast_2d(np.corrcoef(np.stack([process.leave_one_out() for process in processes])))
     return Surrogate(
         parameters=tuple(parameters),
@@ -273,7 +273,7 @@ def check_extra() -> None:
     import_extra("sklearn.gaussian_process", "learning from simulations", "clearance", "scikit-learn")
 
 
-def _fitted(unit: Array, y: Array) -> Process:
+def _fit_process(unit: Array, y: Array) -> Process:
     check_extra()
     from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - an extra
     from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415

@@ -16,8 +16,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.misfit import refuse_contradiction
-from armwright.clearance.estimation.static import Estimate, estimate_at_rest
-from armwright.clearance.features import Features, features_of
+from armwright.clearance.estimation.static_estimate import Estimate, estimate_at_rest
+from armwright.clearance.features import Features, error_curve_features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.files.column_names import LENGTH, TIME, Column, Schema
@@ -38,7 +38,7 @@ _SCHEMA = Schema(
     )
 )
 # A larger error is no clearance but another unit, or another arm [m].
-_LARGEST = 0.02
+_MAX_ERROR = 0.02
 # No instrument measures a resting tip more accurately [m].
 LEAST_NOISE = 1e-6
 # The smallest number of samples of a measured path, and the part of the path that they must cover.
@@ -114,7 +114,7 @@ class PathMeasurement:
 
     def features(self) -> dict[str, Features]:
         """Return the features of each error curve."""
-        return {name: features_of(self.times[name], self.errors[name]) for name in self.times}
+        return {name: error_curve_features(self.times[name], self.errors[name]) for name in self.times}
 
     def feature_values(self, names: tuple[str, ...]) -> Array:
         """Return (f,) features ``path_feature``."""
@@ -131,13 +131,13 @@ class PathMeasurement:
         rng = np.random.default_rng(0)
         columns: dict[str, Array] = {}
         for path, error in self.errors.items():
-            drawn = features_of(self.times[path], error + noise * rng.standard_normal((_DRAWS, *error.shape)))
+            drawn = error_curve_features(self.times[path], error + noise * rng.standard_normal((_DRAWS, *error.shape)))
             columns |= {f"{path}_{feature}": values for feature, values in drawn._asdict().items()}
         table = np.stack([columns[name] for name in names], axis=-1)
         return np.atleast_2d(np.cov(table, rowvar=False))
 
 
-def read_measured(
+def read_clearance_measurements(
     path: Path | str, *, columns: Mapping[str, str] | None = None, skip_incomplete: bool = False
 ) -> RestMeasurement | PathMeasurement:
     """Read a file of measurements.
@@ -158,7 +158,7 @@ def read_measured(
     table = header.rows(filled=expected, skip_incomplete=skip_incomplete)
     groups = _rows_by_name(table, column)
     numbers = table.numbers(expected[1:])
-    return _at_rest(table, numbers, groups) if column == "pose" else _on_paths(table, numbers, groups)
+    return _rest_measurement(table, numbers, groups) if column == "pose" else _path_measurement(table, numbers, groups)
 
 
 def _rows_by_name(table: UnitTable, column: str) -> dict[str, list[int]]:
@@ -176,7 +176,7 @@ def _rows_by_name(table: UnitTable, column: str) -> dict[str, list[int]]:
     return groups
 
 
-def _at_rest(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> RestMeasurement:
+def _rest_measurement(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> RestMeasurement:
     poses, offsets, counts, spread = [], [], [], []
     for name, rows in groups.items():
         values = numbers[rows]
@@ -200,7 +200,7 @@ def _at_rest(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) 
     )
 
 
-def _on_paths(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> PathMeasurement:
+def _path_measurement(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> PathMeasurement:
     times: dict[str, Array] = {}
     errors: dict[str, Array] = {}
     for name, rows in groups.items():
@@ -229,10 +229,10 @@ def _on_paths(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]])
 def _refuse_large_errors(table: UnitTable, row: int, name: str, errors: Array) -> None:
     """Refuse errors (s, 2) of the tip that no clearance explains [m]."""
     worst = float(np.hypot(errors[:, 0], errors[:, 1]).max())
-    if worst > _LARGEST:
+    if worst > _MAX_ERROR:
         raise table.error(
             row,
             name,
             f"the tip is {worst * 1e3:.4g} mm from its commanded position; are the units right, and is it in the axes "
-            f"of the ground? More than {_LARGEST * 1e3:g} mm is no clearance",
+            f"of the ground? More than {_MAX_ERROR * 1e3:g} mm is no clearance",
         )

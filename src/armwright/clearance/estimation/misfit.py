@@ -21,7 +21,7 @@ from armwright.errors import ContradictionError
 
 # Data contradict the model where chance alone yields such residuals in a smaller part of all cases.
 CONTRADICTION = 1e-4
-_NAMED = 3
+_MAX_NAMED = 3
 
 
 def p_value(chi_square: ArrayLike, freedom: int, noise_freedom: float = np.inf) -> Array:
@@ -58,7 +58,7 @@ def refuse_contradiction(misfit: float, residuals: Iterable[tuple[str, float]], 
     """
     if misfit >= CONTRADICTION:
         return
-    worst = sorted(residuals, key=lambda residual: -abs(residual[1]))[:_NAMED]
+    worst = sorted(residuals, key=lambda residual: -abs(residual[1]))[:_MAX_NAMED]
     listed = ", ".join(f"{name} by {deviations:+.3g}" for name, deviations in worst)
     ends = list(bounds)
     raise ContradictionError(

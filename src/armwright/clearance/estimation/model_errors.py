@@ -19,11 +19,11 @@ from scipy.stats import chi2, f, ncf, ncx2
 
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.estimation.misfit import CONTRADICTION
-from armwright.clearance.estimation.static import Estimate, closed_at_poses, matrix_at
-from armwright.clearance.ideal import closed
+from armwright.clearance.estimation.static_estimate import Estimate, closed_at_poses, rest_matrix_at
+from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Body, Linkage, Load
-from armwright.clearance.rest import at_rest
 from armwright.clearance.settings import contact_stiffness
+from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError, one_of
 
 # The probability with which readings contradict a detected model error.
@@ -34,7 +34,7 @@ _STEP = 1e-4
 _NEGLIGIBLE = 1e-6
 # The detection limit is iterated until the remainder is this near to what is needed; an error many times as large as
 # its linear estimate is not detected, since it shifts the tip less and less.
-_TOLERANCE, _FAR, _MAX_ROUNDS = 0.01, 10.0, 20
+_TOLERANCE, _MAX_GROWTH, _MAX_ROUNDS = 0.01, 10.0, 20
 # A model error whose full size shifts the tip by less has no effect, such as the mass of a locked crank [m].
 _NO_SHIFT = 1e-9
 
@@ -55,7 +55,7 @@ class ModelError(NamedTuple):
     shifts: Array
 
 
-class _Kind(NamedTuple):
+class ErrorKind(NamedTuple):
     """A kind of model error.
 
     Attributes:
@@ -86,21 +86,21 @@ def model_errors(
     """
     q = closed_at_poses(linkage, poses)
     weights = np.sqrt(np.repeat(estimate.readings, 2))
-    B = weights[:, None] * matrix_at(linkage, q).reshape(-1, len(estimate.names))
+    B = weights[:, None] * rest_matrix_at(linkage, q).reshape(-1, len(estimate.names))
     Q, _ = np.linalg.qr(B)
     noncentrality = _noncentrality(estimate.degrees_of_freedom, estimate.noise_freedom) if noise_is_known else np.inf
     least = np.sqrt(noncentrality) * estimate.noise
-    nominal = _tips(linkage, linkage, q, np.zeros(len(linkage.drives)), estimate.values)
+    nominal = resting_tips(linkage, linkage, q, np.zeros(len(linkage.drives)), estimate.values)
 
     def remainder(shift: Array) -> float:
         """Return the norm of the part of a weighted shift that no clearances explain."""
         return float(np.linalg.norm(shift - Q @ (Q.T @ shift)))
 
     errors = []
-    for kind in _kinds(linkage):
+    for kind in error_kinds(linkage):
 
-        def shift(change: float, kind: _Kind = kind) -> Array:
-            tips = _tips(kind.changed(change), linkage, q, change * kind.zeros, estimate.values)
+        def shift(change: float, kind: ErrorKind = kind) -> Array:
+            tips = resting_tips(kind.changed(change), linkage, q, change * kind.zeros, estimate.values)
             return weights * (tips - nominal).ravel()
 
         slope = (shift(_STEP) - shift(-_STEP)) / (2 * _STEP)
@@ -135,7 +135,7 @@ def _detection_limit(remainder: Callable[[float], float], linear: float, least: 
         if smaller > (1 - _TOLERANCE) * least:
             return size
         size *= least / max(smaller, 0.5 * least)
-        if size > _FAR * linear:
+        if size > _MAX_GROWTH * linear:
             break
     return float(np.inf)
 
@@ -155,10 +155,10 @@ def offsets_of_wrong_model(
     Raises:
         UnknownNameError: there is no such model error.
     """
-    kinds = {kind.name: kind for kind in _kinds(linkage)}
+    kinds = {kind.name: kind for kind in error_kinds(linkage)}
     kind = kinds[one_of("model error", name, kinds)]
     change, positions, c = amount / kind.size, floats(poses, "poses"), floats(clearances, "clearances")
-    tips = _tips(kind.changed(change), linkage, closed_at_poses(linkage, positions), change * kind.zeros, c)
+    tips = resting_tips(kind.changed(change), linkage, closed_at_poses(linkage, positions), change * kind.zeros, c)
     return np.asarray(tips - positions, dtype=np.float64)
 
 
@@ -179,7 +179,7 @@ def _noncentrality(freedom: int, noise_freedom: float) -> float:
     return float(brentq(excess, 1e-3, upper))
 
 
-def _tips(wrong: Linkage, nominal: Linkage, q: Array, zeros: Array, clearances: Array) -> Array:
+def resting_tips(wrong: Linkage, nominal: Linkage, q: Array, zeros: Array, clearances: Array) -> Array:
     """Return (k, 2) the resting positions of the tip of a wrong model, its drives at those of the nominal model.
 
     Args:
@@ -189,57 +189,67 @@ def _tips(wrong: Linkage, nominal: Linkage, q: Array, zeros: Array, clearances: 
         zeros: (d,) errors of the zeros of the drives [rad, m].
         clearances: (p,) [m].
     """
-    start = closed(wrong, q, drives=q[:, list(nominal.driven)] + zeros)
+    start = close_pins(wrong, q, drives=q[:, list(nominal.driven)] + zeros)
     c = np.broadcast_to(clearances, (len(q), len(clearances)))
-    return at_rest(wrong, start, c, contact_stiffness(wrong, c)).tip
+    return find_static_equilibrium(wrong, start, c, contact_stiffness(wrong, c)).tip
 
 
-def _kinds(linkage: Linkage) -> Iterator[_Kind]:
+def error_kinds(linkage: Linkage) -> Iterator[ErrorKind]:
     """Give all kinds of errors that a model may have."""
     exact = np.zeros(len(linkage.drives))
     for i, load in enumerate(linkage.loads):
         if np.any(load.force):
-            yield _Kind(f"load at {load.point}", "1", 1.0, partial(_with, linkage, "loads", i, _stronger), exact)
+            yield ErrorKind(
+                f"load at {load.point}", "1", 1.0, partial(_alter_part, linkage, "loads", i, _scale_force), exact
+            )
     for i, body in enumerate(linkage.bodies):
-        yield _Kind(f"mass of {body.name}", "1", 1.0, partial(_with, linkage, "bodies", i, _heavier), exact)
-        if _length(body) > 0:
-            yield _Kind(
-                f"length of {body.name}", "m", _length(body), partial(_with, linkage, "bodies", i, _scaled), exact
+        yield ErrorKind(
+            f"mass of {body.name}", "1", 1.0, partial(_alter_part, linkage, "bodies", i, _scale_mass), exact
+        )
+        if _body_length(body) > 0:
+            yield ErrorKind(
+                f"length of {body.name}",
+                "m",
+                _body_length(body),
+                partial(_alter_part, linkage, "bodies", i, _scale_points),
+                exact,
             )
     ground = linkage.ground
-    if _length(ground) > 0:
-        yield _Kind(
+    if _body_length(ground) > 0:
+        yield ErrorKind(
             "distances on the ground",
             "m",
-            _length(ground),
-            lambda change: attrs.evolve(linkage, ground=_scaled(ground, change)),
+            _body_length(ground),
+            lambda change: attrs.evolve(linkage, ground=_scale_points(ground, change)),
             exact,
         )
     for drive, number, zeros in zip(linkage.drives, linkage.driven, np.eye(len(exact)), strict=True):
         unit = "rad" if linkage.coordinates[number].kind == "angle" else "m"
-        yield _Kind(f"zero of {drive.body}", unit, 1.0, lambda _: linkage, zeros)
+        yield ErrorKind(f"zero of {drive.body}", unit, 1.0, lambda _: linkage, zeros)
 
 
-def _with(linkage: Linkage, field: str, number: int, altered: Callable[[Any, float], Any], change: float) -> Linkage:
+def _alter_part(
+    linkage: Linkage, field: str, number: int, altered: Callable[[Any, float], Any], change: float
+) -> Linkage:
     """Return a linkage one of whose bodies or loads is altered."""
     parts: dict[str, Any] = {field: list(getattr(linkage, field))}
     parts[field][number] = altered(parts[field][number], change)
     return attrs.evolve(linkage, **parts)
 
 
-def _stronger(load: Load, change: float) -> Load:
+def _scale_force(load: Load, change: float) -> Load:
     return attrs.evolve(load, force=load.force * (1 + change))
 
 
-def _heavier(body: Body, change: float) -> Body:
+def _scale_mass(body: Body, change: float) -> Body:
     return attrs.evolve(body, mass=body.mass * (1 + change))
 
 
-def _scaled(body: Body, change: float) -> Body:
+def _scale_points(body: Body, change: float) -> Body:
     return attrs.evolve(body, points={name: point * (1 + change) for name, point in body.points.items()})
 
 
-def _length(body: Body) -> float:
+def _body_length(body: Body) -> float:
     """Return the largest distance between two points of a body [m]."""
     points = np.array(list(body.points.values()))
     return float(np.linalg.norm(points[:, None] - points, axis=-1).max()) if len(points) > 1 else 0.0

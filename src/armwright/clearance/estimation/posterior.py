@@ -23,11 +23,11 @@ from armwright.errors import InvalidValueError, ShapeError
 _WALKERS, _STEPS, _BURN = 60, 300, 100
 _STRETCH = 2.0
 # Parameters are likelier than others when their deviance is smaller by so much.
-_LIKELIER = 1.0
+_MIN_DEVIANCE_DECREASE = 1.0
 # A parameter is at a bound when it is nearer than this part of its range, or than its deviation.
-_NEAR = 1e-3
+_BOUND_TOLERANCE = 1e-3
 # A parameter is identifiable when its standard deviation is at most this part of that of the prior.
-_IDENTIFIABLE = 0.3
+_MAX_PRIOR_PART = 0.3
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -63,7 +63,7 @@ class Posterior:
         """
         ends = {}
         for i, name in enumerate(self.names):
-            near = max(float(self.deviations[i]), _NEAR * float(self.upper[i] - self.lower[i]))
+            near = max(float(self.deviations[i]), _BOUND_TOLERANCE * float(self.upper[i] - self.lower[i]))
             for end in (float(self.lower[i]), float(self.upper[i])):
                 if abs(float(self.best[i]) - end) < near and end != 0:
                     ends[name] = end
@@ -75,7 +75,7 @@ class Posterior:
         Raises:
             ContradictionError: no parameters explain the features.
         """
-        ends = [f"{name.removeprefix('c_')} at {_shown(name, end)}" for name, end in self.bounds.items()]
+        ends = [f"{name.removeprefix('c_')} at {_parameter_text(name, end)}" for name, end in self.bounds.items()]
         refuse_contradiction(self.misfit, self.residuals.items(), ends)
         return self
 
@@ -101,7 +101,7 @@ class Posterior:
         A bound narrows the distribution of a parameter beyond it.
         """
         prior = (self.upper - self.lower) / np.sqrt(12)
-        is_narrow = self.deviations <= _IDENTIFIABLE * prior
+        is_narrow = self.deviations <= _MAX_PRIOR_PART * prior
         return {name: bool(x) and name not in self.bounds for name, x in zip(self.names, is_narrow, strict=True)}
 
     def interval(self, level: float = 0.9) -> Array:
@@ -112,7 +112,7 @@ class Posterior:
         return np.asarray(ends.T, dtype=np.float64)
 
 
-def posterior(surrogate: Surrogate, measured: ArrayLike, noise: ArrayLike, *, seed: int = 0) -> Posterior:
+def sample_posterior(surrogate: Surrogate, measured: ArrayLike, noise: ArrayLike, *, seed: int = 0) -> Posterior:
     """Return the posterior distribution of the parameters for measured features.
 
     Args:
@@ -132,7 +132,7 @@ def posterior(surrogate: Surrogate, measured: ArrayLike, noise: ArrayLike, *, se
     lower, upper = surrogate.lower, surrogate.upper
 
     freedom = max(1, count - len(lower))
-    fit = _likeliest(surrogate, goal, noise_covariance)
+    fit = _most_likely_fit(surrogate, goal, noise_covariance)
 
     def log_density(points: Array) -> Array:
         mean, deviation = surrogate.predict(np.clip(points, lower, upper))
@@ -146,10 +146,10 @@ def posterior(surrogate: Surrogate, measured: ArrayLike, noise: ArrayLike, *, se
     while True:
         factor = float(widening(fit.chi_square, freedom))
         with one_core():
-            samples, top = _walk(log_density, fit.point, lower, upper, seed)
+            samples, top = _sample_walkers(log_density, fit.point, lower, upper, seed)
         # Walkers may reach a likelier optimum than the fit; the fit then moves there.
         other = _fit_at(surrogate, goal, noise_covariance, top)
-        if not other.deviance < fit.deviance - _LIKELIER:  # nor where either is NaN
+        if not other.deviance < fit.deviance - _MIN_DEVIANCE_DECREASE:  # nor where either is NaN
             break
         fit = other
     residuals = fit.residual / np.sqrt(np.diag(fit.covariance))
@@ -189,7 +189,7 @@ def _fit_at(surrogate: Surrogate, goal: Array, noise: Array, point: Array) -> _F
     return _Fit(point, residual, covariance, chi_square, chi_square + float(np.linalg.slogdet(covariance)[1]))
 
 
-def _likeliest(surrogate: Surrogate, goal: Array, noise: Array) -> _Fit:
+def _most_likely_fit(surrogate: Surrogate, goal: Array, noise: Array) -> _Fit:
     """Return the parameters whose features come nearest to the measured ones, weighted by their joint covariance."""
     covariance = _fit_at(surrogate, goal, noise, (surrogate.lower + surrogate.upper) / 2).covariance
     fits: list[_Fit] = []
@@ -200,12 +200,12 @@ def _likeliest(surrogate: Surrogate, goal: Array, noise: Array) -> _Fit:
     return min(fits, key=lambda fit: fit.deviance)
 
 
-def _shown(name: str, value: float) -> str:
+def _parameter_text(name: str, value: float) -> str:
     """Return a parameter as text: clearances in mm."""
     return f"{value * 1e3:g} mm" if name.startswith("c_") else f"{value:g}"
 
 
-def _walk(
+def _sample_walkers(
     log_density: Callable[[Array], Array], centre: Array, lower: Array, upper: Array, seed: int
 ) -> tuple[Array, Array]:
     """Return samples (s, k) of walkers that stretch towards and away from one another, and the likeliest (k,)."""

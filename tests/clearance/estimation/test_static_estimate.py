@@ -6,8 +6,14 @@ import pytest
 from scipy.stats import binom
 
 from armwright.arrays import Array
-from armwright.clearance.estimation import static
-from armwright.clearance.estimation.static import Estimate, best_poses, estimate_at_rest, rest_matrix, rest_offsets
+from armwright.clearance.estimation import static_estimate
+from armwright.clearance.estimation.static_estimate import (
+    Estimate,
+    best_poses,
+    estimate_at_rest,
+    rest_matrix,
+    rest_offsets,
+)
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
@@ -220,9 +226,11 @@ def test_poses_are_closed_once(five_bar: Linkage, monkeypatch: pytest.MonkeyPatc
     """However many rounds an estimate takes, the loops of each pose are closed one after the other only once."""
     offsets = rest_offsets(five_bar, STARTS, ARM_A)
     closings = []
-    closed_at_poses = static.closed_at_poses
+    closed_at_poses = static_estimate.closed_at_poses
     monkeypatch.setattr(
-        static, "closed_at_poses", lambda *arguments: (closings.append(arguments), closed_at_poses(*arguments))[1]
+        static_estimate,
+        "closed_at_poses",
+        lambda *arguments: (closings.append(arguments), closed_at_poses(*arguments))[1],
     )
 
     estimate_at_rest(five_bar, STARTS, offsets)

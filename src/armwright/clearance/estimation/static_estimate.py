@@ -16,18 +16,18 @@ from scipy.optimize import nnls
 
 from armwright.arrays import Array, ArrayLike, Flags, floats, positive
 from armwright.clearance.estimation.misfit import p_value, widening
-from armwright.clearance.ideal import closed, ideal_motion, sensitivity, tip_of
+from armwright.clearance.ideal import close_pins, ideal_motion, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.rest import at_rest, forces_of
 from armwright.clearance.scenario import assembly_guess
 from armwright.clearance.settings import contact_stiffness
+from armwright.clearance.static_equilibrium import find_static_equilibrium, force_magnitudes
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 
 _MAX_ROUNDS = 12
 # The iteration ends when no clearance changes by more [m].
-_CONVERGED = 1e-12
+_TOLERANCE = 1e-12
 # The lower bound of clearances during the iteration: contact needs one [m].
-_SMALLEST = 1e-7
+_MIN_CLEARANCE = 1e-7
 # A clearance is identifiable when its standard deviation is below this part of its range.
 _IDENTIFIABLE = 0.1
 
@@ -101,7 +101,7 @@ class Estimate:
     @property
     def at_bound(self) -> Flags:
         """(..., p) which clearances are indistinguishable from 0: they are less than their deviation."""
-        return np.asarray(self.values <= np.maximum(2 * _SMALLEST, self.deviations), dtype=np.bool_)
+        return np.asarray(self.values <= np.maximum(2 * _MIN_CLEARANCE, self.deviations), dtype=np.bool_)
 
     def interval(self, level: float = 0.9) -> Array:
         """Return (..., p, 2) the interval in which each clearance lies with the probability ``level`` [m]."""
@@ -133,15 +133,15 @@ def rest_matrix(linkage: Linkage, poses: ArrayLike) -> Array:
     Raises:
         InvalidValueError: a pose cannot be reached, or a pin carries no force there.
     """
-    return matrix_at(linkage, closed_at_poses(linkage, poses))
+    return rest_matrix_at(linkage, closed_at_poses(linkage, poses))
 
 
-def matrix_at(linkage: Linkage, q: Array) -> Array:
+def rest_matrix_at(linkage: Linkage, q: Array) -> Array:
     """Return B (k, 2, p) at closed coordinates (k, n); see ``rest_matrix``."""
     still = np.zeros((len(q), 2))
     reactions = ideal_motion(linkage, q, still, still, by_tip=True).reactions
-    direction = reactions / forces_of(linkage, reactions)[..., None]
-    return np.asarray(np.einsum("kapb,kpb->kap", sensitivity(linkage, q), direction), dtype=np.float64)
+    direction = reactions / force_magnitudes(linkage, reactions)[..., None]
+    return np.asarray(np.einsum("kapb,kpb->kap", tip_sensitivity(linkage, q), direction), dtype=np.float64)
 
 
 def rest_offsets(linkage: Linkage, poses: ArrayLike, clearances: ArrayLike) -> Array:
@@ -158,7 +158,10 @@ def rest_offsets(linkage: Linkage, poses: ArrayLike, clearances: ArrayLike) -> A
 def _offsets_at(linkage: Linkage, q: Array, clearances: Array) -> Array:
     """Return (..., k, 2) the offsets of the tip at closed coordinates (k, n) [m]; see ``rest_offsets``."""
     c = clearances[..., None, :]
-    return np.asarray(at_rest(linkage, q, c, contact_stiffness(linkage, c)).tip - tip_of(linkage, q), dtype=np.float64)
+    return np.asarray(
+        find_static_equilibrium(linkage, q, c, contact_stiffness(linkage, c)).tip - tip_position(linkage, q),
+        dtype=np.float64,
+    )
 
 
 def estimate_at_rest(
@@ -189,11 +192,11 @@ def estimate_at_rest(
     names = tuple(linkage.clearances)
     weights = np.sqrt(np.repeat(counts, 2))
     q = closed_at_poses(linkage, positions)
-    B = matrix_at(linkage, q).reshape(-1, len(names))
+    B = rest_matrix_at(linkage, q).reshape(-1, len(names))
     singular = np.linalg.svd(B, compute_uv=False)
     if len(singular) < len(names) or singular[-1] < 1e-6 * singular[0]:
         raise TooFewError(f"{len(positions)} poses do not determine {len(names)} clearances; take more, or others")
-    best, residuals = _fitted(linkage, q, measured, B, weights)
+    best, residuals = _fit_clearances(linkage, q, measured, B, weights)
     weighted = weights[:, None] * B
     return Estimate(
         names=names,
@@ -206,7 +209,7 @@ def estimate_at_rest(
     )
 
 
-def _fitted(linkage: Linkage, q: Array, offsets: Array, B: Array, weights: Array) -> tuple[Array, Array]:
+def _fit_clearances(linkage: Linkage, q: Array, offsets: Array, B: Array, weights: Array) -> tuple[Array, Array]:
     """Return the clearances (..., p) that explain offsets (..., k, 2) best, and the residuals (..., k, 2) [m].
 
     The weights (2k,) are those of the equations B (2k, p), at closed coordinates (k, n).
@@ -218,11 +221,11 @@ def _fitted(linkage: Linkage, q: Array, offsets: Array, B: Array, weights: Array
 
     def step(c: Array, residuals: Array) -> Array:
         """Solve the least squares about c, with no clearance below the smallest."""
-        goal = residuals.reshape(*residuals.shape[:-2], -1) + (c - _SMALLEST) @ B.T
+        goal = residuals.reshape(*residuals.shape[:-2], -1) + (c - _MIN_CLEARANCE) @ B.T
         rows = [nnls(weighted, weights * row)[0] for row in goal.reshape(-1, len(B))]
-        return np.reshape(rows, c.shape) + _SMALLEST
+        return np.reshape(rows, c.shape) + _MIN_CLEARANCE
 
-    c = step(np.full((*offsets.shape[:-2], B.shape[1]), _SMALLEST), offsets)
+    c = step(np.full((*offsets.shape[:-2], B.shape[1]), _MIN_CLEARANCE), offsets)
     best, smallest, converged = c, np.full_like(offsets, np.inf), False
     for _ in range(_MAX_ROUNDS):
         residuals = offsets - _offsets_at(linkage, q, c)
@@ -233,7 +236,7 @@ def _fitted(linkage: Linkage, q: Array, offsets: Array, B: Array, weights: Array
         if converged:
             break
         new = step(c, residuals)
-        converged, c = bool(np.abs(new - c).max() < _CONVERGED), new
+        converged, c = bool(np.abs(new - c).max() < _TOLERANCE), new
     return np.asarray(best, dtype=np.float64), np.asarray(smallest, dtype=np.float64)
 
 
@@ -267,5 +270,5 @@ def closed_at_poses(linkage: Linkage, poses: ArrayLike) -> Array:
     """Return (k, n) closed coordinates with the tip at each pose, each from the one before."""
     configurations = [assembly_guess(linkage)]
     for position in floats(poses, "poses").reshape(-1, 2):
-        configurations.append(closed(linkage, configurations[-1], tip=position))
+        configurations.append(close_pins(linkage, configurations[-1], tip=position))
     return np.array(configurations[1:])

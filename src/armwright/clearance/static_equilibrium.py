@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.clearance.ideal import balance, closed, gaps_of, tip_of
+from armwright.clearance.ideal import close_pins, inverse_dynamics, pin_gaps, tip_position
 from armwright.clearance.linkage import Linkage
 from armwright.errors import InvalidValueError
 
@@ -44,7 +44,7 @@ class StaticEquilibrium:
     forces: Array
 
 
-def at_rest(
+def find_static_equilibrium(
     linkage: Linkage, ideal: ArrayLike, clearances: ArrayLike | None = None, stiffness: ArrayLike | None = None
 ) -> StaticEquilibrium:
     """Return the equilibrium of a linkage with its drives locked at the coordinates without clearance.
@@ -70,10 +70,10 @@ def at_rest(
     still = np.zeros_like(q)
     converged = np.zeros((*lead, 1), dtype=bool)
     for _ in range(_MAX_ITERATIONS):
-        _, reactions = balance(linkage, q, still, still)
-        size = forces_of(linkage, reactions)
+        _, reactions = inverse_dynamics(linkage, q, still, still)
+        size = force_magnitudes(linkage, reactions)
         gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
-        new = closed(linkage, q, drives=drives, gaps=gaps)
+        new = close_pins(linkage, q, drives=drives, gaps=gaps)
         moved = np.abs(new - q).max(axis=-1, keepdims=True)
         q = np.where(converged, q, new)
         # A converged configuration stays unchanged while others are iterated.
@@ -85,10 +85,10 @@ def at_rest(
             f"{linkage.name} has no equilibrium: after {_MAX_ITERATIONS} iterations it still moves by "
             f"{moved.max():.2g}; expected drives locked away from singular configurations"
         )
-    return StaticEquilibrium(q=q, tip=tip_of(linkage, q), gaps=gaps_of(linkage, q), forces=size)
+    return StaticEquilibrium(q=q, tip=tip_position(linkage, q), gaps=pin_gaps(linkage, q), forces=size)
 
 
-def forces_of(linkage: Linkage, reactions: Array) -> Array:
+def force_magnitudes(linkage: Linkage, reactions: Array) -> Array:
     """Return (..., p) the magnitudes of the reactions (..., p, 2) of the pins at rest [N].
 
     Raises:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.clearance.estimation.on_paths import surrogate_from_sweep
+from armwright.clearance.estimation.sweep_surrogate import learn_from_sweep
 from armwright.clearance.feature_sweep import FeatureSweep
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.reader import load_linkage
@@ -36,7 +36,7 @@ def folder(five_bar: Linkage, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_chance_is_left_out_and_named(folder: Path, five_bar: Linkage) -> None:
     """Of two paths the straight part of the one that rattles teaches nothing; all else is learnt with its spread."""
-    sweep = surrogate_from_sweep(folder, five_bar, ("y1", "y13"), (*STRAIGHT, "amp_dc"))
+    sweep = learn_from_sweep(folder, five_bar, ("y1", "y13"), (*STRAIGHT, "amp_dc"))
 
     assert sweep.random_features == ("y13_slope", "y13_intercept")
     assert sweep.surrogate.features == ("y1_slope", "y1_intercept", "y1_amp_dc", "y13_amp_dc")
@@ -51,15 +51,15 @@ def test_chance_is_left_out_and_named(folder: Path, five_bar: Linkage) -> None:
 def test_nothing_but_chance(folder: Path, five_bar: Linkage) -> None:
     """Where all features that were measured are chance they determine nothing, and other paths are asked for."""
     with pytest.raises(InvalidValueError, match="on y13 all features are chance: they vary more between"):
-        surrogate_from_sweep(folder, five_bar, ("y13",), STRAIGHT)
+        learn_from_sweep(folder, five_bar, ("y13",), STRAIGHT)
 
 
 def test_sweep_of_something_else(folder: Path, five_bar: Linkage) -> None:
     """A sweep of another linkage, or without a path that was measured, is refused."""
     with pytest.raises(InvalidValueError, match="the sweep is of another linkage than slider-crank"):
-        surrogate_from_sweep(folder, load_linkage("slider-crank"), ("y1",), STRAIGHT)
+        learn_from_sweep(folder, load_linkage("slider-crank"), ("y1",), STRAIGHT)
     with pytest.raises(InvalidValueError, match="the sweep has no path x2; sweep the paths that were measured"):
-        surrogate_from_sweep(folder, five_bar, ("y1", "x2"), STRAIGHT)
+        learn_from_sweep(folder, five_bar, ("y1", "x2"), STRAIGHT)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_foreign_results(
     (tmp_path / "run.json").write_text(record_text({"results.nc": str(sha256(tmp_path / "results.nc"))}, {}))
 
     with pytest.raises(FileFormatError, match=text) as refused:
-        surrogate_from_sweep(tmp_path, five_bar, ("y1",), STRAIGHT)
+        learn_from_sweep(tmp_path, five_bar, ("y1",), STRAIGHT)
 
     assert f"{tmp_path / 'results.nc'}" in str(refused.value)
 
@@ -102,7 +102,7 @@ def test_results_that_are_a_pipe(five_bar: Linkage, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "results.nc")
 
     with pytest.raises(FileFormatError, match=r"results\.nc: expected a file, got a pipe"):
-        surrogate_from_sweep(tmp_path, five_bar, ("y1",), STRAIGHT)
+        learn_from_sweep(tmp_path, five_bar, ("y1",), STRAIGHT)
 
 
 def test_without_runs_beside_each(five_bar: Linkage, tmp_path: Path) -> None:
@@ -110,6 +110,6 @@ def test_without_runs_beside_each(five_bar: Linkage, tmp_path: Path) -> None:
     task = FeatureSweep(linkage=five_bar, paths=("y1",), replicates=0)
     run(task, sobol(dict.fromkeys(task.parameters, RANGE), 16, 0), tmp_path / "out", workers=1).close()
 
-    sweep = surrogate_from_sweep(tmp_path / "out", five_bar, ("y1",), STRAIGHT)
+    sweep = learn_from_sweep(tmp_path / "out", five_bar, ("y1",), STRAIGHT)
 
     assert (sweep.random_features, sweep.predictable_until, sweep.surrogate.spreads) == ((), {}, None)

@@ -6,13 +6,13 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.clearance.equations import Contact, ContactMemory, FrictionModel, State, potential_energy, rates
-from armwright.clearance.ideal import closed, tip_of
+from armwright.clearance.ideal import close_pins, tip_position
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.placement import Placement
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.rest import at_rest
 from armwright.clearance.scenario import assembly_guess
 from armwright.clearance.settings import contact_stiffness
+from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError, ShapeError
 
 # Clearances of the thesis' two arms [m].
@@ -30,7 +30,7 @@ def linkage() -> Linkage:
 
 
 def ideal(linkage: Linkage, tip: tuple[float, float]) -> Array:
-    return closed(linkage, assembly_guess(linkage), tip=tip)
+    return close_pins(linkage, assembly_guess(linkage), tip=tip)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_first_goal_of_the_thesis(
     linkage: Linkage, clearances: Array, offset_mm: tuple[float, float], size_mm: float
 ) -> None:
     """At (-180, -600) mm the tip of arm A hangs 0.5619 mm off, that of arm B 0.9146 mm (thesis: 0.562 and 0.915)."""
-    equilibrium = at_rest(linkage, ideal(linkage, FIRST_GOAL), clearances)
+    equilibrium = find_static_equilibrium(linkage, ideal(linkage, FIRST_GOAL), clearances)
 
     error = equilibrium.tip - FIRST_GOAL
     np.testing.assert_allclose(error, np.array(offset_mm) * 1e-3, rtol=0, atol=PRINTED)
@@ -53,7 +53,10 @@ def test_start_of_y1(linkage: Linkage) -> None:
     """Where y1 starts, half a millimetre in each pin shifts the tip by 0.2891 mm in x, 0.2893 mm with soft walls."""
     q, c = ideal(linkage, Y1_START), np.full(3, 5e-4)
 
-    rigid, soft = at_rest(linkage, q, c), at_rest(linkage, q, c, contact_stiffness(linkage, c))
+    rigid, soft = (
+        find_static_equilibrium(linkage, q, c),
+        find_static_equilibrium(linkage, q, c, contact_stiffness(linkage, c)),
+    )
 
     np.testing.assert_allclose(rigid.tip - Y1_START, (0.2891e-3, -0.9055e-3), rtol=0, atol=PRINTED)
     np.testing.assert_allclose(soft.tip - Y1_START, (0.2893e-3, -0.9059e-3), rtol=0, atol=PRINTED)
@@ -63,7 +66,7 @@ def test_start_of_y1(linkage: Linkage) -> None:
 def test_nothing_moves(linkage: Linkage, clearances: Array) -> None:
     """With its drives held a linkage that lies at rest is in balance: no body begins to move."""
     K = contact_stiffness(linkage, clearances)
-    equilibrium = at_rest(linkage, ideal(linkage, FIRST_GOAL), clearances, K)
+    equilibrium = find_static_equilibrium(linkage, ideal(linkage, FIRST_GOAL), clearances, K)
 
     locked = attrs.evolve(linkage, drives=[attrs.evolve(drive, kind="motion") for drive in linkage.drives])
     contacts = [Contact(*row, 0.15, 0.0, 1e-3) for row in np.stack([clearances, K], axis=-1)]
@@ -78,7 +81,7 @@ def test_nothing_moves(linkage: Linkage, clearances: Array) -> None:
 def test_lowest_place(linkage: Linkage, rng: np.random.Generator) -> None:
     """In rigid walls no other contact directions have less energy: links and load hang as low as they can."""
     q = ideal(linkage, FIRST_GOAL)
-    equilibrium = at_rest(linkage, q, ARM_A)
+    equilibrium = find_static_equilibrium(linkage, q, ARM_A)
 
     def energy(q: Array) -> Array:
         placement = Placement(linkage, [q[..., i] for i in range(8)], [0.0] * 8)
@@ -87,7 +90,7 @@ def test_lowest_place(linkage: Linkage, rng: np.random.Generator) -> None:
     angles = np.arctan2(equilibrium.gaps[:, 1], equilibrium.gaps[:, 0]) + rng.normal(0.0, 0.5, (500, 3))
     sizes = ARM_A * rng.choice([1.0, 0.9], (500, 3))
     gaps = sizes[..., None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    others = closed(linkage, equilibrium.q, drives=q[[0, 7]], gaps=gaps)
+    others = close_pins(linkage, equilibrium.q, drives=q[[0, 7]], gaps=gaps)
 
     assert np.all(energy(others) > energy(equilibrium.q))
 
@@ -97,7 +100,7 @@ def test_play_shifts_in_proportion(linkage: Linkage) -> None:
     q = ideal(linkage, FIRST_GOAL)
     shares = np.array((1e-1, 1e-2, 1e-3))
 
-    shifts = at_rest(linkage, q, shares[:, None] * ARM_A).tip - tip_of(linkage, q)
+    shifts = find_static_equilibrium(linkage, q, shares[:, None] * ARM_A).tip - tip_position(linkage, q)
     slopes = shifts / shares[:, None]
 
     assert np.abs(slopes[0] - slopes[2]).max() < 1e-3 * np.abs(slopes).max()
@@ -106,7 +109,7 @@ def test_play_shifts_in_proportion(linkage: Linkage) -> None:
 
 def test_no_play(linkage: Linkage) -> None:
     """Without play the tip is where it should be, and the pins carry what they carry."""
-    equilibrium = at_rest(linkage, ideal(linkage, FIRST_GOAL), [0.0, 0.0, 0.0])
+    equilibrium = find_static_equilibrium(linkage, ideal(linkage, FIRST_GOAL), [0.0, 0.0, 0.0])
 
     np.testing.assert_allclose(equilibrium.tip, FIRST_GOAL, rtol=0, atol=1e-12)
     assert np.all(equilibrium.forces > 1.0)
@@ -114,26 +117,28 @@ def test_no_play(linkage: Linkage) -> None:
 
 def test_leading_axes(linkage: Linkage, rng: np.random.Generator) -> None:
     """Many clearances at many poses make a table of offsets, each as it is alone."""
-    q = closed(linkage, assembly_guess(linkage), tip=[[-0.1, -0.6], [0.1, -0.5]])
+    q = close_pins(linkage, assembly_guess(linkage), tip=[[-0.1, -0.6], [0.1, -0.5]])
     c = rng.uniform(1e-4, 5e-4, (4, 1, 3))
 
-    equilibrium = at_rest(linkage, q, c)
+    equilibrium = find_static_equilibrium(linkage, q, c)
 
     assert equilibrium.tip.shape == (4, 2, 2)
-    np.testing.assert_allclose(at_rest(linkage, q[1], c[2, 0]).tip, equilibrium.tip[2, 1], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        find_static_equilibrium(linkage, q[1], c[2, 0]).tip, equilibrium.tip[2, 1], rtol=0, atol=1e-13
+    )
 
 
 def test_slack_pins_are_refused(linkage: Linkage) -> None:
     """Without weight and load nothing says where the journals lie."""
     adrift = attrs.evolve(linkage, gravity=(0.0, 0.0), loads=())
     with pytest.raises(InvalidValueError, match="pin J2 of five-bar carries no force at rest"):
-        at_rest(adrift, ideal(linkage, FIRST_GOAL))
+        find_static_equilibrium(adrift, ideal(linkage, FIRST_GOAL))
 
 
 def test_clearances_that_do_not_fit(linkage: Linkage) -> None:
     """There is one clearance for each pin, and none is negative."""
     q = ideal(linkage, FIRST_GOAL)
     with pytest.raises(ShapeError, match=r"clearances of J2, J3, J4: expected a shape ending in \(3,\), got \(2,\)"):
-        at_rest(linkage, q, [1e-4, 1e-4])
+        find_static_equilibrium(linkage, q, [1e-4, 1e-4])
     with pytest.raises(InvalidValueError, match=r"clearances: expected none below 0, got -0\.1 mm"):
-        at_rest(linkage, q, [1e-4, -1e-4, 1e-4])
+        find_static_equilibrium(linkage, q, [1e-4, -1e-4, 1e-4])

@@ -13,15 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.kriging import Surrogate, learn
-from armwright.clearance.feature_sweep import is_chance, is_sweep_of
+from armwright.clearance.estimation.kriging import Surrogate, fit_surrogate
+from armwright.clearance.feature_sweep import is_random, is_sweep_of
 from armwright.clearance.linkage import Linkage
 from armwright.errors import FileFormatError, InvalidValueError, shown
 from armwright.sweep.folder import RESULTS
 from armwright.sweep.results import load
 
 # No swept quantity has a larger number, in SI units.
-_LARGEST = 1e9
+_MAX_VALUE = 1e9
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -42,7 +42,7 @@ class SweepSurrogate:
     runs: int
 
 
-def surrogate_from_sweep(
+def learn_from_sweep(
     folder: Path | str,
     linkage: Linkage,
     paths: Sequence[str],
@@ -68,14 +68,14 @@ def surrogate_from_sweep(
     names = [
         name
         for name in all_names
-        if not (replicates and is_chance(table[name][finished], table[f"{name}_spread"][finished], replicates + 1))
+        if not (replicates and is_random(table[name][finished], table[f"{name}_spread"][finished], replicates + 1))
     ]
     if not names:
         raise InvalidValueError(
             f"{folder}: on {', '.join(paths)} all features are chance: they vary more between indistinguishable runs "
             f"than over the clearances of the sweep; measure and sweep other paths"
         )
-    surrogate = learn(
+    surrogate = fit_surrogate(
         sweep.parameters,
         sweep.points,
         names,
@@ -113,15 +113,17 @@ def _read_sweep(folder: Path | str, linkage: Linkage, paths: Sequence[str], feat
             same, replicates = is_sweep_of(settings, linkage), int(settings.get("replicates", 0))
             parameters = tuple(name for name in map(str, data.coords) if name.startswith("c_") or name == "friction")
             # The two bounds of a random design, or the levels of a full factorial.
-            ranges = [_range(design[name], name) for name in parameters] if set(parameters) <= set(design) else None
+            ranges = (
+                [_swept_range(design[name], name) for name in parameters] if set(parameters) <= set(design) else None
+            )
             outputs = [f"{path}_{feature}" for path in paths for feature in features]
             if replicates:
                 outputs += [f"{name}_spread" for name in outputs] + [f"{path}_until" for path in paths]
             missing = sorted(path for path in paths if f"{path}_{features[0]}" not in data)
             runs = data.sizes["run"]
-            table = {} if missing else {name: _numbers(data[name].to_numpy(), name, runs) for name in outputs}
-            points = np.stack([_numbers(data[name].to_numpy(), name, runs) for name in parameters], axis=-1)
-            finished = _numbers(data["status"].to_numpy(), "status", runs) == 0
+            table = {} if missing else {name: _output_values(data[name].to_numpy(), name, runs) for name in outputs}
+            points = np.stack([_output_values(data[name].to_numpy(), name, runs) for name in parameters], axis=-1)
+            finished = _output_values(data["status"].to_numpy(), "status", runs) == 0
         except (
             LookupError,
             ValueError,
@@ -145,7 +147,7 @@ def _read_sweep(folder: Path | str, linkage: Linkage, paths: Sequence[str], feat
     )
 
 
-def _numbers(values: npt.NDArray[Any], name: str, runs: int) -> Array:
+def _output_values(values: npt.NDArray[Any], name: str, runs: int) -> Array:
     """Return an output as numbers, one for each run; those of failed runs may be NaN.
 
     Raises:
@@ -154,12 +156,12 @@ def _numbers(values: npt.NDArray[Any], name: str, runs: int) -> Array:
     if values.shape != (runs,) or values.dtype.kind not in "fiu":
         raise ValueError(f"{name}: expected {runs} numbers, got {values.dtype} of shape {values.shape}")
     numbers = values.astype(np.float64)
-    if np.any(np.abs(numbers) > _LARGEST):
-        raise ValueError(f"{name}: expected numbers up to {_LARGEST:g}, got {np.nanmax(np.abs(numbers)):g}")
+    if np.any(np.abs(numbers) > _MAX_VALUE):
+        raise ValueError(f"{name}: expected numbers up to {_MAX_VALUE:g}, got {np.nanmax(np.abs(numbers)):g}")
     return numbers
 
 
-def _range(levels: Any, name: str) -> tuple[float, float]:
+def _swept_range(levels: Any, name: str) -> tuple[float, float]:
     """Return the ends of the swept range of a parameter.
 
     Raises:
