@@ -27,7 +27,7 @@ def running() -> Trajectory:
 def test_a_stop_goes_on_from_the_motion(running: Trajectory, share: float) -> None:
     """Position, speed and acceleration have no jump where the stop begins, and the arm rests at its end."""
     t = share * running.duration
-    stop = brake(running, t, load_arm("puma560-seed").limit("acceleration"))
+    stop = brake(running, t, load_arm("puma560-seed").limits.acceleration)
 
     for order in range(3):
         np.testing.assert_allclose(stop(0.0, order), running(t, order), atol=ROUNDING)
@@ -39,7 +39,7 @@ def test_a_stop_goes_on_from_the_motion(running: Trajectory, share: float) -> No
 def test_a_stop_keeps_the_limit(running: Trajectory, share: float) -> None:
     """No joint brakes harder than it may, nor harder than it was accelerating already."""
     t = share * running.duration
-    limit = np.maximum(load_arm("puma560-seed").limit("acceleration"), np.abs(running(t, 2)))
+    limit = np.maximum(load_arm("puma560-seed").limits.acceleration, np.abs(running(t, 2)))
 
     assert (brake(running, t, np.full(6, limit)).peaks(2) <= limit * (1 + 1e-6)).all()
 
@@ -58,7 +58,7 @@ def test_a_stop_keeps_to_its_path(running: Trajectory, share: float) -> None:
     """A motion from point to point is straight in joint space, and so is its stop; it never turns back."""
     start = running(0.0)
     way = (running(running.duration) - start) / np.linalg.norm(running(running.duration) - start)
-    stop = brake(running, share * running.duration, load_arm("puma560").limit("acceleration"))
+    stop = brake(running, share * running.duration, load_arm("puma560").limits.acceleration)
     q = stop(np.linspace(0, stop.duration, 200)) - start
 
     np.testing.assert_allclose(q, (q @ way)[:, None] * way, atol=ROUNDING)
@@ -68,7 +68,7 @@ def test_a_stop_keeps_to_its_path(running: Trajectory, share: float) -> None:
 def test_stops_of_random_motions(sample: Sample) -> None:
     """Splines through random configurations, as fast as the limits allow, are stopped within them at any time."""
     arm = load_arm("puma560")
-    speed, acceleration = arm.limit("speed"), arm.limit("acceleration")
+    speed, acceleration = arm.limits.speed, arm.limits.acceleration
     worst = 0.0
     for rng in sample.cases(300):
         knots = rng.uniform(-1, 1, (int(rng.integers(3, 9)), arm.n))
@@ -89,7 +89,7 @@ def test_stops_of_random_motions(sample: Sample) -> None:
 def test_joints_stop_together(running: Trajectory) -> None:
     """The whole stop has no jump inside either, and lasts a whole number of servo periods when one is given."""
     t = 0.4 * running.duration
-    stop = brake(running, t, load_arm("puma560-seed").limit("acceleration"), period=1e-3)
+    stop = brake(running, t, load_arm("puma560-seed").limits.acceleration, period=1e-3)
 
     assert stop.duration / 1e-3 == pytest.approx(round(stop.duration / 1e-3), abs=1e-6)
     assert max(continuity(stop).largest(order).max() for order in range(3)) < ROUNDING

@@ -61,11 +61,11 @@ def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
     np.testing.assert_allclose(motion(0.0), q, atol=1e-12)
     np.testing.assert_allclose(forward(arm, motion(motion.duration)), X, atol=1e-5)
     np.testing.assert_allclose(motion([0.0, motion.duration], 1), 0, atol=1e-6)
-    assert (motion.peaks(1) <= arm.limit("speed") * (1 + 1e-9)).all()
-    assert (motion.peaks(2) <= arm.limit("acceleration") * (1 + 1e-9)).all()
+    assert (motion.peaks(1) <= arm.limits.speed * (1 + 1e-9)).all()
+    assert (motion.peaks(2) <= arm.limits.acceleration * (1 + 1e-9)).all()
     lowest, highest = motion.extremes(0)
-    assert (lowest >= arm.limit("lower")).all()
-    assert (highest <= arm.limit("upper")).all()
+    assert (lowest >= arm.limits.lower).all()
+    assert (highest <= arm.limits.upper).all()
     places = forward(arm, motion(np.linspace(0, motion.duration, 3000)))[:, :3, 3]
     A, B = forward(arm, q)[:3, 3], X[:3, 3]
     s = np.clip((places - A) @ (B - A) / ((B - A) @ (B - A)), 0, 1)
@@ -92,9 +92,9 @@ def test_a_way_round_near_the_joint_move() -> None:
     assert [leg.certificate.holds for leg in way.legs] == [True, True]
     np.testing.assert_allclose(fast.forward(way.trajectory(way.trajectory.duration)), C, atol=1e-6)
     lowest, highest = way.trajectory.extremes(0)
-    assert (lowest >= fast.arm.limit("lower")).all()
-    assert (highest <= fast.arm.limit("upper")).all()
-    assert (way.trajectory.peaks(1) <= fast.arm.limit("speed") * (1 + 1e-9)).all()
+    assert (lowest >= fast.arm.limits.lower).all()
+    assert (highest <= fast.arm.limits.upper).all()
+    assert (way.trajectory.peaks(1) <= fast.arm.limits.speed * (1 + 1e-9)).all()
 
 
 def test_damped_rates_keep_efforts(through_the_wrist: tuple[Array, Array]) -> None:
@@ -108,7 +108,7 @@ def test_damped_rates_keep_efforts(through_the_wrist: tuple[Array, Array]) -> No
     motion = line_or_detour(weak, q, X, method="damped").trajectory
 
     t = np.linspace(0, motion.duration, 20_000)
-    parts = np.abs(inverse_dynamics(weak, motion(t), motion(t, 1), motion(t, 2))) / weak.limit("effort")
+    parts = np.abs(inverse_dynamics(weak, motion(t), motion(t, 1), motion(t, 2))) / weak.limits.effort
     assert parts.max() == pytest.approx(1, abs=1e-3)
 
 

@@ -92,10 +92,10 @@ def test_least_slowing(rng: np.random.Generator) -> None:
         found = slowing_for_efforts(PUMA, move)
 
         assert found.factor > 1
-        use = effort_peaks(PUMA, move.slowed(found.factor)).peaks / PUMA.limit("effort")
+        use = effort_peaks(PUMA, move.slowed(found.factor)).peaks / PUMA.limits.effort
         assert use.max() <= 1 + 2 * ROUNDING
         assert int(use.argmax()) == found.joint
-        faster = effort_peaks(PUMA, move.slowed(found.factor / 1.001)).peaks / PUMA.limit("effort")
+        faster = effort_peaks(PUMA, move.slowed(found.factor / 1.001)).peaks / PUMA.limits.effort
         assert faster.max() > 1
 
 

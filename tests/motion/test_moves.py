@@ -52,7 +52,7 @@ def puma() -> CompiledArm:
 
 def some_poses(arm: Arm, rng: np.random.Generator, count: int = 4) -> tuple[Array, Array]:
     """Return poses not far from each other, and joint positions at the first one."""
-    lower, upper = arm.limit("lower"), arm.limit("upper")
+    lower, upper = arm.limits.lower, arm.limits.upper
     q = rng.uniform(0.7 * lower + 0.3 * upper, 0.3 * lower + 0.7 * upper)
     X = np.repeat(forward(arm, q)[None], count, axis=0)
     X[1:, :3, 3] += rng.normal(size=(count - 1, 3)) * 0.08
@@ -165,8 +165,8 @@ def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str,
         assert np.linalg.norm(move.tool_path(certificate.worst_time)[:3, 3] - certificate.worst_position) < ROUNDING
         assert continuity(move.trajectory).order >= 2
         lowest, highest = move.trajectory.extremes(0)
-        assert (lowest >= arm.arm.limit("lower") - ROUNDING).all()
-        assert (highest <= arm.arm.limit("upper") + ROUNDING).all()
+        assert (lowest >= arm.arm.limits.lower - ROUNDING).all()
+        assert (highest <= arm.arm.limits.upper + ROUNDING).all()
         for at in (0.4, 1.5, 2.9):
             labels = [b.label for b in inverse(arm.arm, move.tool_path(at), move.trajectory(at)).branches]
             assert move.label in labels
@@ -266,7 +266,7 @@ def test_one_branch_where_there_is_one(seed: int) -> None:
     """A joint move through poses of one branch keeps to one branch, or finds a shorter one that also does."""
     arm = load_arm("puma560-seed")
     rng = np.random.default_rng(seed)
-    lower, upper = arm.limit("lower"), arm.limit("upper")
+    lower, upper = arm.limits.lower, arm.limits.upper
     Q = rng.uniform(0.6 * lower + 0.4 * upper, 0.4 * lower + 0.6 * upper, (3, 6))
     labels = {inverse(arm, forward(arm, q), q).best.label for q in Q}
 

@@ -27,8 +27,8 @@ FREE = attrs.evolve(
         attrs.evolve(joint, limits=attrs.evolve(joint.limits, lower=-np.inf, upper=np.inf)) for joint in PUMA.joints
     ],
 )
-LOWER, UPPER = PUMA.limit("lower"), PUMA.limit("upper")
-SPEED, ACCELERATION = PUMA.limit("speed"), PUMA.limit("acceleration")
+LOWER, UPPER = PUMA.limits.lower, PUMA.limits.upper
+SPEED, ACCELERATION = PUMA.limits.speed, PUMA.limits.acceleration
 # Position, speed and acceleration may jump by this much where the goal changes.
 JUMP = 1e-9
 # Limits may be passed by this part of them: rounding.

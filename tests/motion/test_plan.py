@@ -92,8 +92,8 @@ def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.ra
         assert off.max() <= found.certificate.deviation + POSE
         assert found.certificate.deviation <= deviation
         assert found.certificate.rotation <= ROTATION_PER_METRE * deviation
-        assert (found.trajectory.peaks(1) <= arm.limit("speed") * (1 + 1e-9)).all()
-        assert (found.trajectory.peaks(2) <= arm.limit("acceleration") * (1 + 1e-9)).all()
+        assert (found.trajectory.peaks(1) <= arm.limits.speed * (1 + 1e-9)).all()
+        assert (found.trajectory.peaks(2) <= arm.limits.acceleration * (1 + 1e-9)).all()
         np.testing.assert_allclose(X[0], A, atol=POSE)
         np.testing.assert_allclose(X[-1], B, atol=POSE)
     assert done > 20
@@ -140,7 +140,7 @@ def test_very_short_ways(stanford: Arm, length: float, turn: float) -> None:
 
     np.testing.assert_allclose(forward(stanford, found.trajectory(found.trajectory.duration)), B, atol=2e-9)
     assert found.trajectory.duration < 3
-    assert (found.trajectory.peaks(2) <= stanford.limit("acceleration") * (1 + 1e-9)).all()
+    assert (found.trajectory.peaks(2) <= stanford.limits.acceleration * (1 + 1e-9)).all()
 
 
 def test_a_frame_met_twice_in_a_row(stanford: Arm) -> None:

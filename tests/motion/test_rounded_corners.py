@@ -60,8 +60,8 @@ def test_limits() -> None:
     """Speeds and accelerations of the joints stay inside their limits, exactly."""
     move = corner(0.03, (0.45, 0.2, 0.25), (0.45, 0.2, 0.10))
 
-    assert (move.trajectory.peaks(1) <= ARM.limit("speed") * (1 + 1e-9)).all()
-    assert (move.trajectory.peaks(2) <= ARM.limit("acceleration") * (1 + 1e-9)).all()
+    assert (move.trajectory.peaks(1) <= ARM.limits.speed * (1 + 1e-9)).all()
+    assert (move.trajectory.peaks(2) <= ARM.limits.acceleration * (1 + 1e-9)).all()
 
 
 def test_a_short_way_is_rounded_from_its_middle() -> None:

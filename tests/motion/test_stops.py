@@ -51,7 +51,7 @@ def upright(puma: Arm) -> tuple[Array, Array, Array]:
 def nearly_singular(arm: Arm, factor: str, part: float, rng: np.random.Generator) -> Array:
     """Return a configuration inside the limits, one factor this part of its scale from zero, the others far from it."""
     number, turning = FACTORS[factor]
-    lower, upper = arm.limit("lower"), arm.limit("upper")
+    lower, upper = arm.limits.lower, arm.limits.upper
     scales = np.array([one.scale for one in singularities(arm, (lower + upper) / 2).factors])
     while True:
         q = rng.uniform(0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper)
@@ -117,7 +117,7 @@ def blamed(fast: CompiledArm, A: Array, B: Array, fraction: float) -> set[tuple[
         for number, factor in enumerate(factors):
             k = int(off[:, branch, number].argmin())
             if off[k, branch, number] < NEAR:
-                idle = np.abs(np.linalg.svd(jacobian(arm, q[k, branch]))[2][-1]) / arm.limit("speed")
+                idle = np.abs(np.linalg.svd(jacobian(arm, q[k, branch]))[2][-1]) / arm.limits.speed
                 found |= {(factor.name, j + 1) for j in np.flatnonzero(idle > BLAMED * idle.max())}
     return found
 
@@ -150,7 +150,7 @@ def test_the_singularity_and_a_joint_to_blame_are_named(name: str, factor: str, 
     """
     fast = compile_arm(load_arm(name))
     arm, causes = fast.arm, Counter[str]()
-    lower, upper = arm.limit("lower"), arm.limit("upper")
+    lower, upper = arm.limits.lower, arm.limits.upper
     for q, A, B in lines_past(arm, factor, rng):
         deviation = 10 ** rng.uniform(-4.5, -3)
         error = refused(fast, q, B, deviation)

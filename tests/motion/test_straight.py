@@ -33,7 +33,7 @@ def fast(request: pytest.FixtureRequest) -> CompiledArm:
 
 def random_line(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
     """Return a configuration inside the limits, and a pose up to half a metre and a radian away."""
-    lower, upper = arm.limit("lower"), arm.limit("upper")
+    lower, upper = arm.limits.lower, arm.limits.upper
     q = rng.uniform(0.8 * lower + 0.2 * upper, 0.2 * lower + 0.8 * upper)
     X = forward(arm, q).copy()
     X[:3, 3] += rng.normal(size=3) * 0.2
@@ -124,16 +124,16 @@ def test_limits_hold_between_samples(fast: CompiledArm) -> None:
         except PathError:
             continue
         motion = line.trajectory
-        assert (motion.peaks(1) <= arm.limit("speed") * (1 + ROUNDING)).all()
-        assert (motion.peaks(2) <= arm.limit("acceleration") * (1 + ROUNDING)).all()
+        assert (motion.peaks(1) <= arm.limits.speed * (1 + ROUNDING)).all()
+        assert (motion.peaks(2) <= arm.limits.acceleration * (1 + ROUNDING)).all()
         lowest, highest = motion.extremes(0)
-        assert (lowest >= arm.limit("lower") - ROUNDING).all()
-        assert (highest <= arm.limit("upper") + ROUNDING).all()
+        assert (lowest >= arm.limits.lower - ROUNDING).all()
+        assert (highest <= arm.limits.upper + ROUNDING).all()
         np.testing.assert_allclose(line.certificate.peaks["speed"], motion.peaks(1), rtol=1e-9)
         np.testing.assert_allclose(line.certificate.peaks["acceleration"], motion.peaks(2), rtol=1e-9)
         t = np.linspace(0, motion.duration, 500)
         tau = np.abs(inverse_dynamics(arm, motion(t), motion(t, 1), motion(t, 2)))
-        assert (tau.max(axis=0) <= arm.limit("effort") * (1 + 1e-3)).all()
+        assert (tau.max(axis=0) <= arm.limits.effort * (1 + 1e-3)).all()
 
 
 def test_the_ends() -> None:

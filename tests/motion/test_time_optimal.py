@@ -28,7 +28,7 @@ from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.motion.xspline_path import xspline
 
 PUMA = load_arm("puma560-seed")
-SPEED, ACCELERATION, EFFORT = (PUMA.limit(name) for name in ("speed", "acceleration", "effort"))
+SPEED, ACCELERATION, EFFORT = PUMA.limits.speed, PUMA.limits.acceleration, PUMA.limits.effort
 ROUNDING = 1e-9
 # The part of the time that a grid of 300 intervals costs.
 GRID = 7e-3
@@ -86,9 +86,9 @@ def limits_hold(arm: Arm, run: Trajectory) -> bool:
     t = np.linspace(0, run.duration, 20001)[1:-1]
     tau = inverse_dynamics(arm, run(t), run(t, 1), run(t, 2))
     return bool(
-        (np.abs(run(t, 1)) <= arm.limit("speed") * (1 + ROUNDING)).all()
-        and (np.abs(run(t, 2)) <= arm.limit("acceleration") * (1 + ROUNDING)).all()
-        and (np.abs(tau) <= arm.limit("effort") * (1 + SEEN)).all()
+        (np.abs(run(t, 1)) <= arm.limits.speed * (1 + ROUNDING)).all()
+        and (np.abs(run(t, 2)) <= arm.limits.acceleration * (1 + ROUNDING)).all()
+        and (np.abs(tau) <= arm.limits.effort * (1 + SEEN)).all()
     )
 
 
@@ -181,7 +181,7 @@ def test_limits_hold_between_the_grid_points(rng: np.random.Generator) -> None:
         found = time_optimal(PUMA, path, intervals=(30, 120)[k % 2])
 
         assert limits_hold(PUMA, found.trajectory)
-        uses = [(peak / PUMA.limit(name)).max() for name, peak in found.peaks.items()]
+        uses = [(peak / getattr(PUMA.limits, name)).max() for name, peak in found.peaks.items()]
         assert max(uses) == pytest.approx(1, abs=2e-3)
         assert found.factor < 1.02
 

@@ -52,7 +52,7 @@ def test_point_to_point_uses_its_limits() -> None:
     arm = load_arm("puma560-seed")
     for goal in ([1, 0.5, -1, 1, 1, 2], [0.01, 0, 0, 0, 0, 0.002]):
         fast, slow = (point_to_point(arm, np.zeros(6), goal, speed) for speed in (120, 60))
-        use = max((fast.peaks(1) / arm.limit("speed")).max(), (fast.peaks(2) / arm.limit("acceleration")).max())
+        use = max((fast.peaks(1) / arm.limits.speed).max(), (fast.peaks(2) / arm.limits.acceleration).max())
 
         assert use == pytest.approx(1, abs=1e-9)
         assert slow.duration == pytest.approx(2 * fast.duration)

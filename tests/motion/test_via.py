@@ -62,13 +62,13 @@ def reached(arm: Arm, q: Array, X: Array, Y: Array) -> bool:
     if arm.n <= 6:
         return bool(inverse(arm, Y).allowed)
     found, off = chain(solver_of(arm), np.stack([X, Y]), q)
-    return off is None and bool(((found >= arm.limit("lower")) & (found <= arm.limit("upper"))).all())
+    return off is None and bool(((found >= arm.limits.lower) & (found <= arm.limits.upper)).all())
 
 
 def random_way(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
     """A configuration, and poses from there past 1 to 6 others; half of the ways turn the hand."""
     vias, turning = int(rng.integers(1, 7)), bool(rng.integers(2))
-    lower, upper = np.maximum(arm.limit("lower"), -3.0), np.minimum(arm.limit("upper"), 3.0)
+    lower, upper = np.maximum(arm.limits.lower, -3.0), np.minimum(arm.limits.upper, 3.0)
     while True:
         q = rng.uniform(lower, upper)
         X = [forward(arm, q)]
@@ -130,7 +130,7 @@ def test_random_ways_are_smooth_and_never_slower(name: str, sample: Sample) -> N
         if continuity(run).order < 2 and "stop" not in stage.slowed:
             found.append("the acceleration jumps")
         for name_of, order in (("speed", 1), ("acceleration", 2)):
-            if (run.peaks(order) > arm.limit(name_of) * (1 + ROUNDING)).any():
+            if (run.peaks(order) > getattr(arm.limits, name_of) * (1 + ROUNDING)).any():
                 found.append(f"a limit of {name_of} is passed")
         slowest = max(slowest, run.duration / lasting)
         hand = forward(arm, run(np.linspace(0, run.duration, LOOKS)))

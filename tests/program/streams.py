@@ -61,7 +61,7 @@ def _of_arm(recording: Recording, name: str, rows: list[list[str]]) -> Differenc
     found, off = [], 0.0
     for order, value, slope in ((1, q, qd), (2, qd, qdd)):
         rate = np.diff(value, axis=0) / period
-        limit = arm.limit(("speed", "acceleration")[order - 1])
+        limit = (arm.limits.speed, arm.limits.acceleration)[order - 1]
         found.append(float(max((np.abs(rate) / limit).max(initial=0.0), (np.abs(slope) / limit).max())))
         away = np.abs(rate - (slope[1:] + slope[:-1]) / 2)
         # What changes from one row to the next changes within the tick too; only where that is not enough, look closer.
@@ -99,4 +99,4 @@ def share_at_stop(recording: Recording, stage: RunStage) -> float:
     ticks = np.arange(round(stage.duration / period) + 1) * period
     left = np.abs(stage.motion(ticks) - planned(ticks)).max(axis=1) > _LEFT
     last = ticks[max(0, int(left.argmax()) - 1)] if left.any() else 0.0
-    return float((np.abs(planned(last, 1)) / arm.limit("speed")).max())
+    return float((np.abs(planned(last, 1)) / arm.limits.speed).max())

@@ -36,7 +36,7 @@ def test_a_move_in_an_action_begins_at_rest(action: str) -> None:
     np.testing.assert_allclose(recording.tree.world("ARM_1"), G, atol=EXACT)
     (stream,) = recording.streams
     arm = recording.cell.arms["ARM_1"].arm
-    assert (np.abs(np.diff(stream.q, axis=0)) <= AT_MOST * arm.limit("speed") * recording.cell.period).all()
+    assert (np.abs(np.diff(stream.q, axis=0)) <= AT_MOST * arm.limits.speed * recording.cell.period).all()
     at = round(moves[1].t0 / recording.cell.period)
     assert np.abs(stream.q[at] - stream.q[at - 1]).max() < np.abs(np.diff(stream.q, axis=0)).max() / 10
 

@@ -137,10 +137,10 @@ def test_a_stage_like_any_other(by: Around) -> None:
     assert motion.duration / period == pytest.approx(round(motion.duration / period), abs=1e-9)
     np.testing.assert_allclose(hand(recording, line)[-1, :3, 3], BOTTOM, atol=2e-6)
     lowest, highest = motion.extremes(0)
-    assert (lowest >= arm.limit("lower")).all()
-    assert (highest <= arm.limit("upper")).all()
-    assert (motion.peaks(1) <= arm.limit("speed") * (1 + 1e-9)).all()
-    assert (motion.peaks(2) <= arm.limit("acceleration") * (1 + 1e-9)).all()
+    assert (lowest >= arm.limits.lower).all()
+    assert (highest <= arm.limits.upper).all()
+    assert (motion.peaks(1) <= arm.limits.speed * (1 + 1e-9)).all()
+    assert (motion.peaks(2) <= arm.limits.acceleration * (1 + 1e-9)).all()
 
 
 def test_no_way_round_where_none_is_needed() -> None:

@@ -132,7 +132,7 @@ def test_positions_have_no_jump(twelve: Recording) -> None:
     (s,) = twelve.streams
     arm = twelve.cell.arms["ARM_1"].arm
 
-    assert (np.abs(np.diff(s.q, axis=0)) <= arm.limit("speed") * twelve.cell.period * (1 + 1e-9)).all()
+    assert (np.abs(np.diff(s.q, axis=0)) <= arm.limits.speed * twelve.cell.period * (1 + 1e-9)).all()
     np.testing.assert_allclose(np.diff(s.t), twelve.cell.period, atol=1e-12)
 
 
@@ -193,9 +193,9 @@ def test_no_joint_beyond_its_limits(twelve: Recording) -> None:
     (s,) = twelve.streams
     arm = twelve.cell.arms["ARM_1"].arm
 
-    assert ((s.q >= arm.limit("lower") - 1e-9) & (s.q <= arm.limit("upper") + 1e-9)).all()
-    assert (np.abs(s.qd) <= arm.limit("speed") * (1 + 1e-9)).all()
-    assert (np.abs(s.qdd) <= arm.limit("acceleration") * (1 + 1e-9)).all()
+    assert ((s.q >= arm.limits.lower - 1e-9) & (s.q <= arm.limits.upper + 1e-9)).all()
+    assert (np.abs(s.qd) <= arm.limits.speed * (1 + 1e-9)).all()
+    assert (np.abs(s.qdd) <= arm.limits.acceleration * (1 + 1e-9)).all()
 
 
 def test_efforts_are_the_inverse_dynamics_of_the_row(twelve: Recording) -> None:

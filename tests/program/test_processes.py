@@ -240,7 +240,7 @@ def test_halt_stops_everything() -> None:
     assert np.abs(np.diff(stream.qd, axis=0)).max() < 0.1
     hand = recording.tree.world("ARM_2")[:3, 3]
     assert 0.01 < np.linalg.norm(hand - down(0.70, 0.15, 0.20)[:3, 3]) < 0.2
-    limit = cell.arms["ARM_2"].arm.limit("acceleration")
+    limit = cell.arms["ARM_2"].arm.limits.acceleration
     assert (np.abs(stream.qdd).max(axis=0) <= limit * (1 + 1e-6)).all()
 
 

@@ -228,7 +228,7 @@ def test_guard_stops_in_a_controlled_way() -> None:
     (line,) = printed(recording)
     assert 0.001 < float(line) < 0.08
     (s,) = recording.streams
-    limit = recording.cell.arms["ARM_1"].arm.limit("acceleration")
+    limit = recording.cell.arms["ARM_1"].arm.limits.acceleration
     assert (np.abs(s.qdd).max(axis=0) <= limit * (1 + 1e-6)).all()
     jump = np.abs(np.diff(s.qd, axis=0))
     assert (jump <= 1.01 * limit * recording.cell.period).all()

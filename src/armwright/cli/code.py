@@ -1,16 +1,12 @@
 """``armwright code``: the intermediate code of a program, as a listing or as assembly text."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from armwright.cli.programs import CODE_SUFFIX, CellFile, Std, Strict
-from armwright.errors import ExitStatus
+from armwright.cli.programs import CellFile, Std, Strict
 from armwright.program.language.words import Standard
-
-if TYPE_CHECKING:
-    from armwright.program.bytecode.instructions import Code
 
 
 def code(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -30,36 +26,23 @@ def code(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright code examples/bench.rlo -o out/bench.rlc`
     """
+    from armwright.cli.programs import print_diagnostics, read_cell_option
     from armwright.cli.terminal import print_verbatim
     from armwright.files.output import write_file
+    from armwright.program import ProgramError
+    from armwright.program.api import load
     from armwright.program.bytecode.assembler import assembly
     from armwright.program.bytecode.instructions import listing
 
-    loaded = load_code(program, cell, strict=strict, std=std)
+    try:
+        loaded = load(program, read_cell_option(cell), strict=strict, std=std)
+    except ProgramError as error:
+        print_diagnostics(error.compilation.diagnostics, error.compilation.source, to_errors=True)
+        raise typer.Exit(error.exit_status) from None
+    if loaded.diagnostics:
+        print_diagnostics(loaded.diagnostics, loaded.code.source, to_errors=True)
     if output is not None:
-        write_file(output, assembly(loaded))
+        write_file(output, assembly(loaded.code))
         print(f"code: {output}")
     else:
-        print_verbatim(assembly(loaded) if full else listing(loaded))
-
-
-def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> "Code":
-    """Return the code of a program or of a file of code; diagnostics go to the error output.
-
-    Raises:
-        FileFormatError: the file cannot be read, or its code is invalid.
-        typer.Exit: the program has errors.
-    """
-    from armwright.cli.programs import print_diagnostics, read_cell_option
-    from armwright.files.inputs import read_program
-    from armwright.program import compile as compile_program
-    from armwright.program.bytecode.assembler import assemble
-
-    if path.suffix == CODE_SUFFIX:
-        return assemble(read_program(path), str(path))
-    compiled = compile_program(path, read_cell_option(cell), strict=strict, std=std)
-    if compiled.diagnostics:
-        print_diagnostics(compiled.diagnostics, compiled.source, to_errors=True)
-    if compiled.code is None:
-        raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
-    return compiled.code
+        print_verbatim(assembly(loaded.code) if full else listing(loaded.code))

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.programs import CODE_SUFFIX, CellFile, Std, Strict
-from armwright.errors import ExitStatus
+from armwright.cli.programs import CellFile, Std, Strict
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.program.debugger.dap_session import LaunchRequest, LoadedProgram
+    from armwright.program.api import LoadedProgram
+    from armwright.program.debugger.dap_session import LaunchRequest
     from armwright.program.vm.recording import Recording
 
 
@@ -38,16 +38,21 @@ def debug(
         _serve()
         return
     from armwright.cli.debug_terminal import Terminal
-    from armwright.program.debugger.dap_session import LaunchRequest, LoadError
+    from armwright.program import ProgramError
+    from armwright.program.debugger.dap_session import LaunchRequest, MissingCellError
+    from armwright.program.diagnostics.render import render
 
     launch = LaunchRequest(
         program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False, strict=strict
     )
     try:
         loaded = load(launch)
-    except LoadError as error:
-        print(error.page, end="")
-        raise typer.Exit(error.status) from None
+    except ProgramError as error:
+        print(render(error.compilation.diagnostics, error.compilation.source), end="")
+        raise typer.Exit(error.exit_status) from None
+    except MissingCellError as error:
+        print(error)
+        raise typer.Exit(error.exit_status) from None
     if status := Terminal(loaded).run():
         raise typer.Exit(status)
 
@@ -67,44 +72,29 @@ def _serve() -> None:
 
 
 def load(launch: "LaunchRequest") -> "LoadedProgram":
-    """Return the compiled program of a session with its cell.
+    """Return the compiled program of a session with its cell; without one, the only cell beside the program is used.
 
     Raises:
-        LoadError: the program has errors, or no cell to run in.
+        ProgramError: the program has errors.
+        MissingCellError: the program has no cell to run in.
         FileFormatError: a file cannot be read.
     """
-    from armwright.cli.programs import imported_files, read_cell_option
+    from armwright.cli.programs import read_cell_option
     from armwright.files.inputs import read_program
-    from armwright.program import compile as compile_program
-    from armwright.program.bytecode.assembler import assemble
-    from armwright.program.debugger.dap_session import LoadedProgram, LoadError
-    from armwright.program.diagnostics.render import render
-    from armwright.program.language.diagnostic import count_line
+    from armwright.program import api
+    from armwright.program.debugger.dap_session import MissingCellError
     from armwright.program.language_server.cell_lookup import CellCache
 
-    cell = read_cell_option(launch.cell)
-    if launch.program.suffix == CODE_SUFFIX:
-        if cell is None:
-            message = f"{launch.program.name} needs a cell to run in"
-            raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
-        return LoadedProgram(
-            code=assemble(read_program(launch.program), str(launch.program)), cell=cell, is_code_file=True
-        )
-    if cell is None:
-        nearby = CellCache().find_cell(launch.program.parent, read_program(launch.program), None)
+    path, cell = launch.program, read_cell_option(launch.cell)
+    is_code_file = path.suffix == api.CODE_SUFFIX
+    if cell is None and not is_code_file:
+        nearby = CellCache().find_cell(path.parent, read_program(path), None)
         cell = None if nearby is None else nearby.cell
-    compiled = compile_program(launch.program, cell, strict=launch.strict, std=launch.std)
-    if compiled.code is None:
-        raise LoadError(
-            count_line(compiled.diagnostics, compiled.source), render(compiled.diagnostics, compiled.source)
-        )
-    if compiled.cell is None:
-        message = (
-            f"{launch.program.name} needs a cell to run in: it IMPORTs none, and its folder does not have exactly one"
-        )
-        raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
-    imports = imported_files(launch.program, compiled)
-    return LoadedProgram(code=compiled.code, cell=compiled.cell, diagnostics=compiled.diagnostics, imports=imports)
+    loaded = api.load(path, cell, strict=launch.strict, std=launch.std)
+    if loaded.cell is None:
+        reason = "" if is_code_file else ": it IMPORTs none, and its folder does not have exactly one"
+        raise MissingCellError(f"{path.name} needs a cell to run in{reason}")
+    return loaded
 
 
 def save(launch: "LaunchRequest", loaded: "LoadedProgram", recording: "Recording") -> str:
@@ -113,9 +103,8 @@ def save(launch: "LaunchRequest", loaded: "LoadedProgram", recording: "Recording
     Raises:
         OutputError: the folder cannot be written.
     """
-    from armwright.files.output import write_folder
-    from armwright.program.vm.interpreter import motion_warnings
-    from armwright.report.files import Origin, result_files, run_record
+    from armwright.program.vm.interpreter import run_diagnostics
+    from armwright.report.files import Origin, write_run
 
     assert launch.output is not None  # noqa: S101 - the session calls this only with an output
     origin = Origin(
@@ -125,8 +114,5 @@ def save(launch: "LaunchRequest", loaded: "LoadedProgram", recording: "Recording
         command="armwright debug",
         options={"std": launch.std.value, "strict": launch.strict},
     )
-    failed = () if recording.failure is None else (recording.failure.diagnostic,)
-    diagnostics = (*loaded.diagnostics, *motion_warnings(recording.stages, recording.cell), *failed)
-    results = (recording, diagnostics, origin)
-    write_folder(launch.output, result_files(*results), run_record(*results))
-    return f"report{' up to the failure' if failed else ''}: {launch.output / 'report.html'}"
+    write_run(launch.output, recording, (*loaded.diagnostics, *run_diagnostics(recording)), origin)
+    return f"report{' up to the failure' if recording.failure else ''}: {launch.output / 'report.html'}"

@@ -11,7 +11,7 @@ from armwright.cli.repl_lines import Script
 from armwright.errors import ArmwrightError, ExitStatus, shortened
 
 if TYPE_CHECKING:
-    from armwright.program.debugger.dap_session import LoadedProgram
+    from armwright.program.api import LoadedProgram
     from armwright.program.debugger.debugger import Command
     from armwright.program.debugger.history import ProcessPath
     from armwright.program.debugger.stop_reason import Stop
@@ -58,6 +58,7 @@ class Terminal:
         from armwright.program.debugger.debugger import Debugger
 
         self._loaded = loaded
+        assert loaded.cell is not None  # noqa: S101 - a program without a cell is not loaded
         self._debugger = Debugger(loaded.code, loaded.cell)
         self._path: ProcessPath = ()
         self._last, self._script = "", Script()

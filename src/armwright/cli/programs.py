@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from armwright.program import Compilation, Source
     from armwright.program.language.diagnostic import Diagnostic
 
-# Suffix of a file of intermediate code.
-CODE_SUFFIX = ".rlc"
-
 ProgramFiles: TypeAlias = Annotated[
     list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
 ]
@@ -42,14 +39,6 @@ def read_cell_option(path: Path | None) -> "Cell | None":
     from armwright.cell.reader import read_cell
 
     return None if path is None else read_cell(path)
-
-
-def imported_files(program: Path, compiled: "Compilation") -> tuple[Path, ...]:
-    """Return the files that a program imports."""
-    from armwright.program.syntax import tree
-
-    imports = (node for node in compiled.tree.headers if isinstance(node, tree.Import))
-    return tuple(program.parent / node.path.value for node in imports)
 
 
 def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, to_errors: bool = False) -> None:

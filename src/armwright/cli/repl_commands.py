@@ -185,12 +185,10 @@ class Commands:
         return Reply(lines=(f"report: {folder / 'report.html'}",))
 
     def _report(self, folder: Path) -> None:
-        from armwright.cli.programs import imported_files
-        from armwright.files.output import write_folder
         from armwright.program import Source, compile as compile_program, run
-        from armwright.program.api import import_reader
-        from armwright.program.vm.interpreter import motion_warnings
-        from armwright.report.files import Origin, result_files, run_record
+        from armwright.program.api import import_reader, imported_files
+        from armwright.program.vm.interpreter import run_diagnostics
+        from armwright.report.files import Origin, write_run
 
         session, program = self._session, folder / _PROGRAM
         text = self._program(program)
@@ -198,7 +196,6 @@ class Commands:
             Source(program.name, text), session.state.cell, std=session.std, read_import=import_reader(folder)
         )
         recording = run(compiled)
-        diagnostics = (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell))
         command = ["armwright", "run", str(program), *(["--cell", str(self._cell)] if self._cell else [])]
         origin = Origin(
             program=program,
@@ -208,8 +205,7 @@ class Commands:
             options={"std": session.std.value},
             text=text,
         )
-        results = (recording, diagnostics, origin)
-        write_folder(folder, {_PROGRAM: text, **result_files(*results)}, run_record(*results))
+        write_run(folder, recording, (*compiled.diagnostics, *run_diagnostics(recording)), origin)
 
 
 @attrs.frozen(kw_only=True)

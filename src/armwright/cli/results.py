@@ -3,19 +3,18 @@
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from armwright.files.output import Content
 
 
-def write_results(folder: Path, files: "Mapping[str, Content]", record: Mapping[str, Any] | None = None) -> None:
-    """Write the results of a command into a folder, either all of them or none.
+def write_results(folder: Path, files: "Mapping[str, Content]") -> None:
+    """Write the results of a command into a folder, either all of them or none; the record has command and version.
 
     Args:
         folder: the folder; it is created where it is missing.
         files: contents by name of file.
-        record: content of ``run.json``; the default is the command and the version.
 
     Raises:
         OutputError: the folder or a file cannot be written; the message names it with the reason.
@@ -24,8 +23,7 @@ def write_results(folder: Path, files: "Mapping[str, Content]", record: Mapping[
     from armwright.files.output import write_folder
     from armwright.version import __version__
 
-    own = {"command": command_line(), "versions": {"armwright": __version__}}
-    write_folder(folder, files, own if record is None else record)
+    write_folder(folder, files, {"command": command_line(), "versions": {"armwright": __version__}})
 
 
 def warn_of_stray(path: Path) -> None:

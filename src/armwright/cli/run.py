@@ -9,7 +9,7 @@ import typer
 from armwright.cli.numbers import within
 from armwright.cli.options import Json, OutputFolder, QuietButWarnings
 from armwright.cli.output import command_line, print_json, print_result, print_result_table
-from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, read_cell_option
+from armwright.cli.programs import CellFile, ProgramFile, Std, Strict, read_cell_option
 from armwright.cli.progress import waiting
 from armwright.errors import ExitStatus
 from armwright.program.language.words import Standard
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from armwright.cell.model import Cell
-    from armwright.program import Source
+    from armwright.program import Compilation
     from armwright.program.bytecode.instructions import Code
     from armwright.program.language.diagnostic import Diagnostic
     from armwright.program.vm.interpreter import Limits, RunError
@@ -74,17 +74,24 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
     from armwright.cli.results import warn_of_stray
+    from armwright.program import ProgramError
+    from armwright.program.api import load
     from armwright.program.vm.interpreter import Limits, RunError
     from armwright.report.files import Origin
 
     warn_of_stray(program)
-    option_cell = read_cell_option(cell)
-    code, used_cell, diagnostics, imports = _compiled(program, option_cell, strict=strict, std=std, as_json=as_json)
-    used_cell = _adjusted(used_cell, servo_ms, deviation_mm, around)
+    try:
+        loaded = load(program, read_cell_option(cell), strict=strict, std=std)
+    except ProgramError as wrong:
+        _refuse(wrong.compilation, as_json=as_json)
+    if loaded.cell is None:
+        text = f"missing: {program} needs a cell to run in, and IMPORTs none; try examples/stanford_cell.toml"
+        raise typer.BadParameter(text, param_hint="--cell")
+    used_cell = _adjust_cell(loaded.cell, servo_ms, deviation_mm, around)
     limits = Limits(steps=max_steps, time=max_time)
     error: RunError | None = None
     try:
-        recording = _interpret(code, used_cell, limits, watched=not (quiet or as_json))
+        recording = _interpret(loaded.code, used_cell, limits, watched=not (quiet or as_json))
     except RunError as stopped:
         if stopped.recording is None:
             raise
@@ -98,9 +105,14 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         "strict": strict,
     }
     origin = Origin(
-        program=program, cell=cell, imports=imports, command=command_line(), options=options, motion_rows=most_rows
+        program=program,
+        cell=cell,
+        imports=loaded.imports,
+        command=command_line(),
+        options=options,
+        motion_rows=most_rows,
     )
-    _finish(recording, diagnostics, origin, output, error, as_json=as_json, quiet=quiet)
+    _finish(recording, loaded.diagnostics, origin, output, error, as_json=as_json, quiet=quiet)
 
 
 def _finish(
@@ -115,21 +127,18 @@ def _finish(
 ) -> None:
     """Write and print the results of a run, also of one that failed."""
     from armwright.cli.programs import print_diagnostics
-    from armwright.cli.results import write_results
     from armwright.cli.terminal import console
     from armwright.program.vm.excerpt import EVENT_LOG_HINT, NO_EVENT_LOG_HINT
-    from armwright.program.vm.interpreter import motion_warnings
-    from armwright.report.files import left_out, result_files, run_record
+    from armwright.program.vm.interpreter import run_diagnostics
+    from armwright.report.files import left_out, write_run
     from armwright.report.run_summary import RunSummary, frame_table
 
-    failed = () if error is None else (error.diagnostic,)
-    diagnostics = (*compiler_diagnostics, *motion_warnings(recording.stages, recording.cell), *failed)
+    diagnostics = (*compiler_diagnostics, *run_diagnostics(recording))
     hint = EVENT_LOG_HINT if output else NO_EVENT_LOG_HINT
     result = RunSummary(recording=recording, diagnostics=diagnostics, hint=hint)
     notes = left_out(recording, origin.motion_rows) if output is not None else ()
     if output is not None:
-        results = (recording, diagnostics, origin)
-        write_results(output, result_files(*results), run_record(*results))
+        write_run(output, recording, diagnostics, origin)
     if as_json:
         folder = {"output": str(output)} if output else {}
         frames = {"time": error.time, "frames": _frame_positions(error)} if error else {}
@@ -149,33 +158,7 @@ def _finish(
         raise typer.Exit(error.exit_status)
 
 
-def _compiled(
-    program: Path, cell: "Cell | None", *, strict: bool, std: Standard, as_json: bool
-) -> "tuple[Code, Cell, tuple[Diagnostic, ...], tuple[Path, ...]]":
-    """Return the code of a program, its cell, its diagnostics, and the files that it imports."""
-    from armwright.cli.programs import imported_files
-    from armwright.files.inputs import read_program
-    from armwright.program import compile as compile_program
-    from armwright.program.bytecode.assembler import assemble
-
-    if program.suffix == CODE_SUFFIX:
-        if cell is None:
-            _refuse_without_cell(program)
-        return assemble(read_program(program), str(program)), cell, (), ()
-    compiled = compile_program(program, cell, strict=strict, std=std)
-    if compiled.code is None:
-        _refuse(compiled.source, compiled.diagnostics, as_json=as_json)
-    if compiled.cell is None:
-        _refuse_without_cell(program)
-    return compiled.code, compiled.cell, compiled.diagnostics, imported_files(program, compiled)
-
-
-def _refuse_without_cell(program: Path) -> NoReturn:
-    text = f"missing: {program} needs a cell to run in, and IMPORTs none; try examples/stanford_cell.toml"
-    raise typer.BadParameter(text, param_hint="--cell")
-
-
-def _adjusted(cell: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
+def _adjust_cell(cell: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
     import attrs
 
     from armwright.cell.reader import DETOURS, DEVIATION_MM, SERVO_MS
@@ -206,11 +189,12 @@ def _interpret(code: "Code", cell: "Cell", limits: "Limits", *, watched: bool) -
         return interpret(code, cell, simulator, show, limits=limits)
 
 
-def _refuse(source: "Source", diagnostics: "Sequence[Diagnostic]", *, as_json: bool) -> NoReturn:
+def _refuse(compiled: "Compilation", *, as_json: bool) -> NoReturn:
     """Print the diagnostics of a program with errors, and end the command."""
     from armwright.cli.programs import error_data, print_diagnostics
     from armwright.program.language.diagnostic import to_json
 
+    source, diagnostics = compiled.source, compiled.diagnostics
     if as_json:
         rows = [to_json(diagnostic, source) for diagnostic in diagnostics]
         print_json({**error_data(diagnostics, source), "program": source.name, "diagnostics": rows})

@@ -15,11 +15,12 @@ from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, counted
 from armwright.files.inputs import read_program, regular_file
 from armwright.files.limits import limit, limit_message
+from armwright.program.bytecode.assembler import assemble
 from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis import analysis
 from armwright.program.flow_analysis.analysis import Flow
-from armwright.program.language.diagnostic import Diagnostic, in_order
+from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.semantics import check
@@ -27,11 +28,14 @@ from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadIm
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
 from armwright.program.vm.interpreter import Progress, interpret
 from armwright.program.vm.machine import Limits
 from armwright.program.vm.recording import Recording
+
+# Suffix of a file of intermediate code.
+CODE_SUFFIX = ".rlc"
 
 
 @attrs.frozen(kw_only=True)
@@ -68,6 +72,25 @@ class Compilation:
     cell: Cell | None = None
     known: KnownCell | None = None
     strict: bool = False
+
+
+@attrs.frozen(kw_only=True)
+class LoadedProgram:
+    """The code of a program that was read from a file, with what is needed to run it.
+
+    Attributes:
+        code: the intermediate code.
+        cell: what it runs in; None where none was specified and none is imported.
+        diagnostics: warnings of the compiler.
+        imports: the files that the program imports.
+        is_code_file: whether the file holds intermediate code, and not the text of the program.
+    """
+
+    code: Code
+    cell: Cell | None
+    diagnostics: tuple[Diagnostic, ...] = ()
+    imports: tuple[Path, ...] = ()
+    is_code_file: bool = False
 
 
 class ProgramError(ArmwrightError, ValueError):
@@ -168,6 +191,37 @@ def run(
     return interpret(compiled.code, compiled.cell, hardware, progress=progress, limits=limits)
 
 
+def load(
+    path: Path, cell: Cell | None = None, *, strict: bool = False, std: Standard = Standard.RLO_2
+) -> LoadedProgram:
+    """Compile the program in a file, or read a file of intermediate code.
+
+    Args:
+        path: of the file; the suffix ``.rlc`` denotes intermediate code.
+        cell: what the program acts on; without one, the first that it IMPORTs and that has arms.
+        strict: whether an AFFIX that is only implied is an error.
+        std: the language that the program is written in.
+
+    Raises:
+        FileFormatError: the file cannot be read, or is not text.
+        CodeError: the intermediate code is invalid.
+        ProgramError: the program has errors.
+    """
+    if path.suffix == CODE_SUFFIX:
+        return LoadedProgram(code=assemble(read_program(path), str(path)), cell=cell, is_code_file=True)
+    compiled = compile(path, cell, strict=strict, std=std)
+    if compiled.code is None:
+        raise ProgramError(compiled)
+    imports = imported_files(path, compiled)
+    return LoadedProgram(code=compiled.code, cell=compiled.cell, diagnostics=compiled.diagnostics, imports=imports)
+
+
+def imported_files(program: Path, compiled: Compilation) -> tuple[Path, ...]:
+    """Return the paths of the files that a program imports."""
+    imports = (node for node in compiled.tree.headers if isinstance(node, tree.Import))
+    return tuple(program.parent / node.path.value for node in imports)
+
+
 def import_reader(folder: Path) -> ReadImport:
     """Return what reads the files that a program of this folder IMPORTs."""
 
@@ -238,7 +292,7 @@ def _check_names(
     source: Source, cell: Cell | KnownCell | None, *, strict: bool, std: Standard, read_import: ReadImport | None
 ) -> Compilation:
     """Return a program with its syntax, names and types checked."""
-    text, diagnostics = without_numbers(source)
+    text, diagnostics = blank_line_numbers(source)
     scanned = scan(source, text, std)
     program, syntax_errors = parse(source, scanned.tokens, std)
     if read_import is not None:
@@ -259,7 +313,7 @@ def _check_names(
         symbols=symbols,
         imports=imports,
         flow=None,
-        diagnostics=in_order(diagnostics),
+        diagnostics=sort_diagnostics(diagnostics),
         code=None,
         cell=add_imported_frames(cell, imports) if isinstance(cell, Cell) else None,
         known=known,
@@ -279,7 +333,7 @@ def analyse_flow(compiled: Compilation) -> Compilation:
         flow, diagnostics = analysis.check(
             compiled.tree, compiled.symbols, _name_spellings(compiled), known, strict=strict, source=source
         )
-    return attrs.evolve(compiled, flow=flow, diagnostics=in_order((*compiled.diagnostics, *diagnostics)))
+    return attrs.evolve(compiled, flow=flow, diagnostics=sort_diagnostics((*compiled.diagnostics, *diagnostics)))
 
 
 def _generate_code(compiled: Compilation) -> Compilation:

@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.errors import ExitStatus
 from armwright.files.inputs import hash_of_read_file
-from armwright.files.output import sha256
+from armwright.files.output import sha256, write_folder
 from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
@@ -52,6 +52,23 @@ class Origin:
     options: Mapping[str, Any]
     motion_rows: int = MOTION_ROWS
     text: str | None = None
+
+
+def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnostic], origin: Origin) -> None:
+    """Write the files of a run and its record into a folder, all of them or none.
+
+    Args:
+        folder: the folder; it is created where it is missing.
+        recording: the recording of the run.
+        diagnostics: diagnostics of compilation and run, with the error that ended it.
+        origin: the inputs of the run; a program that was not read from a file is written too.
+
+    Raises:
+        OutputError: the folder or a file cannot be written.
+    """
+    program = {} if origin.text is None else {origin.program.name: origin.text}
+    files = {**program, **result_files(recording, diagnostics, origin)}
+    write_folder(folder, files, run_record(recording, diagnostics, origin))
 
 
 def result_files(
@@ -160,8 +177,8 @@ def _stage(run: RunStage, recording: Recording) -> dict[str, Any]:
         "peak_speed": _numbers(motion.peaks(1)),
         "peak_acceleration": _numbers(motion.peaks(2)),
         "peak_effort": _numbers(run.peak_effort),
-        "speed_of_limit": _numbers(motion.peaks(1) / arm.limit("speed")),
-        "effort_of_limit": _numbers(run.peak_effort / arm.limit("effort")),
+        "speed_of_limit": _numbers(motion.peaks(1) / arm.limits.speed),
+        "effort_of_limit": _numbers(run.peak_effort / arm.limits.effort),
     }
 
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import attrs
 
-from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError, ExitStatus
-from armwright.program.bytecode.instructions import Code
+from armwright.program.api import LoadedProgram, ProgramError
 from armwright.program.debugger.breakpoints import Breakpoint
 from armwright.program.debugger.dap_messages import Arguments, RequestError
 from armwright.program.debugger.debugger import Command, Debugger
@@ -17,7 +16,7 @@ from armwright.program.debugger.history import ProcessPath
 from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Variable
 from armwright.program.diagnostics.render import render
-from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.diagnostic import summary_line
 from armwright.program.language.position_codec import UTF_16, PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
@@ -55,39 +54,10 @@ class LaunchRequest:
     strict: bool = False
 
 
-@attrs.frozen(kw_only=True)
-class LoadedProgram:
-    """A program that can run.
+class MissingCellError(ArmwrightError, ValueError):
+    """A program has no cell to run in."""
 
-    Attributes:
-        code: the program.
-        cell: what it runs in.
-        diagnostics: warnings.
-        imports: the files that it imports.
-        is_code_file: whether it was read from a file of code, which holds the text of the program and is not that text.
-    """
-
-    code: Code
-    cell: Cell
-    diagnostics: Sequence[Diagnostic] = ()
-    imports: Sequence[Path] = ()
-    is_code_file: bool = False
-
-
-class LoadError(ArmwrightError, ValueError):
-    """A program cannot run.
-
-    Attributes:
-        page: all that is wrong with it, with the lines.
-        status: with which a command ends.
-    """
-
-    exit_status = ExitStatus.PROGRAM_ERRORS
-
-    def __init__(self, message: str, page: str, status: ExitStatus = ExitStatus.PROGRAM_ERRORS) -> None:
-        """Keep both texts and the exit status."""
-        super().__init__(message)
-        self.page, self.status = page, status
+    exit_status = ExitStatus.USAGE
 
 
 Load = Callable[[LaunchRequest], LoadedProgram]
@@ -142,14 +112,19 @@ class EditorSession:
         """Load a program.
 
         Raises:
-            LoadError: it has errors.
-            ArmwrightError: a file cannot be read.
+            RequestError: it has errors.
+            ArmwrightError: a file cannot be read, or the program has no cell.
         """
         try:
             loaded = self._load(launch)
-        except LoadError as error:
-            self.write(error.page, "stderr")
+        except ProgramError as error:
+            compiled = error.compilation
+            self.write(render(compiled.diagnostics, compiled.source), "stderr")
+            raise RequestError(summary_line(compiled.diagnostics, compiled.source)) from None
+        except MissingCellError as error:
+            self.write(f"{error}\n", "stderr")
             raise
+        assert loaded.cell is not None  # noqa: S101 - a program without a cell is not loaded
         self.launch, self.loaded = launch, loaded
         self.codec = PositionCodec(loaded.code.source.text, UTF_16)
         self.debugger = Debugger(loaded.code, loaded.cell)
@@ -309,7 +284,7 @@ class EditorSession:
 
     def location(self, span: Span, *, full: bool = True) -> dict[str, int]:
         """Return where a stretch of the text is, in the numbers of the editor."""
-        (line, column), (end_line, end_column) = map(self.codec.place, span)
+        (line, column), (end_line, end_column) = map(self.codec.line_and_column, span)
         start = {"line": line + self.first_line, "column": column + self.first_column}
         end = {"endLine": end_line + self.first_line, "endColumn": end_column + self.first_column}
         return start | end if full else start

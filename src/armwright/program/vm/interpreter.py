@@ -204,9 +204,15 @@ def motion_warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic,
         if (warning := obstacle_warning(stage)) is not None:
             diagnostics.append(warning)
         arm = cell.arms[stage.arm].arm
-        excessive = np.flatnonzero(stage.peak_effort / arm.limit("effort") > 1)
+        excessive = np.flatnonzero(stage.peak_effort / arm.limits.effort > 1)
         diagnostics += [_effort_warning(stage, arm, joint) for joint in excessive.tolist()]
     return tuple(diagnostics)
+
+
+def run_diagnostics(recording: Recording) -> tuple[Diagnostic, ...]:
+    """Return the warnings about the motions of a run, and the error that ended it, if any."""
+    failed = () if recording.failure is None else (recording.failure.diagnostic,)
+    return (*motion_warnings(recording.stages, recording.cell), *failed)
 
 
 def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:
