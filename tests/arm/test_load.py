@@ -73,7 +73,7 @@ def test_units(pair: tuple[str, str], read: Callable[[str], Arm]) -> None:
     one, other = map(read, pair)
 
     for name in ("lower", "upper", "speed", "acceleration", "effort"):
-        np.testing.assert_allclose(one.limit(name), other.limit(name), rtol=ROUNDING)
+        np.testing.assert_allclose(getattr(one.limits, name), getattr(other.limits, name), rtol=ROUNDING)
     for a, b in zip(one.joints, other.joints, strict=True):
         np.testing.assert_allclose((a.theta, a.d, a.a, a.alpha), (b.theta, b.d, b.a, b.alpha), rtol=ROUNDING)
     np.testing.assert_allclose(one.links[0].com, other.links[0].com, rtol=ROUNDING)

@@ -284,6 +284,6 @@ def test_limits_of_all_joints() -> None:
     assert arm.limits is arm.limits
     np.testing.assert_array_equal(arm.limits.speed, [joint.limits.speed for joint in arm.joints])
     for limits in (arm.limits, pickle.loads(pickle.dumps(arm)).limits, attrs.evolve(arm, name="another").limits):
-        np.testing.assert_array_equal(limits.lower, arm.limit("lower"))
+        np.testing.assert_array_equal(limits.lower, arm.limits.lower)
         with pytest.raises(ValueError, match="read-only"):
             limits.lower[0] = 0.0

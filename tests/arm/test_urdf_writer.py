@@ -94,7 +94,7 @@ def test_catalogue(name: str, rng: np.random.Generator, back: Callable[[Arm], Ar
     ours, theirs = (inverse_dynamics(one, q, qd, qdd) for one in (bare_again, bare))
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=ROUND_TRIP * max(1.0, np.abs(theirs).max()))
     for limit in ("lower", "upper", "speed", "effort"):
-        np.testing.assert_array_equal(again.limit(limit), arm.limit(limit))
+        np.testing.assert_array_equal(getattr(again.limits, limit), getattr(arm.limits, limit))
     families = [geometry.family if (geometry := find_geometry(one)) else None for one in (arm, again)]
     assert families[0] == families[1]
 

@@ -418,11 +418,6 @@ class Arm:
         names = [field.name for field in attrs.fields(JointLimits)]
         return JointLimits(**{name: np.array([getattr(joint.limits, name) for joint in self.joints]) for name in names})
 
-    def limit(self, name: str) -> Array:
-        """Return one of the limits of all joints, (n,), by its name in ``limits``."""
-        limit: Array = getattr(self.limits, name)
-        return limit
-
     @cached_property
     def revolute(self) -> Flags:
         """Which joints rotate, (n,)."""

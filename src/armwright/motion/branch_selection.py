@@ -74,7 +74,7 @@ def _shortest(
     arm: Arm, near: Array, layers: Sequence[Sequence[LabelledConfiguration]]
 ) -> tuple[float, list[LabelledConfiguration]]:
     """Return the shortest path through one configuration of every layer, and its length."""
-    speed = arm.limit("speed")
+    speed = arm.limits.speed
     weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
     previous, lengths, came = near[None], np.zeros(1), []
     for layer in layers:

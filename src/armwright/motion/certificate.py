@@ -105,11 +105,11 @@ class Certificate:
     @property
     def _uses(self) -> list[tuple[LimitName, int, float]]:
         """Of each limit that some joint has: its name, the joint nearest to it, and which part of it that uses."""
-        return [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
+        return [(name, *self.use(name)) for name in LIMITS if np.isfinite(getattr(self.arm.limits, name)).any()]
 
     def use(self, name: LimitName) -> tuple[int, float]:
         """Return the joint, from 0, that comes nearest to a limit, and which part of the limit it uses."""
-        parts = self.peaks[name] / self.arm.limit(name)
+        parts = self.peaks[name] / getattr(self.arm.limits, name)
         joint = int(parts.argmax())
         return joint, float(parts[joint])
 
@@ -169,8 +169,8 @@ def slowing(arm: Arm, peaks: dict[LimitName, Array]) -> tuple[float, tuple[Limit
         peaks: largest speeds and accelerations, (n,) each.
     """
     needs: dict[LimitName, Array] = {
-        "speed": peaks["speed"] / arm.limit("speed"),
-        "acceleration": np.sqrt(peaks["acceleration"] / arm.limit("acceleration")),
+        "speed": peaks["speed"] / arm.limits.speed,
+        "acceleration": np.sqrt(peaks["acceleration"] / arm.limits.acceleration),
     }
     factor, because = 1.0, None
     for name, need in needs.items():

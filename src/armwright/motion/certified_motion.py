@@ -195,7 +195,7 @@ def limit_peaks(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
 def _efforts(arm: AnyArm, trajectory: Trajectory) -> Array:
     """Return the largest efforts (n,): at samples, but exactly where they come near a limit."""
     solver = solver_of(arm)
-    limits = solver.arm.limit("effort")
+    limits = solver.arm.limits.effort
     if not np.isfinite(limits).any():
         return np.zeros(solver.arm.n)
     ends = trajectory.times
@@ -210,7 +210,7 @@ def _efforts(arm: AnyArm, trajectory: Trajectory) -> Array:
 def _inside_efforts(arm: AnyArm, trajectory: Trajectory, *, weak: bool) -> tuple[Trajectory, Array, int | None]:
     """Return a motion slowed for its efforts, the largest of them (n,), and for which joint, from 0, it is slowed."""
     efforts = _efforts(arm, trajectory)
-    if (efforts <= _NEAR * solver_of(arm).arm.limit("effort")).all():
+    if (efforts <= _NEAR * solver_of(arm).arm.limits.effort).all():
         return trajectory, efforts, None
     try:
         slowing_down = slowing_for_efforts(arm, trajectory)

@@ -214,7 +214,7 @@ def _by_via(
 
 def _is_too_weak_to_begin(solver: Solver, q: Array) -> bool:
     """Whether gravity alone takes more than a joint may give where a motion begins, so that none keeps the efforts."""
-    limits = solver.arm.limit("effort")
+    limits = solver.arm.limits.effort
     if not np.isfinite(limits).any():
         return False
     at_rest = np.abs(solver.inverse_dynamics(q, np.zeros(len(q)), np.zeros(len(q))))
@@ -294,7 +294,7 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
         times = np.append(0.0, np.cumsum(np.diff(times) * _easing(solver.arm, trajectory)))
     trajectory = xspline(times, configurations)
     lowest, highest = trajectory.extremes(0)
-    if (lowest < solver.arm.limit("lower")).any() or (highest > solver.arm.limit("upper")).any():
+    if (lowest < solver.arm.limits.lower).any() or (highest > solver.arm.limits.upper).any():
         return None
     eased = attrs.evolve(line, corners=times[[0, -1]], progress=xspline(times, fractions), near=np.inf)
     c, h = trajectory.coefficients, np.diff(times)
@@ -316,8 +316,8 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
 def _easing(arm: Arm, trajectory: Trajectory) -> Array:
     """Return how many times longer each interval of a motion should last, changing slowly along it (m,)."""
     need = np.maximum(
-        (trajectory.segment_peaks(1) / arm.limit("speed")).max(axis=1),
-        np.sqrt((trajectory.segment_peaks(2) / arm.limit("acceleration")).max(axis=1)),
+        (trajectory.segment_peaks(1) / arm.limits.speed).max(axis=1),
+        np.sqrt((trajectory.segment_peaks(2) / arm.limits.acceleration).max(axis=1)),
     )
     # The largest need of the neighbourhood, averaged over it: nowhere less than is needed.
     wide = np.pad(np.maximum(need, 1.0), _AROUND, mode="edge")
@@ -333,7 +333,7 @@ def _integrated(solver: Solver, line: StraightPath, q: Array, damping: float) ->
     No configurations where it is not met, or where a joint passes a limit before.
     """
     h = line.duration / _STEPS
-    lower, upper = solver.arm.limit("lower"), solver.arm.limit("upper")
+    lower, upper = solver.arm.limits.lower, solver.arm.limits.upper
     configurations, t = [q], 0.0
     while t < line.duration * (1 + _AFTER) and not ((q < lower) | (q > upper)).any():
         ahead = line(np.minimum([t, t + h], line.duration))

@@ -127,7 +127,7 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     """
     solver = solver_of(arm)
     checked(solver.arm, trajectory)
-    limits = solver.arm.limit("effort")
+    limits = solver.arm.limits.effort
     if not np.isfinite(limits).any():
         return EffortSlowing(1.0, None, 0.0)
     samples = _spread(solver.arm, trajectory)
@@ -254,7 +254,7 @@ def _peaks(solver: Solver, trajectory: Trajectory, samples: _Samples, tau: Array
 
 def _check_lasting(arm: Arm, lasting: Array, times: Array) -> None:
     """Refuse a motion where what lasts however slow it is takes more than there is."""
-    use = np.abs(lasting) / arm.limit("effort")
+    use = np.abs(lasting) / arm.limits.effort
     if use.max() > 1 - _ROUNDING:
         k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
         raise refuse_lasting(arm, joint, float(lasting[k, joint]), f"at {times[k]:.3f} s")

@@ -83,8 +83,8 @@ def through_knots(arm: Arm, knots: Array) -> Trajectory:
 def natural_speeds(arm: Arm, points: Array) -> Array:
     """Return for every joint (n,) what is fast for it on a path through positions (k, n), by its limits."""
     with np.errstate(invalid="ignore"):
-        by_acceleration = np.sqrt(arm.limit("acceleration") * np.ptp(points, axis=0))
-    fast = np.fmin(arm.limit("speed"), np.where(by_acceleration > 0, by_acceleration, np.inf))
+        by_acceleration = np.sqrt(arm.limits.acceleration * np.ptp(points, axis=0))
+    fast = np.fmin(arm.limits.speed, np.where(by_acceleration > 0, by_acceleration, np.inf))
     return np.where(np.isfinite(fast), fast, 1.0)
 
 

@@ -31,11 +31,11 @@ def limit_use(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
     """
     model = solver_of(arm).arm
     checked(model, trajectory)
-    limit = model.limit("effort")
+    limit = model.limits.effort
     efforts = effort_peaks(arm, trajectory).peaks if np.isfinite(limit).any() else np.zeros(model.n)
     return {
-        "speed": trajectory.peaks(1) / model.limit("speed"),
-        "acceleration": trajectory.peaks(2) / model.limit("acceleration"),
+        "speed": trajectory.peaks(1) / model.limits.speed,
+        "acceleration": trajectory.peaks(2) / model.limits.acceleration,
         "effort": efforts / limit,
     }
 

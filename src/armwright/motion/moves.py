@@ -124,7 +124,7 @@ def joint_move(
             raise InvalidValueError(
                 "blend: allowed only with times; without times the acceleration limits determine the blends"
             )
-        t, b = blend_timing(q, solver.arm.limit("speed"), solver.arm.limit("acceleration"), ends=ends)
+        t, b = blend_timing(q, solver.arm.limits.speed, solver.arm.limits.acceleration, ends=ends)
     else:
         t, b = _timing(times, blend, len(X))
     move = Move(

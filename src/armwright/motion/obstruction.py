@@ -157,7 +157,7 @@ def unmet(arm: Arm, X: Array, before: Array, time: float, time_before: float) ->
 
 def beyond_limits(arm: Arm, q: Array, times: Array) -> Obstruction | None:
     """Return the first joint limit that configurations (k, n) at times (k,) pass; None where they keep them."""
-    outside = ((q < arm.limit("lower")) | (q > arm.limit("upper"))).any(axis=1)
+    outside = ((q < arm.limits.lower) | (q > arm.limits.upper)).any(axis=1)
     for k in np.flatnonzero(outside):
         for violation in violations(arm, q[k]):
             return Obstruction("limits", float(times[k]), violation.joint, str(violation))
@@ -211,7 +211,7 @@ def _on_step(
         return unmet(arm, step.X, before.q, end, start)
     if clock is None:
         return None
-    ratios = np.abs(step.q - before.q) / (np.diff(clock(np.array([start, end]))) * arm.limit("speed"))
+    ratios = np.abs(step.q - before.q) / (np.diff(clock(np.array([start, end]))) * arm.limits.speed)
     if ratios.max() > MAX_SLOWDOWN:
         return singular(arm, np.stack([before.q, step.q]), np.array([start, end]), ratios)
     return beyond_limits(arm, step.q[None], np.array([end]))
@@ -219,7 +219,7 @@ def _on_step(
 
 def _idlest(arm: Arm, q: Array) -> int:
     """Return the number, from 1, of the joint that is fastest in the motion that moves the tool least, by its limit."""
-    speed = arm.limit("speed")
+    speed = arm.limits.speed
     idle = np.linalg.svd(jacobian(arm, q))[2][-1]
     return int((np.abs(idle) / np.where(np.isfinite(speed), speed, 1.0)).argmax()) + 1
 

@@ -178,13 +178,13 @@ def _up_to(running: Trajectory, t: float) -> Trajectory:
 
 def _check_goal(task: _Task) -> None:
     """Refuse a goal that no motion can end in, and an arm without limits."""
-    arm, speed = task.arm, task.arm.limit("speed")
+    arm, speed = task.arm, task.arm.limits.speed
     for fault in violations(arm, task.q_goal):
         raise InvalidValueError(f"q_goal: {fault}")
     for j in np.flatnonzero(np.abs(task.qd_goal) > speed * (1 + _AT_LIMIT)).tolist():
         beyond = _beyond_limit(arm, j, "s", task.qd_goal[j], speed[j])
         raise InvalidValueError(f"qd_goal: the velocity of {arm.called(j)} would be {beyond}")
-    for j in np.flatnonzero(~np.isfinite(arm.limit("acceleration"))).tolist():
+    for j in np.flatnonzero(~np.isfinite(arm.limits.acceleration)).tolist():
         raise InvalidValueError(
             f"arm '{arm.name}': {arm.called(j)} has no limit of acceleration, so the duration of the motion to a new "
             "goal is undefined"
@@ -194,7 +194,7 @@ def _check_goal(task: _Task) -> None:
 def _jerk_limits(task: _Task, limits: ArrayLike | None, *, brake: bool) -> Array:
     """Return the largest jerks (n,) to plan with; refuse a state that they cannot keep inside the limits."""
     arm, n = task.arm, task.arm.n
-    speed, acceleration = arm.limit("speed"), arm.limit("acceleration")
+    speed, acceleration = arm.limits.speed, arm.limits.acceleration
     if limits is None:
         jerk = acceleration / JERK_TIME
     else:
@@ -221,7 +221,7 @@ def _jerk_limits(task: _Task, limits: ArrayLike | None, *, brake: bool) -> Array
 
 def _check_state(task: _Task, jerk: Array, least: Array) -> None:
     """Refuse a state beyond a limit, or one that passes its limit of speed with jerks below the ``least`` (n,)."""
-    arm, speed, acceleration = task.arm, task.arm.limit("speed"), task.arm.limit("acceleration")
+    arm, speed, acceleration = task.arm, task.arm.limits.speed, task.arm.limits.acceleration
     allowed = "; brake=True accepts it and first brakes to within the limits"
     for does, per, rates, limits in (
         ("accelerates by", "s²", task.qdd, acceleration),
@@ -259,7 +259,7 @@ def _phases(task: _Task, jerk_limits: Array, *, synchronised: bool, period: floa
     request.current_acceleration = task.qdd.tolist()
     request.target_position, request.target_velocity = task.q_goal.tolist(), task.qd_goal.tolist()
     request.target_acceleration = [0.0] * n
-    request.max_velocity, request.max_acceleration = arm.limit("speed").tolist(), arm.limit("acceleration").tolist()
+    request.max_velocity, request.max_acceleration = arm.limits.speed.tolist(), arm.limits.acceleration.tolist()
     request.max_jerk = jerk_limits.tolist()
     request.synchronization = ruckig.Synchronization.Time if synchronised else ruckig.Synchronization.No
     if period is not None:
@@ -312,7 +312,7 @@ def _check_range(task: _Task, motion: Trajectory) -> None:
         [motion.coefficients[:, 0], *turning_positions(motion.coefficients, np.diff(motion.times))]
     )
     lowest, highest = positions.min(axis=0), positions.max(axis=0)
-    if (lowest >= task.arm.limit("lower")).all() and (highest <= task.arm.limit("upper")).all():
+    if (lowest >= task.arm.limits.lower).all() and (highest <= task.arm.limits.upper).all():
         return
     for extreme, worse in ((lowest, np.less), (highest, np.greater)):
         for fault in violations(task.arm, extreme):

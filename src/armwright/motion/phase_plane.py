@@ -126,9 +126,9 @@ def _use(solver: Solver, grid: Grid, x: Array, *, efforts: bool) -> Array:
         there = np.maximum(x + 2 * part * grid.lengths * u, 0.0)[:, None]
         rate, bend = grid.at(part, 1), grid.at(part, 2)
         qd, qdd = rate * np.sqrt(there), rate * u[:, None] + bend * there
-        uses = [(qd / arm.limit("speed")) ** 2, np.abs(qdd) / arm.limit("acceleration")]
-        if efforts and number % _EVERY == 0 and np.isfinite(arm.limit("effort")).any():
-            uses.append(np.abs(solver.inverse_dynamics(grid.at(part, 0), qd, qdd)) / arm.limit("effort"))
+        uses = [(qd / arm.limits.speed) ** 2, np.abs(qdd) / arm.limits.acceleration]
+        if efforts and number % _EVERY == 0 and np.isfinite(arm.limits.effort).any():
+            uses.append(np.abs(solver.inverse_dynamics(grid.at(part, 0), qd, qdd)) / arm.limits.effort)
         use = np.maximum(use, np.max(uses, axis=(0, 2)))
     return use
 
@@ -136,7 +136,7 @@ def _use(solver: Solver, grid: Grid, x: Array, *, efforts: bool) -> Array:
 def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts: bool) -> _Rows:
     """Write down the bounds of all limits that there are."""
     arm = solver.arm
-    speed, acceleration, effort = (arm.limit(name) for name in ("speed", "acceleration", "effort"))
+    speed, acceleration, effort = arm.limits.speed, arm.limits.acceleration, arm.limits.effort
     viscous = arm.drive("viscous")
     # The least and the most that dry friction takes of the joints on the intervals (N, n).
     frictions = np.stack([dry_frictions(arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])

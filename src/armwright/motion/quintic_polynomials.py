@@ -49,8 +49,8 @@ def quintic(q_start: ArrayLike, q_goal: ArrayLike, duration: float) -> Trajector
 def shortest_duration(arm: Arm, way: ArrayLike) -> float:
     """Return the shortest time of a quintic over ``way`` (n,) inside the speed and acceleration limits [s]."""
     way = np.abs(joint_array(way, arm.n, "way"))
-    by_speed: Array = PEAK_SPEED * way / arm.limit("speed")
-    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * way / arm.limit("acceleration"))
+    by_speed: Array = PEAK_SPEED * way / arm.limits.speed
+    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * way / arm.limits.acceleration)
     return float(max(by_speed.max(), by_acceleration.max()))
 
 

@@ -288,7 +288,7 @@ def _tightened(task: _Task, most: float) -> tuple[CertifiedMotion, float]:
             last = error
             continue
         motion = CertifiedMotion(trajectory=run.trajectory, certificate=_certificate(task, widths, tracking, run))
-        return motion, float((tracking.speed / solver_of(task.arm).arm.limit("speed")).max())
+        return motion, float((tracking.speed / solver_of(task.arm).arm.limits.speed).max())
     raise last
 
 
@@ -355,7 +355,7 @@ def _inside_efforts(task: _Task, motion: CertifiedMotion) -> CertifiedMotion:
 def _shortest_with_stops(task: _Task) -> float:
     """Return a time that no run with a stop at every pose is shorter than [s]; 0 where it is not known."""
     solver = solver_of(task.arm)
-    limits = solver.arm.limit("speed"), solver.arm.limit("acceleration")
+    limits = solver.arm.limits.speed, solver.arm.limits.acceleration
     q, failed = chain(solver, task.legs.poses, task.q_start)
     if failed is not None or not np.isfinite(limits[1]).all():
         return 0.0

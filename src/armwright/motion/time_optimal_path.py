@@ -138,8 +138,8 @@ def time_optimal(
         runs.append(_composed(grid, fastest(solver, grid, piece.rests, locate, efforts=efforts, method=method)))
     run = join(runs) if runs else hold(geometry(0.0), 0.0)
     speeds, accelerations = run.peaks(1), run.peaks(2)
-    by_acceleration = math.sqrt(float((accelerations / solver.arm.limit("acceleration")).max()))
-    factor = max(1.0, float((speeds / solver.arm.limit("speed")).max()), by_acceleration)
+    by_acceleration = math.sqrt(float((accelerations / solver.arm.limits.acceleration).max()))
+    factor = max(1.0, float((speeds / solver.arm.limits.speed).max()), by_acceleration)
     if efforts:
         factor *= slowing_for_efforts(arm, run.slowed(factor)).factor
     run = run.slowed(factor)
@@ -185,7 +185,7 @@ def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
         for fault in violations(arm, extreme):
             raise InvalidValueError(f"path: {fault}")
     counting = LIMITS if efforts else LIMITS[:2]
-    limited = np.any([np.isfinite(arm.limit(name)) for name in counting if name != "speed"], axis=0)
+    limited = np.any([np.isfinite(getattr(arm.limits, name)) for name in counting if name != "speed"], axis=0)
     for j in np.flatnonzero(~limited & (np.ptp(path.extremes(0), axis=0) > 0)):
         raise IncapableArmError(
             f"arm '{arm.name}': {arm.called(int(j))} moves and has no limit of {' or '.join(counting[1:])}, so the "
@@ -207,7 +207,7 @@ def _bindings(solver: Solver, run: Trajectory, *, efforts: bool) -> tuple[Bindin
     values = {"speed": states[1], "acceleration": states[2]}
     if efforts:
         values["effort"] = np.asarray(solver.inverse_dynamics(*states))
-    uses = np.stack([np.abs(values[name]) / solver.arm.limit(name) for name in values], axis=1)
+    uses = np.stack([np.abs(values[name]) / getattr(solver.arm.limits, name) for name in values], axis=1)
     flat = uses.reshape(_LOOKS, -1)
     counts = np.bincount(flat.argmax(axis=1)[flat.max(axis=1) >= _BINDS], minlength=flat.shape[1])
     return tuple(

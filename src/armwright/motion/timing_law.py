@@ -154,8 +154,8 @@ def timed(arm: Arm, path: Trajectory, caps: Array) -> Timed:
     trajectory = run.trajectory
     speed, acceleration = trajectory.peaks(1), trajectory.peaks(2)
     over = max(
-        float((speed / arm.limit("speed")).max()),
-        math.sqrt(float((acceleration / arm.limit("acceleration")).max())),
+        float((speed / arm.limits.speed).max()),
+        math.sqrt(float((acceleration / arm.limits.acceleration).max())),
         float(run.uses[:, 0].max()),
         grid.allowed / trajectory.duration,
     )
@@ -188,7 +188,7 @@ def _gridded(arm: Arm, path: Trajectory, caps: Array) -> _Grid:
 def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
     """Return bounds on x = s'² at the start of every segment, and on u = s'', that hold all along it."""
     lengths, terms = np.diff(path.times), path.coefficients
-    speed, acceleration = arm.limit("speed"), arm.limit("acceleration")
+    speed, acceleration = arm.limits.speed, arm.limits.acceleration
     ramp = 0.0 if np.isfinite(acceleration).all() else _RAMP
     a, b = [np.full((len(lengths), 1), ramp)], [np.zeros((len(lengths), 1))]
     rates, bends = derivative(terms, 1), derivative(terms, 2)
@@ -297,8 +297,8 @@ def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
         np.maximum(acceleration, np.abs(evaluate(curves, s) * sd**2 + slope * sdd), out=acceleration)
     uses = [
         along / caps[interval][:, None],
-        speed / arm.limit("speed"),
-        np.sqrt(acceleration / arm.limit("acceleration")),
+        speed / arm.limits.speed,
+        np.sqrt(acceleration / arm.limits.acceleration),
     ]
     return _Run(path, times, interval, inner[..., 0], np.concatenate(uses, axis=1))
 

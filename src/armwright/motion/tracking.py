@@ -130,7 +130,7 @@ def excess(error: TrackingError, allowed: Tolerance) -> Array:
 def too_far(task: Task, tracking: Tracking) -> Obstruction:
     """Return that the tool cannot be kept on its path, however many knots there are, with the worst interval."""
     arm, trajectory = task.solver.arm, tracking.trajectory
-    worst, speed = int(excess(tracking.error, task.tolerance).argmax()), arm.limit("speed")
+    worst, speed = int(excess(tracking.error, task.tolerance).argmax()), arm.limits.speed
     time = float(trajectory.times[worst])
     q, q_next = trajectory(trajectory.times[worst : worst + 2])
     jump = np.abs(q_next - q) / np.where(np.isfinite(speed), speed, 1.0)
@@ -173,7 +173,7 @@ def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
     """
     times = trajectory.times
     slower = 1.0 if task.clock is None else (np.diff(task.clock(times)) / np.diff(times))[:, None]
-    return np.asarray(speed / slower / task.solver.arm.limit("speed"))
+    return np.asarray(speed / slower / task.solver.arm.limits.speed)
 
 
 def _diagnosed(task: Task, knots: Array, obstruction: Obstruction) -> Tracking | Obstruction:
@@ -247,7 +247,7 @@ def _rate(t: Array, q: Array) -> Array:
 def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Array:
     """Rotate joints by as few revolutions as bring all of their path inside the limits, where any do."""
     lowest, highest = q[:failed].min(axis=0), q[:failed].max(axis=0)
-    least, most = (arm.limit("lower") - lowest) / _TURN, (arm.limit("upper") - highest) / _TURN
+    least, most = (arm.limits.lower - lowest) / _TURN, (arm.limits.upper - highest) / _TURN
     turns = np.where(least > _NONE, np.ceil(least), np.where(most < -_NONE, np.floor(most), 0.0))
     fits = (turns >= least - _NONE) & (turns <= most + _NONE) & arm.revolute
     return np.asarray(q + _TURN * np.where(fits, turns, 0.0))
