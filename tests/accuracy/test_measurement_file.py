@@ -178,7 +178,7 @@ def test_too_few_directions(read: Read) -> None:
 
 def test_limits(read: Read) -> None:
     """A limit holds or not; one of what was not measured is a mistake."""
-    assessment = assess(read(POSE), few=True).within({"AP": 1e-3, "RP": 2e-3})
+    assessment = assess(read(POSE), few=True).with_limits({"AP": 1e-3, "RP": 2e-3})
 
     assert {measure.symbol: measure.holds for measure in assessment.measures} == {
         "AP": False,
@@ -187,7 +187,7 @@ def test_limits(read: Read) -> None:
         "RP": True,
     }
     with pytest.raises(UnknownNameError, match="no measure 'PR'"):
-        assessment.within({"PR": 1.0})
+        assessment.with_limits({"PR": 1.0})
 
 
 NOMINAL = """Pose;X nominal [mm];Y nominal [mm];X measured [mm];Y measured [mm]

@@ -1,17 +1,15 @@
 """Small angles about a, b, c that may be on either side of 180 deg: 179.9 and -179.9 deg are 0.2 deg apart."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
 
 # Angles that scatter further than this [rad] are no small angles, and have neither a mean nor a deviation.
-_WIDEST = np.pi / 2
+_MAX_SCATTER = np.pi / 2
 
 
-def wrapped(angles: Array) -> Array:
+def wrap_to_pi(angles: Array) -> Array:
     """Return angles of any size as those of the same direction in [-pi, pi) [rad]."""
     return np.asarray((angles + np.pi) % (2 * np.pi) - np.pi)
 
@@ -25,13 +23,13 @@ def mean_angles(angles: Array, what: str = "angles") -> Array:
         InvalidValueError: those of one column scatter by more than 90 deg about their mean.
     """
     direction = np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))
-    deviations = wrapped(angles - direction)
-    if deviations.size and np.abs(deviations).max() > _WIDEST:
+    deviations = wrap_to_pi(angles - direction)
+    if deviations.size and np.abs(deviations).max() > _MAX_SCATTER:
         widest = np.degrees(np.abs(deviations).max())
         raise InvalidValueError(
             f"{what}: they scatter by {widest:.0f} deg about their mean, which is defined only for angles within 90 deg"
         )
-    return wrapped(direction + deviations.mean(axis=0))
+    return wrap_to_pi(direction + deviations.mean(axis=0))
 
 
 def angle_deviations(angles: Array, what: str = "angles") -> Array:
@@ -40,7 +38,7 @@ def angle_deviations(angles: Array, what: str = "angles") -> Array:
     Raises:
         InvalidValueError: those of one column scatter by more than 90 deg about their mean.
     """
-    return wrapped(angles - mean_angles(angles, what))
+    return wrap_to_pi(angles - mean_angles(angles, what))
 
 
 def three_sigma(deviations: Array) -> Array:

@@ -1,7 +1,5 @@
 """Every measure that a set of tests allows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
@@ -27,7 +25,7 @@ from armwright.files.result_table import ResultTable
 
 _AXES = "xyz"
 # How many tests a note names.
-_NAMED = 4
+_MAX_NAMED_TESTS = 4
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -65,8 +63,8 @@ class Assessment:
         notes = []
         if self.planar:
             names = [f"{test.kind} {test.name}" for test in self.tests if test.size == 2]
-            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-            which = "all tests" if len(names) == len(self.tests) else f"{', '.join(names[:_NAMED])}{more}"
+            more = f" and {len(names) - _MAX_NAMED_TESTS} more" if len(names) > _MAX_NAMED_TESTS else ""
+            which = "all tests" if len(names) == len(self.tests) else f"{', '.join(names[:_MAX_NAMED_TESTS])}{more}"
             notes.append(
                 f"planar reduction: {which} measured in a plane, without z; distances are computed in that plane"
             )
@@ -116,7 +114,7 @@ class Assessment:
                 marks=tuple({"exceeds": "over"}.get(measure.verdict, measure.verdict) for measure in measures),
             )
 
-    def within(self, limits: Mapping[str, float]) -> Assessment:
+    def with_limits(self, limits: Mapping[str, float]) -> "Assessment":
         """Return the same with limits that measures should keep.
 
         Args:
@@ -150,32 +148,32 @@ def assess(
     results: list[tuple[Result, ...]] = []
     for test in tests:
         try:
-            test_results = _results(test, tests, few=few, band=band, corners=corners)
+            test_results = _test_results(test, tests, few=few, band=band, corners=corners)
         except InvalidValueError as error:
-            raise type(error)(f"{_title(test)}: {str(error).removeprefix(f'{test.kind}: ')}") from error
+            raise type(error)(f"{_test_title(test)}: {str(error).removeprefix(f'{test.kind}: ')}") from error
         results.append(test_results)
         for result in test_results:
             measures.extend(characteristics_of(test, result))
     return Assessment(measures=tuple(measures), results=tuple(results), tests=tuple(tests))
 
 
-def _title(test: AnyTest) -> str:
+def _test_title(test: AnyTest) -> str:
     return f"{test.kind} {test.name}{f' ({test.condition})' if test.condition else ''}"
 
 
-def _results(
+def _test_results(
     test: AnyTest, tests: Sequence[AnyTest], *, few: bool, band: float | None, corners: float
 ) -> tuple[Result, ...]:
     if isinstance(test, PoseTest):
-        return _of_poses(test, few=few)
+        return _pose_results(test, few=few)
     if test.kind in {"settling", "posing"}:
-        radius = _band_of(test, tests) if band is None else band
+        radius = _repeatability_band(test, tests) if band is None else band
         return ((settling if test.kind == "settling" else posing_time)(test.runs, radius, few=few),)
     assert test.commanded is not None  # noqa: S101 - no test of the others is read without
     if test.kind == "cornering":
         return corner_deviations(test.commanded, test.runs, band=band, few=few)
     if test.kind == "weaving":
-        return (weaving_deviation(test.commanded, test.runs, _speed(test), few=few),)
+        return (weaving_deviation(test.commanded, test.runs, _commanded_speed(test), few=few),)
     results: list[Result] = []
     if test.kind != "velocity":
         results.append(path_deviation(test.commanded, test.runs, corners=corners, kind=test.kind, few=few))
@@ -184,35 +182,38 @@ def _results(
     return tuple(results)
 
 
-def _of_poses(test: PoseTest, *, few: bool) -> tuple[Result, ...]:
+def _pose_results(test: PoseTest, *, few: bool) -> tuple[Result, ...]:
     clouds = test.clouds
     first = clouds[0]
     positions, angles = [cloud.positions for cloud in clouds], [cloud.angles for cloud in clouds]
     if test.kind == "pose":
         goal = {"angles": first.angles, "commanded_angles": first.commanded_angles}
         return (
-            pose_accuracy(first.positions, _goal(first), **goal, few=few),
+            pose_accuracy(first.positions, _commanded_position(first), **goal, few=few),
             pose_repeatability(first.positions, angles=first.angles, few=few),
         )
     if test.kind == "distance":
-        goals = [_goal(cloud) for cloud in clouds]
+        goals = [_commanded_position(cloud) for cloud in clouds]
         commanded = (clouds[0].commanded_angles, clouds[1].commanded_angles)
         return (
             distance_accuracy(*positions, *goals, angles=(angles[0], angles[1]), commanded_angles=commanded, few=few),
             distance_repeatability(*positions, angles=(angles[0], angles[1]), few=few),
         )
     if test.kind == "drift":
-        rising = sorted(clouds, key=lambda cloud: cloud.t or 0.0)
-        times = [cloud.t or 0.0 for cloud in rising]
-        angles = [cloud.angles for cloud in rising]
-        warming = [cloud.positions for cloud in rising]
-        return (
-            pose_drift(times, warming, _goal(first), angles=angles, commanded_angles=first.commanded_angles, few=few),
+        by_time = sorted(clouds, key=lambda cloud: cloud.t or 0.0)
+        drift = pose_drift(
+            [cloud.t or 0.0 for cloud in by_time],
+            [cloud.positions for cloud in by_time],
+            _commanded_position(first),
+            angles=[cloud.angles for cloud in by_time],
+            commanded_angles=first.commanded_angles,
+            few=few,
         )
+        return (drift,)
     if test.kind == "compliance":
         return tuple(_compliance(cloud, test.size, few=few) for cloud in clouds)
-    vary = multidirectional_variation if test.kind == "multidirectional" else exchangeability
-    return (vary(positions, angles=angles, few=few),)
+    variation = multidirectional_variation if test.kind == "multidirectional" else exchangeability
+    return (variation(positions, angles=angles, few=few),)
 
 
 def _compliance(cloud: Cloud, size: int, *, few: bool) -> StaticCompliance:
@@ -225,17 +226,17 @@ def _compliance(cloud: Cloud, size: int, *, few: bool) -> StaticCompliance:
     return static_compliance(cloud.loads, cloud.positions, direction, few=few)
 
 
-def _goal(cloud: Cloud) -> Array:
+def _commanded_position(cloud: Cloud) -> Array:
     assert cloud.commanded is not None  # noqa: S101 - no such test is read without
     return cloud.commanded
 
 
-def _speed(test: PathTest) -> float:
+def _commanded_speed(test: PathTest) -> float:
     assert test.speed is not None  # noqa: S101 - no such test is read without
     return test.speed
 
 
-def _band_of(test: PathTest, tests: Sequence[AnyTest]) -> float:
+def _repeatability_band(test: PathTest, tests: Sequence[AnyTest]) -> float:
     """Return RP of the pose at which a robot settles."""
     pose_tests = [t for t in tests if isinstance(t, PoseTest) and t.kind == "pose" and t.name == test.name]
     pose_tests = [t for t in pose_tests if t.condition == test.condition] or pose_tests

@@ -1,7 +1,5 @@
 """The numbers of ISO 9283, each with its symbol, its unit, its cycles and the limit it should keep."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias
 
@@ -21,7 +19,7 @@ from armwright.accuracy.weaving import WeavingDeviation
 from armwright.arrays import Array
 
 # Units for people: name, and how many of it are one in SI units.
-_DISPLAYED = {
+_DISPLAY_UNITS = {
     "m": ("mm", 1e3),
     "rad": ("deg", 180 / np.pi),
     "s": ("s", 1.0),
@@ -99,12 +97,12 @@ class Characteristic:
     @property
     def displayed_unit(self) -> str:
         """The unit for people: mm, deg, s, mm/s, mm/N or %."""
-        return _DISPLAYED[self.unit][0]
+        return _DISPLAY_UNITS[self.unit][0]
 
     @property
     def scale(self) -> float:
         """How many of that unit are one in SI units."""
-        return _DISPLAYED[self.unit][1]
+        return _DISPLAY_UNITS[self.unit][1]
 
     @property
     def displayed_value(self) -> str:
@@ -126,99 +124,99 @@ class Characteristic:
 def characteristics_of(test: AnyTest, result: Result) -> Iterator[Characteristic]:
     """Give the numbers of a result of a test."""
     common = {"test": test.kind, "name": test.name, "condition": test.condition, "cycles": result.cycles}
-    for fields in _NUMBERS_OF[type(result)](test, result):
+    for fields in _FIELDS_OF[type(result)](test, result):
         yield Characteristic(**{**common, "required": REQUIRED_CYCLES[test.kind], **fields})
 
 
-def _axes(symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[str, Any]]:
+def _axis_fields(symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[str, Any]]:
     for axis, value in zip(_AXES, values.tolist(), strict=False):
         yield {"symbol": f"{symbol}_{axis}", "what": f"{what} along {axis}", "value": value, "unit": "m", **more}
 
 
-def _turns(test: AnyTest, symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[str, Any]]:
+def _angle_fields(test: AnyTest, symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[str, Any]]:
     for angle, value in zip(test.angle_names, values.tolist(), strict=True):
         yield {"symbol": f"{symbol}_{angle}", "what": f"{what} about {angle}", "value": value, "unit": "rad", **more}
 
 
-def _pose_accuracy(test: AnyTest, result: PoseAccuracy) -> Iterator[dict[str, Any]]:
+def _pose_accuracy_fields(test: AnyTest, result: PoseAccuracy) -> Iterator[dict[str, Any]]:
     yield {"symbol": "AP", "what": "pose accuracy", "value": result.position, "unit": "m"}
-    yield from _axes("AP", "pose accuracy", result.components)
-    yield from _turns(test, "AP", "pose accuracy", result.angles)
+    yield from _axis_fields("AP", "pose accuracy", result.components)
+    yield from _angle_fields(test, "AP", "pose accuracy", result.angles)
 
 
-def _pose_repeatability(test: AnyTest, result: PoseRepeatability) -> Iterator[dict[str, Any]]:
+def _pose_repeatability_fields(test: AnyTest, result: PoseRepeatability) -> Iterator[dict[str, Any]]:
     yield {"symbol": "RP", "what": "pose repeatability", "value": result.radius, "unit": "m"}
-    yield from _turns(test, "RP", "pose repeatability", result.angles, either_way=True)
+    yield from _angle_fields(test, "RP", "pose repeatability", result.angles, either_way=True)
 
 
-def _variation(test: AnyTest, result: Variation) -> Iterator[dict[str, Any]]:
+def _variation_fields(test: AnyTest, result: Variation) -> Iterator[dict[str, Any]]:
     symbol, what, required, parts = "vAP", "multi-directional variation", DIRECTIONS, "directions of approach"
     if test.kind == "exchangeability":
         symbol, what, required, parts = "E", "exchangeability", ROBOTS, "robots"
     labels = [cloud.label for cloud in test.clouds] if isinstance(test, PoseTest) else []
-    few = _lacking(len(result.barycentres), required, parts)
+    few = _shortage_note(len(result.barycentres), required, parts)
     note = f"between {' and '.join(labels[i] for i in result.pair)}{few}"
     yield {"symbol": symbol, "what": what, "value": result.position, "unit": "m", "note": note, "lacking": bool(few)}
-    yield from _turns(test, symbol, what, result.angles, lacking=bool(few))
+    yield from _angle_fields(test, symbol, what, result.angles, lacking=bool(few))
 
 
-def _lacking(count: int, required: int, parts: str) -> str:
+def _shortage_note(count: int, required: int, parts: str) -> str:
     """Say how many parts of a test there are, if they are too few."""
     return f", {count} of {required} {parts}" if count < required else ""
 
 
-def _drift(test: AnyTest, result: PoseDrift) -> Iterator[dict[str, Any]]:
+def _drift_fields(test: AnyTest, result: PoseDrift) -> Iterator[dict[str, Any]]:
     note = f"over {(result.times[-1] - result.times[0]) / 3600:.3g} h, {len(result.times)} measurements"
     what = "drift of pose accuracy"
     yield {"symbol": "dAP", "what": what, "value": result.accuracy_change, "unit": "m", "note": note}
     yield {"symbol": "dRP", "what": "drift of pose repeatability", "value": result.repeatability_change, "unit": "m"}
-    yield from _turns(test, "dAP", what, result.accuracy_change_angles)
-    yield from _turns(test, "dRP", "drift of pose repeatability", result.repeatability_change_angles)
+    yield from _angle_fields(test, "dAP", what, result.accuracy_change_angles)
+    yield from _angle_fields(test, "dRP", "drift of pose repeatability", result.repeatability_change_angles)
 
 
-def _distance_accuracy(test: AnyTest, result: DistanceAccuracy) -> Iterator[dict[str, Any]]:
+def _distance_accuracy_fields(test: AnyTest, result: DistanceAccuracy) -> Iterator[dict[str, Any]]:
     note = f"of {result.commanded * 1e3:.6g} mm"
     yield {"symbol": "AD", "what": "distance accuracy", "value": result.distance, "unit": "m", "note": note}
-    yield from _axes("AD", "distance accuracy", result.components)
-    yield from _turns(test, "AD", "distance accuracy", result.angles)
+    yield from _axis_fields("AD", "distance accuracy", result.components)
+    yield from _angle_fields(test, "AD", "distance accuracy", result.angles)
 
 
-def _distance_repeatability(test: AnyTest, result: DistanceRepeatability) -> Iterator[dict[str, Any]]:
+def _distance_repeatability_fields(test: AnyTest, result: DistanceRepeatability) -> Iterator[dict[str, Any]]:
     what = "distance repeatability"
     yield {"symbol": "RD", "what": what, "value": result.distance, "unit": "m", "either_way": True}
-    yield from _axes("RD", what, result.components, either_way=True)
-    yield from _turns(test, "RD", what, result.angles, either_way=True)
+    yield from _axis_fields("RD", what, result.components, either_way=True)
+    yield from _angle_fields(test, "RD", what, result.angles, either_way=True)
 
 
-def _settling(_test: AnyTest, result: Settling) -> Iterator[dict[str, Any]]:
+def _settling_fields(_test: AnyTest, result: Settling) -> Iterator[dict[str, Any]]:
     note = f"within {result.band * 1e3:.4g} mm"
     yield {"symbol": "t", "what": "stabilisation time", "value": result.time, "unit": "s", "note": note}
     yield {"symbol": "OV", "what": "pose overshoot", "value": result.overshoot, "unit": "m", "note": note}
 
 
-def _posing(_test: AnyTest, result: PosingTime) -> Iterator[dict[str, Any]]:
+def _posing_fields(_test: AnyTest, result: PosingTime) -> Iterator[dict[str, Any]]:
     note = f"over {result.distance * 1e3:.4g} mm, within {result.band * 1e3:.4g} mm"
     yield {"symbol": "TP", "what": "minimum posing time", "value": result.time, "unit": "s", "note": note}
 
 
-def _path(test: AnyTest, result: PathDeviation) -> Iterator[dict[str, Any]]:
+def _path_fields(test: AnyTest, result: PathDeviation) -> Iterator[dict[str, Any]]:
     for symbol, what, value, station, angles in (
         ("AT", "path accuracy", result.accuracy, result.accuracy_at, result.accuracy_angles),
         ("RT", "path repeatability", result.repeatability, result.repeatability_at, result.repeatability_angles),
     ):
         note = f"at {station * 1e3:.4g} mm along"
         yield {"symbol": symbol, "what": what, "value": value, "unit": "m", "note": note}
-        yield from _turns(test, symbol, what, angles, either_way=symbol == "RT")
+        yield from _angle_fields(test, symbol, what, angles, either_way=symbol == "RT")
 
 
-def _velocity(_test: AnyTest, result: PathVelocity) -> Iterator[dict[str, Any]]:
+def _velocity_fields(_test: AnyTest, result: PathVelocity) -> Iterator[dict[str, Any]]:
     yield {"symbol": "AV", "what": "path velocity accuracy", "value": result.accuracy, "unit": ""}
     what = "path velocity repeatability"
     yield {"symbol": "RV", "what": what, "value": result.repeatability, "unit": "", "either_way": True}
     yield {"symbol": "FV", "what": "path velocity fluctuation", "value": result.fluctuation, "unit": "m/s"}
 
 
-def _corner(_test: AnyTest, result: CornerDeviation) -> Iterator[dict[str, Any]]:
+def _corner_fields(_test: AnyTest, result: CornerDeviation) -> Iterator[dict[str, Any]]:
     note = f"at ({', '.join(f'{x * 1e3:.4g}' for x in result.position)}) mm"
     yield {"symbol": "CR", "what": "cornering round-off", "value": result.round_off, "unit": "m", "note": note}
     yield {"symbol": "CO", "what": "cornering overshoot", "value": result.overshoot, "unit": "m", "note": note}
@@ -227,35 +225,35 @@ def _corner(_test: AnyTest, result: CornerDeviation) -> Iterator[dict[str, Any]]
         yield {"symbol": "SPL", "what": what, "value": result.settling_length, "unit": "m", "note": note}
 
 
-def _weaving(_test: AnyTest, result: WeavingDeviation) -> Iterator[dict[str, Any]]:
+def _weaving_fields(_test: AnyTest, result: WeavingDeviation) -> Iterator[dict[str, Any]]:
     note = f"of {result.commanded_stroke * 1e3:.4g} mm"
     yield {"symbol": "WS", "what": "weaving stroke error", "value": result.stroke, "unit": "", "note": note}
     note = f"of {result.commanded_frequency:.4g} Hz"
     yield {"symbol": "WF", "what": "weaving frequency error", "value": result.frequency, "unit": "", "note": note}
 
 
-def _compliance(_test: AnyTest, result: StaticCompliance) -> Iterator[dict[str, Any]]:
+def _compliance_fields(_test: AnyTest, result: StaticCompliance) -> Iterator[dict[str, Any]]:
     axis = int(np.argmax(np.abs(result.direction)))
-    few = _lacking(len(result.loads), LOADS, "loads")
+    few = _shortage_note(len(result.loads), LOADS, "loads")
     note = f"force along {'-' if result.direction[axis] < 0 else '+'}{_AXES[axis]}, up to {result.loads[-1]:.4g} N{few}"
     more = {"unit": "m/N", "note": note, "lacking": bool(few)}
     what = "static compliance"
     yield {"symbol": "C", "what": f"{what} along the force", "value": result.along, **more}
-    yield from _axes("C", what, result.components, **more)
+    yield from _axis_fields("C", what, result.components, **more)
 
 
-_NUMBERS_OF: dict[type, Callable[[AnyTest, Any], Iterator[dict[str, Any]]]] = {
-    PoseAccuracy: _pose_accuracy,
-    PoseRepeatability: _pose_repeatability,
-    Variation: _variation,
-    PoseDrift: _drift,
-    DistanceAccuracy: _distance_accuracy,
-    DistanceRepeatability: _distance_repeatability,
-    Settling: _settling,
-    PosingTime: _posing,
-    PathDeviation: _path,
-    PathVelocity: _velocity,
-    CornerDeviation: _corner,
-    WeavingDeviation: _weaving,
-    StaticCompliance: _compliance,
+_FIELDS_OF: dict[type, Callable[[AnyTest, Any], Iterator[dict[str, Any]]]] = {
+    PoseAccuracy: _pose_accuracy_fields,
+    PoseRepeatability: _pose_repeatability_fields,
+    Variation: _variation_fields,
+    PoseDrift: _drift_fields,
+    DistanceAccuracy: _distance_accuracy_fields,
+    DistanceRepeatability: _distance_repeatability_fields,
+    Settling: _settling_fields,
+    PosingTime: _posing_fields,
+    PathDeviation: _path_fields,
+    PathVelocity: _velocity_fields,
+    CornerDeviation: _corner_fields,
+    WeavingDeviation: _weaving_fields,
+    StaticCompliance: _compliance_fields,
 }

@@ -1,12 +1,10 @@
 """Static compliance: how far a pose is displaced by a force."""
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 
-from armwright.accuracy.cycles import LOADS, checked_cycles, checked_parts
-from armwright.accuracy.trace import frozen_array, position_of, positions_of
+from armwright.accuracy.cycles import LOADS, check_cycles, check_parts
+from armwright.accuracy.trace import as_position, as_positions, frozen_array
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
@@ -53,25 +51,30 @@ def static_compliance(
     Source:
         ISO 9283:1998, 10.
     """
-    P = positions_of(positions)
+    P = as_positions(positions)
     F = floats(loads, "compliance: loads", LARGEST)
     if F.shape != (len(P),):
         raise ShapeError(f"compliance: loads: expected shape ({len(P)},), one per position, got {F.shape}")
     if (F < 0).any():
         raise InvalidValueError("compliance: loads are magnitudes of forces, 0 or more; reverse the direction instead")
-    d = np.array(position_of(direction, P.shape[1], "compliance: direction"))
+    d = np.array(as_position(direction, P.shape[1], "compliance: direction"))
     if not np.linalg.norm(d) > 0:
         raise InvalidValueError("compliance: the direction is 0")
     d /= np.linalg.norm(d)
     levels, repeats = np.unique(F, return_counts=True)
     if levels[0] != 0:
         raise InvalidValueError("compliance: expected a measurement without load as the reference, got none")
-    checked_parts("compliance", len(levels) - 1, LOADS, few=few, what="loads besides none")
-    count = checked_cycles("compliance", repeats.tolist(), few=few, least=1)
+    check_parts("compliance", len(levels) - 1, LOADS, few=few, what="loads besides none")
+    count = check_cycles("compliance", repeats.tolist(), few=few, least=1)
     unloaded = P[F == 0].mean(axis=0)
     forces = levels[1:]
-    bent = np.array([P[force == F].mean(axis=0) - unloaded for force in forces])
-    slopes = forces @ bent / (forces @ forces)
+    mean_deflections = np.array([P[force == F].mean(axis=0) - unloaded for force in forces])
+    slopes = forces @ mean_deflections / (forces @ forces)
     return StaticCompliance(
-        along=float(slopes @ d), direction=d, components=slopes, loads=forces, deflections=bent, cycles=count
+        along=float(slopes @ d),
+        direction=d,
+        components=slopes,
+        loads=forces,
+        deflections=mean_deflections,
+        cycles=count,
     )

@@ -1,20 +1,18 @@
 """Cornering: how a sharp corner of a path is rounded off, CR, and overshot, CO."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
-from armwright.accuracy.cycles import checked_cycles
+from armwright.accuracy.cycles import check_cycles
 from armwright.accuracy.planes import Legs, legs_of
-from armwright.accuracy.trace import Trace, frozen_array, positive, refuse_mixed_dimensions
-from armwright.arrays import Array, reduce_by_fields
+from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
+from armwright.arrays import Array, positive, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # Of a leg that ends in another corner, so much belongs to the corner it comes from.
-_SHARE = 0.5
+_LEG_SHARE = 0.5
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -63,25 +61,25 @@ def corner_deviations(
     Source:
         ISO 9283:1998, 8.5.
     """
-    count = checked_cycles("cornering", [len(runs)], few=few, least=1)
+    count = check_cycles("cornering", [len(runs)], few=few, least=1)
     refuse_mixed_dimensions([commanded.positions, *(run.positions for run in runs)], "cornering")
     if band is not None:
-        positive(band, "cornering: the band", "m")
+        positive(band, "cornering: band", "m")
     legs = legs_of(commanded)
     corners = np.flatnonzero(legs.corners)
     if not len(corners):
         raise InvalidValueError("cornering: the commanded path has no change of direction by more than 20 deg")
     corner_results = []
     for corner in corners.tolist():
-        rows = [_corner_of_run(legs, corner, run, band, f"cornering: run {j + 1}") for j, run in enumerate(runs)]
-        near, over, lengths = zip(*rows, strict=True)
+        rows = [_measure_corner(legs, corner, run, band, f"cornering: run {j + 1}") for j, run in enumerate(runs)]
+        round_offs, overshoots, lengths = zip(*rows, strict=True)
         corner_results.append(
             CornerDeviation(
-                round_off=float(np.mean(near)),
-                overshoot=float(np.mean(over)),
+                round_off=float(np.mean(round_offs)),
+                overshoot=float(np.mean(overshoots)),
                 settling_length=None if band is None else float(np.mean(lengths)),
-                round_offs=near,
-                overshoots=over,
+                round_offs=round_offs,
+                overshoots=overshoots,
                 position=legs.positions[corner],
                 cycles=count,
             )
@@ -89,15 +87,15 @@ def corner_deviations(
     return tuple(corner_results)
 
 
-def _corner_of_run(legs: Legs, corner: int, run: Trace, band: float | None, name: str) -> tuple[float, float, float]:
+def _measure_corner(legs: Legs, corner: int, run: Trace, band: float | None, name: str) -> tuple[float, float, float]:
     """Return nearest distance, overshoot and stabilisation path length of one run at one corner."""
     point = legs.positions[corner]
-    near, after = _nearest(run.positions, point)
+    near, after = _nearest_passage(run.positions, point)
     u1, u2 = legs.directions[corner - 1], legs.directions[corner]
-    later = np.flatnonzero(legs.corners[corner + 1 :])
+    next_corners = np.flatnonzero(legs.corners[corner + 1 :])
     end = legs.stations[corner + 1] - legs.stations[corner]
-    if len(later):
-        end *= _SHARE
+    if len(next_corners):
+        end *= _LEG_SHARE
     relative = run.positions[after:] - point
     along = relative @ u2
     past_end = np.flatnonzero(along > end)
@@ -115,10 +113,10 @@ def _corner_of_run(legs: Legs, corner: int, run: Trace, band: float | None, name
     beyond = on & (offset @ (onward / size) > 0) if size > 0 else np.zeros_like(on)
     distances = np.linalg.norm(offset, axis=1)
     over = float(distances[beyond].max(initial=0.0))
-    return near, over, _length(along[on], distances[on], band)
+    return near, over, _settling_length(along[on], distances[on], band)
 
 
-def _nearest(positions: Array, point: Array) -> tuple[float, int]:
+def _nearest_passage(positions: Array, point: Array) -> tuple[float, int]:
     """Return the smallest distance of a run from a point, and the number of the first sample after it."""
     starts, steps = positions[:-1], np.diff(positions, axis=0)
     squares = np.sum(steps**2, axis=1)
@@ -128,7 +126,7 @@ def _nearest(positions: Array, point: Array) -> tuple[float, int]:
     return float(distances[piece]), piece + 1
 
 
-def _length(along: Array, distances: Array, band: float | None) -> float:
+def _settling_length(along: Array, distances: Array, band: float | None) -> float:
     """Return where along a leg the distances come within the band for good; infinite where they do not."""
     if band is None:
         return np.nan

@@ -1,7 +1,5 @@
 """How often the standard asks for each measure to be repeated, and what happens where a test has fewer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
@@ -30,7 +28,7 @@ REQUIRED_CYCLES: dict[Kind, int] = {
 DIRECTIONS, ROBOTS, LOADS = 3, 5, 10
 
 
-def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int) -> int:
+def check_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int) -> int:
     """Return the smallest number of cycles of a test, if it is enough.
 
     Args:
@@ -42,19 +40,19 @@ def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int) 
     Raises:
         TooFewError: there are fewer than ``least``, or than the standard asks for without ``few``.
     """
-    return _checked(kind, min(counts, default=0), REQUIRED_CYCLES[kind], few=few, least=least, what="cycles")
+    return _check_count(kind, min(counts, default=0), REQUIRED_CYCLES[kind], few=few, least=least, what="cycles")
 
 
-def checked_parts(kind: Kind, count: int, required: int, *, few: bool, what: str) -> None:
+def check_parts(kind: Kind, count: int, required: int, *, few: bool, what: str) -> None:
     """Refuse too few parts of a test: directions of approach, robots, or loads.
 
     Raises:
         TooFewError: there are fewer than two, or than the standard asks for without ``few``.
     """
-    _checked(kind, count, required, few=few, least=2, what=what)
+    _check_count(kind, count, required, few=few, least=2, what=what)
 
 
-def _checked(kind: Kind, count: int, required: int, *, few: bool, least: int, what: str) -> int:
+def _check_count(kind: Kind, count: int, required: int, *, few: bool, least: int, what: str) -> int:
     if count < least:
         raise TooFewError(f"{kind}: expected at least {least} {what}, got {count}")
     if count < required and not few:

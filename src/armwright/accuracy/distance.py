@@ -1,14 +1,12 @@
 """Accuracy and repeatability of the distance between two poses: AD and RD."""
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 
-from armwright.accuracy.angles import mean_angles, wrapped
-from armwright.accuracy.cycles import checked_cycles
-from armwright.accuracy.trace import angles_of, frozen_array, position_of, positions_of
-from armwright.arrays import Array, ArrayLike, floats, reduce_by_fields
+from armwright.accuracy.angles import mean_angles, wrap_to_pi
+from armwright.accuracy.cycles import check_cycles
+from armwright.accuracy.trace import as_angles, as_commanded_angles, as_position, as_positions, frozen_array
+from armwright.arrays import Array, ArrayLike, reduce_by_fields
 from armwright.errors import ShapeError
 
 
@@ -81,17 +79,17 @@ def distance_accuracy(
     Source:
         ISO 9283:1998, 7.3.2.
     """
-    differences = _differences(first, second)
-    count = checked_cycles("distance", [len(differences)], few=few, least=1)
-    start, end = (position_of(pose, differences.shape[1]) for pose in (commanded_first, commanded_second))
+    differences = _position_differences(first, second)
+    count = check_cycles("distance", [len(differences)], few=few, least=1)
+    start, end = (as_position(pose, differences.shape[1]) for pose in (commanded_first, commanded_second))
     commanded = float(np.linalg.norm(end - start))
-    A, B = _angles(angles, len(differences))
-    goals = [_commanded(goal, A.shape[1]) for goal in commanded_angles or (None, None)]
-    rotation = wrapped(goals[1] - goals[0])
+    A, B = _angles_of_both_poses(angles, len(differences))
+    goals = [as_commanded_angles(goal, A.shape[1]) for goal in commanded_angles or (None, None)]
+    rotation = wrap_to_pi(goals[1] - goals[0])
     return DistanceAccuracy(
         distance=float(np.linalg.norm(differences, axis=1).mean()) - commanded,
         components=np.abs(differences).mean(axis=0) - np.abs(end - start),
-        angles=np.abs(_between(A, B, rotation)).mean(axis=0) - np.abs(rotation),
+        angles=np.abs(_rotation_angles(A, B, rotation)).mean(axis=0) - np.abs(rotation),
         commanded=commanded,
         cycles=count,
     )
@@ -116,45 +114,37 @@ def distance_repeatability(
     Source:
         ISO 9283:1998, 7.3.3.
     """
-    differences = _differences(first, second)
-    count = checked_cycles("distance", [len(differences)], few=few, least=2)
-    A, B = _angles(angles, len(differences))
-    turns = _between(A, B, mean_angles(B - A, "angles between the two poses"))
+    differences = _position_differences(first, second)
+    count = check_cycles("distance", [len(differences)], few=few, least=2)
+    A, B = _angles_of_both_poses(angles, len(differences))
+    rotations = _rotation_angles(A, B, mean_angles(B - A, "angles between the two poses"))
     return DistanceRepeatability(
         distance=3 * float(np.linalg.norm(differences, axis=1).std(ddof=1)),
         components=3 * np.abs(differences).std(axis=0, ddof=1),
-        angles=3 * np.abs(turns).std(axis=0, ddof=1),
+        angles=3 * np.abs(rotations).std(axis=0, ddof=1),
         cycles=count,
     )
 
 
-def _differences(first: ArrayLike, second: ArrayLike) -> Array:
-    P, Q = positions_of(first, "first pose"), positions_of(second, "second pose")
+def _position_differences(first: ArrayLike, second: ArrayLike) -> Array:
+    P, Q = as_positions(first, "first pose"), as_positions(second, "second pose")
     if P.shape != Q.shape:
         raise ShapeError(f"distance: the two poses need the same cycles, got shapes {P.shape} and {Q.shape}")
     return np.asarray(Q - P)
 
 
-def _angles(angles: tuple[ArrayLike, ArrayLike] | None, rows: int) -> tuple[Array, Array]:
+def _angles_of_both_poses(angles: tuple[ArrayLike, ArrayLike] | None, rows: int) -> tuple[Array, Array]:
     """Return the angles (n, k) of both poses; none where none were measured."""
     first, second = (None, None) if angles is None else angles
-    A, B = angles_of(first, rows, "angles of the first pose"), angles_of(second, rows, "angles of the second pose")
+    A, B = as_angles(first, rows, "angles of the first pose"), as_angles(second, rows, "angles of the second pose")
     if A.shape != B.shape:
         raise ShapeError(f"distance: both poses need the same angles, got shapes {A.shape} and {B.shape}")
     return A, B
 
 
-def _commanded(angles: ArrayLike | None, size: int) -> Array:
-    """Return the commanded angles (k,) of a pose [rad]."""
-    goal = np.empty(0) if angles is None else floats(angles, "commanded angles")
-    if goal.shape != (size,):
-        raise ShapeError(f"commanded angles: expected {size} numbers, as many as were measured, got shape {goal.shape}")
-    return goal
-
-
-def _between(A: Array, B: Array, near: Array) -> Array:
+def _rotation_angles(A: Array, B: Array, near: Array) -> Array:
     """Return the rotation angles from the first pose to the second (n, k), the equivalents nearest to (k,) [rad].
 
     So rotations of about 180 deg have one sign.
     """
-    return np.asarray(near + wrapped(B - A - near))
+    return np.asarray(near + wrap_to_pi(B - A - near))

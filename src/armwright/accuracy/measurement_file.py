@@ -1,7 +1,5 @@
 """Tests out of tables: rows that belong together, what was commanded beside what was attained."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
@@ -10,21 +8,25 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.cycles import Kind, PoseKind
-from armwright.accuracy.scales import angle_unit_question, length_unit_question
 from armwright.accuracy.table import Row, read_tables
 from armwright.accuracy.trace import Trace
+from armwright.accuracy.unit_mismatch import angle_unit_question, length_unit_question
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
 from armwright.files.limits import limit, limit_message
 
 # Tests of which every row is one attained pose; of the others a cycle is a run of many rows.
-POSES: frozenset[Kind] = frozenset(get_args(PoseKind))
+POSE_KINDS: frozenset[Kind] = frozenset(get_args(PoseKind))
 # Tests that need a commanded pose or path.
-_COMMANDED: frozenset[Kind] = frozenset(
+_KINDS_WITH_COMMAND: frozenset[Kind] = frozenset(
     {"pose", "distance", "drift", "path", "reorientation", "cornering", "velocity", "weaving"}
 )
 # The column that distinguishes the parts of a test, where it is not the name of the pose.
-_LABELS: Mapping[Kind, str] = {"multidirectional": "direction", "compliance": "direction", "exchangeability": "robot"}
+_LABEL_COLUMNS: Mapping[Kind, str] = {
+    "multidirectional": "direction",
+    "compliance": "direction",
+    "exchangeability": "robot",
+}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -133,11 +135,11 @@ def read_measurements(
             # A distance takes two poses.
             name = "" if row.test == "distance" else row.name
             groups.setdefault((row.test, name, row.word("condition")), []).append(row)
-    _refuse_many(groups)
-    return tuple(_pose_test(rows) if rows[0].test in POSES else _path_test(rows) for rows in groups.values())
+    _refuse_too_many_parts(groups)
+    return tuple(_pose_test(rows) if rows[0].test in POSE_KINDS else _path_test(rows) for rows in groups.values())
 
 
-def _refuse_many(groups: Mapping[tuple[str, ...], Sequence[Row]]) -> None:
+def _refuse_too_many_parts(groups: Mapping[tuple[str, ...], Sequence[Row]]) -> None:
     """Refuse more tests, and poses, instants and runs in them, than a laboratory measures: each is an object.
 
     Raises:
@@ -147,7 +149,7 @@ def _refuse_many(groups: Mapping[tuple[str, ...], Sequence[Row]]) -> None:
     most = limit("entries")
     for group, rows in groups.items():
         for row in rows:
-            parts.add((group, _part(row) if row.test in POSES else row.cycle))
+            parts.add((group, _part_key(row) if row.test in POSE_KINDS else row.cycle))
             if len(parts) > most:
                 raise row.error("test", f"too many tests, and poses and runs in them: {limit_message('entries')}")
 
@@ -162,7 +164,7 @@ def _pose_test(rows: list[Row]) -> PoseTest:
         commanded[row.name] = row
     clouds: dict[tuple[str, float | None], list[Row]] = {}
     for row in (row for row in rows if row.cycle is not None):
-        clouds.setdefault(_part(row), []).append(row)
+        clouds.setdefault(_part_key(row), []).append(row)
     for cloud in clouds.values():
         _refuse_repeated_cycles(cloud)
     if not clouds:
@@ -170,7 +172,7 @@ def _pose_test(rows: list[Row]) -> PoseTest:
     parts = tuple(_cloud(part, commanded) for part in clouds.values())
     names = list(dict.fromkeys(row.name for row in rows))
     if first.test == "distance":
-        parts = _paired(rows, parts, names)
+        parts = _pair_cycles(rows, parts, names)
     return PoseTest(
         kind=first.test,
         name=" to ".join(names),
@@ -180,9 +182,9 @@ def _pose_test(rows: list[Row]) -> PoseTest:
     )
 
 
-def _part(row: Row) -> tuple[str, float | None]:
+def _part_key(row: Row) -> tuple[str, float | None]:
     """Return the part of its test to which a row belongs: a direction, a robot or a pose, and for drift a time."""
-    label = row.word(_LABELS[row.test]) if row.test in _LABELS else row.name
+    label = row.word(_LABEL_COLUMNS[row.test]) if row.test in _LABEL_COLUMNS else row.name
     return label, row.number("t") if row.test == "drift" else None
 
 
@@ -194,23 +196,23 @@ def _refuse_repeated_cycles(rows: Sequence[Row]) -> None:
     same = (cycles[order][1:] == cycles[order][:-1]) & (loads[order][1:] == loads[order][:-1])
     if same.any():
         twins = order[1:][same]
-        which = int(twins.argmin())
-        row, first = rows[int(twins[which])], rows[int(order[:-1][same][which])]
+        earliest = int(twins.argmin())
+        row, first = rows[int(twins[earliest])], rows[int(order[:-1][same][earliest])]
         raise row.error("cycle", f"a second row of cycle {row.cycle}, after line {first.line}")
 
 
 def _cloud(rows: list[Row], commanded: dict[str, Row]) -> Cloud:
     first = rows[0]
     goal = commanded.get(first.name)
-    if goal is None and first.test in _COMMANDED:
+    if goal is None and first.test in _KINDS_WITH_COMMAND:
         raise first.error("cycle", f"{first.name} has no commanded pose: expected a row with cycle commanded")
-    positions, angles = _stacked(rows, "position"), _stacked(rows, "angles")
+    positions, angles = _stack_rows(rows, "position"), _stack_rows(rows, "angles")
     if goal is not None:
         _refuse_different_units(goal, np.array([goal.position]), positions)
         question = angle_unit_question(np.array(goal.angles), angles)
         if question:
             raise goal.error("cycle", question)
-    label, t = _part(first)
+    label, t = _part_key(first)
     return Cloud(
         label=label,
         t=t,
@@ -223,13 +225,13 @@ def _cloud(rows: list[Row], commanded: dict[str, Row]) -> Cloud:
     )
 
 
-def _paired(rows: list[Row], clouds: tuple[Cloud, ...], names: list[str]) -> tuple[Cloud, ...]:
+def _pair_cycles(rows: list[Row], clouds: tuple[Cloud, ...], names: list[str]) -> tuple[Cloud, ...]:
     """Return the two poses of a distance with their cycles in one order."""
     if len(clouds) != 2:
         raise rows[0].error("pose", f"a distance needs two poses, got {len(clouds)}: {', '.join(names)}")
-    lacking = set(clouds[0].cycles) ^ set(clouds[1].cycles)
-    if lacking:
-        raise rows[0].error("cycle", f"cycle {min(lacking)} of {' to '.join(names)} has one of the two poses only")
+    unpaired = set(clouds[0].cycles) ^ set(clouds[1].cycles)
+    if unpaired:
+        raise rows[0].error("cycle", f"cycle {min(unpaired)} of {' to '.join(names)} has one of the two poses only")
     order = [np.argsort(cloud.cycles) for cloud in clouds]
     return tuple(
         attrs.evolve(cloud, cycles=tuple(sorted(cloud.cycles)), positions=cloud.positions[i], angles=cloud.angles[i])
@@ -247,7 +249,7 @@ def _path_test(rows: list[Row]) -> PathTest:
             runs.setdefault(row.cycle, []).append(row)
     if not runs:
         raise rows[0].error("cycle", "the test has commanded rows, but no attained ones")
-    if not path and first.test in _COMMANDED:
+    if not path and first.test in _KINDS_WITH_COMMAND:
         raise rows[0].error("cycle", f"{first.name} has no commanded path: expected rows with cycle commanded")
     if path and first.test == "settling":
         raise path[0].error("cycle", "a settling test must not have a commanded row: its pose is the end of the run")
@@ -278,13 +280,13 @@ def _trace(rows: list[Row], *, timed: bool) -> Trace:
     if len(rows) < 2:
         raise first.error("cycle", f"a {'run' if timed else 'path'} has two rows at least, and this is its only one")
     return Trace(
-        positions=_stacked(rows, "position"),
+        positions=_stack_rows(rows, "position"),
         times=_times(rows) if timed else None,
-        angles=_stacked(rows, "angles") if first.angles else None,
+        angles=_stack_rows(rows, "angles") if first.angles else None,
     )
 
 
-def _stacked(rows: Sequence[Row], what: str) -> Array:
+def _stack_rows(rows: Sequence[Row], what: str) -> Array:
     """Return (n, k) coordinates or angles of rows of one layout."""
     width = len(getattr(rows[0], what))
     numbers = (number for row in rows for number in getattr(row, what))

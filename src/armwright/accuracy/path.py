@@ -1,21 +1,19 @@
 """Accuracy and repeatability of a path, AT and RT, and the speed along it, AV, RV and FV."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
-from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrapped
-from armwright.accuracy.cycles import Kind, checked_cycles
-from armwright.accuracy.planes import ENDS, Legs, legs_of, middles, passages
-from armwright.accuracy.trace import Trace, frozen_array, positive, refuse_mixed_dimensions
-from armwright.arrays import Array, number, reduce_by_fields
+from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrap_to_pi
+from armwright.accuracy.cycles import Kind, check_cycles
+from armwright.accuracy.planes import END_SHARE, Legs, legs_of, passages
+from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
+from armwright.arrays import Array, number, positive, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
-# Planes across a path, and stretches over which speeds are taken.
-PLANES, STRETCHES = 200, 20
+# Planes across a path, and sections over which speeds are taken.
+PLANES, SECTIONS = 200, 20
 # The part of a path on which the speed is steady, unless told otherwise.
 STEADY = (0.25, 0.75)
 
@@ -61,7 +59,7 @@ class PathVelocity:
         accuracy: AV, mean less commanded speed, in parts of the commanded one.
         repeatability: RV, three deviations of the mean speeds of the runs, in parts of the commanded speed.
         fluctuation: FV, the largest difference of speeds within one run [m/s].
-        stations: (m,) middles of the stretches along the path [m].
+        stations: (m,) midpoints of the sections along the path [m].
         speeds: (n, m) of every run on every stretch [m/s].
         cycles: n.
     """
@@ -103,18 +101,18 @@ def path_deviation(
     Source:
         ISO 9283:1998, 8.2 to 8.4.
     """
-    count = _checked(kind, commanded, runs, few=few)
+    count = _check_runs(kind, commanded, runs, few=few)
     legs = legs_of(commanded)
     if planes < 1:
         raise InvalidValueError(f"{kind}: expected at least one plane, got {planes}")
-    stations = _apart(legs, middles(legs.stations[-1], planes), corners)
-    across, passed = passages(legs, stations, runs, what=kind, ends=ENDS)
+    stations = _exclude_corners(legs, legs.stations[-1] * ((np.arange(planes) + 0.5) / planes), corners)
+    across, passed = passages(legs, stations, runs, what=kind, ends=END_SHARE)
     P, A = np.array([run.positions for run in passed]), np.array([run.angles for run in passed])
     mean = P.mean(axis=0)
     distances = np.linalg.norm(P - mean, axis=2)
     offsets = np.linalg.norm(mean - across.points, axis=1)
     radii = distances.mean(axis=0) + 3 * distances.std(axis=0, ddof=1)
-    rotations = [wrapped(mean_angles(A[:, i]) - across.angles[i]) for i in range(len(mean))]
+    rotations = [wrap_to_pi(mean_angles(A[:, i]) - across.angles[i]) for i in range(len(mean))]
     scatter = [three_sigma(angle_deviations(A[:, i])) for i in range(len(mean))]
     return PathDeviation(
         accuracy=float(offsets.max()),
@@ -136,7 +134,7 @@ def path_velocity(
     runs: Sequence[Trace],
     speed: float,
     *,
-    stretches: int = STRETCHES,
+    sections: int = SECTIONS,
     part: tuple[float, float] = STEADY,
     few: bool = False,
 ) -> PathVelocity:
@@ -149,7 +147,7 @@ def path_velocity(
         commanded: the points of the path, from start to end.
         runs: what was measured, with times.
         speed: the commanded one [m/s].
-        stretches: pieces of the path, all of one length, over each of which a speed is taken.
+        sections: pieces of the path, all of one length, over each of which a speed is taken.
         part: of the path on which the speed should be steady.
         few: take fewer than 10 cycles.
 
@@ -161,13 +159,13 @@ def path_velocity(
     Source:
         ISO 9283:1998, 8.6.
     """
-    count = _checked("velocity", commanded, runs, few=few)
+    count = _check_runs("velocity", commanded, runs, few=few)
     speed = positive(speed, "velocity: the commanded speed", "m/s")
     start, end = part
-    if not (0 <= start < end <= 1 and stretches >= 1):
+    if not (0 <= start < end <= 1 and sections >= 1):
         raise InvalidValueError(f"velocity: expected a part within 0 to 1 and a stretch at least, got {part}")
     legs = legs_of(commanded)
-    edges = legs.stations[-1] * np.linspace(start, end, stretches + 1)
+    edges = legs.stations[-1] * np.linspace(start, end, sections + 1)
     for run in runs:
         run.timed("velocity")
     _, passed = passages(legs, edges, runs, what="velocity")
@@ -186,8 +184,8 @@ def path_velocity(
     )
 
 
-def _checked(kind: Kind, commanded: Trace, runs: Sequence[Trace], *, few: bool) -> int:
-    count = checked_cycles(kind, [len(runs)], few=few, least=2)
+def _check_runs(kind: Kind, commanded: Trace, runs: Sequence[Trace], *, few: bool) -> int:
+    count = check_cycles(kind, [len(runs)], few=few, least=2)
     refuse_mixed_dimensions([commanded.positions, *(run.positions for run in runs)], kind)
     columns = sorted({0 if trace.angles is None else trace.angles.shape[1] for trace in (commanded, *runs)})
     if len(columns) > 1 and kind != "velocity":
@@ -195,8 +193,12 @@ def _checked(kind: Kind, commanded: Trace, runs: Sequence[Trace], *, few: bool) 
     return count
 
 
-def _apart(legs: Legs, stations: Array, corners: float) -> Array:
-    """Leave out what is near a corner."""
+def _exclude_corners(legs: Legs, stations: Array, corners: float) -> Array:
+    """Return the stations that are not near a corner.
+
+    Raises:
+        InvalidValueError: all are.
+    """
     corners = number(corners, "corners")
     sharp = legs.stations[legs.corners]
     near = np.abs(stations[:, None] - sharp[None, :]).min(axis=1, initial=np.inf) < corners

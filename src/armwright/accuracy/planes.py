@@ -6,29 +6,27 @@ behind to the front, where no other part of the path is much nearer. Of all choi
 with the least sum of squares is taken: of the distances from the path, and of the lengths run backwards between planes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
-from armwright.accuracy.trace import Trace, frozen_array, unwrapped
-from armwright.arrays import Array, reduce_by_fields
+from armwright.accuracy.trace import Trace, unwrap_angles
+from armwright.arrays import Array
 from armwright.errors import InvalidValueError
 
 # Where two legs meet at a larger angle than this [rad], there is a corner, and the planes do not turn gradually.
 CORNER = np.radians(20)
 # Passages of one plane that are looked at, the nearest ones.
-_NEAREST = 100
+_MAX_CANDIDATES = 100
 # A passage belongs to a plane if no other part of the path is nearer by more than this factor, rounding aside.
-_NEARER, _ROUNDING = 2.0, 1e-9
+_MAX_DISTANCE_RATIO, _ROUNDING = 2.0, 1e-9
 # Passages whose distances from the path are worked out at once.
-_AT_ONCE = 256
+_BLOCK = 256
 # So much of a path at either end may be left out, where runs begin late or end early.
-ENDS = 0.05
+END_SHARE = 0.05
 # Points of a commanded path this much nearer together than its length are one.
-_SAME = 1e-12
+_COINCIDENT = 1e-12
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -40,16 +38,12 @@ class Planes:
         points: (m, 2) or (m, 3) where they cut it [m].
         normals: (m, 2) or (m, 3) unit vectors along it.
         angles: (m, k) commanded angles there [rad], free of jumps.
-        length: of the whole path [m].
     """
 
-    stations: Array = attrs.field(converter=frozen_array)
-    points: Array = attrs.field(converter=frozen_array)
-    normals: Array = attrs.field(converter=frozen_array)
-    angles: Array = attrs.field(converter=frozen_array)
-    length: float
-
-    __reduce__ = reduce_by_fields
+    stations: Array
+    points: Array
+    normals: Array
+    angles: Array
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -62,9 +56,9 @@ class Passages:
         angles: (m, k) [rad], free of jumps.
     """
 
-    positions: Array = attrs.field(converter=frozen_array)
+    positions: Array
     times: Array | None
-    angles: Array = attrs.field(converter=frozen_array)
+    angles: Array
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -95,7 +89,7 @@ def legs_of(commanded: Trace) -> Legs:
     steps = np.linalg.norm(np.diff(commanded.positions, axis=0), axis=1)
     if not steps.sum() > 0:
         raise InvalidValueError("commanded path: all of its points coincide")
-    distinct = np.append(True, steps > _SAME * steps.sum())
+    distinct = np.append(True, steps > _COINCIDENT * steps.sum())
     positions = commanded.positions[distinct]
     legs = np.diff(positions, axis=0)
     lengths = np.linalg.norm(legs, axis=1)
@@ -103,17 +97,11 @@ def legs_of(commanded: Trace) -> Legs:
     cosines = np.sum(directions[:-1] * directions[1:], axis=1)
     return Legs(
         positions=positions,
-        angles=unwrapped(commanded.angles, len(distinct))[distinct],
+        angles=unwrap_angles(commanded.angles, len(distinct))[distinct],
         stations=np.append(0.0, np.cumsum(lengths)),
         directions=directions,
         corners=np.concatenate([[False], cosines < np.cos(CORNER), [False]]),
     )
-
-
-def middles(length: float, count: int, part: tuple[float, float] = (0.0, 1.0)) -> Array:
-    """Return the middles of ``count`` equal pieces of a part of a path, (count,) [m]."""
-    start, end = part
-    return np.asarray(length * (start + (end - start) * (np.arange(count) + 0.5) / count))
 
 
 def planes_at(legs: Legs, stations: Array) -> Planes:
@@ -125,7 +113,7 @@ def planes_at(legs: Legs, stations: Array) -> Planes:
     before = np.vstack([legs.directions[:1], legs.directions])
     after = np.vstack([legs.directions, legs.directions[-1:]])
     mean = before + after
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), _SAME)
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), _COINCIDENT)
     sharp = legs.corners[:, None]
     start, end = np.where(sharp, after, mean)[leg], np.where(sharp, before, mean)[leg + 1]
     normals = (1 - part) * start + part * end
@@ -134,7 +122,6 @@ def planes_at(legs: Legs, stations: Array) -> Planes:
         points=(1 - part) * legs.positions[leg] + part * legs.positions[leg + 1],
         normals=normals / np.linalg.norm(normals, axis=1, keepdims=True),
         angles=(1 - part) * legs.angles[leg] + part * legs.angles[leg + 1],
-        length=float(s[-1]),
     )
 
 
@@ -159,18 +146,19 @@ def passages(
     planes = planes_at(legs, stations)
     candidates = [_candidates(legs, planes, run) for run in runs]
     passed = np.array([[len(samples) > 0 for samples, _ in by_plane] for by_plane in candidates])
-    away = np.minimum(stations, planes.length - stations) > ends * planes.length
+    length = float(legs.stations[-1])
+    away = np.minimum(stations, length - stations) > ends * length
     not_passed = np.argwhere(~passed & away)
     if len(not_passed) or not passed.all(axis=0).any():
         run, i = not_passed[0] if len(not_passed) else np.argwhere(~passed)[0]
         raise InvalidValueError(
             f"{what}: run {run + 1} does not go through the plane at {stations[i] * 1e3:.4g} of "
-            f"{planes.length * 1e3:.4g} mm of the commanded path: it begins too late, ends too early, "
+            f"{length * 1e3:.4g} mm of the commanded path: it begins too late, ends too early, "
             f"or cuts a corner{_corner_hint(legs, stations[i])}"
         )
     common = np.flatnonzero(passed.all(axis=0))
     return planes_at(legs, stations[common]), [
-        _passages(run, _in_order([by_plane[i] for i in common], _along(run)))
+        _interpolate_passages(run, _select_passages([by_plane[i] for i in common], _arc_lengths(run)))
         for by_plane, run in zip(candidates, runs, strict=True)
     ]
 
@@ -185,15 +173,15 @@ def _corner_hint(legs: Legs, station: float) -> str:
     )
 
 
-def _passages(run: Trace, samples: Array) -> Passages:
+def _interpolate_passages(run: Trace, samples: Array) -> Passages:
     return Passages(
-        positions=_interpolated(run.positions, samples),
-        times=None if run.times is None else _interpolated(run.times, samples),
-        angles=_interpolated(unwrapped(run.angles, len(run.positions)), samples),
+        positions=_interpolate(run.positions, samples),
+        times=None if run.times is None else _interpolate(run.times, samples),
+        angles=_interpolate(unwrap_angles(run.angles, len(run.positions)), samples),
     )
 
 
-def _along(run: Trace) -> Array:
+def _arc_lengths(run: Trace) -> Array:
     """Return the distance covered until every sample (n,) [m]."""
     return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.positions, axis=0), axis=1)))
 
@@ -203,27 +191,30 @@ def _candidates(legs: Legs, planes: Planes, run: Trace) -> list[tuple[Array, Arr
     candidates = []
     for point, normal in zip(planes.points, planes.normals, strict=True):
         samples = _crossings(run.positions, point, normal)
-        squares = np.sum((_interpolated(run.positions, samples) - point) ** 2, axis=1)
-        nearest = np.sort(np.argsort(squares, kind="stable")[:_NEAREST])
+        squares = np.sum((_interpolate(run.positions, samples) - point) ** 2, axis=1)
+        nearest = np.sort(np.argsort(squares, kind="stable")[:_MAX_CANDIDATES])
         candidates.append((samples[nearest], squares[nearest]))
-    every = np.concatenate([samples for samples, _ in candidates])
-    clear = _clearances(legs, _interpolated(run.positions, every))
-    own = np.sqrt(np.concatenate([squares for _, squares in candidates])) <= _NEARER * clear + _ROUNDING * planes.length
-    pieces = np.split(own, np.cumsum([len(samples) for samples, _ in candidates])[:-1])
-    return [(samples[mine], squares[mine]) for (samples, squares), mine in zip(candidates, pieces, strict=True)]
+    all_samples = np.concatenate([samples for samples, _ in candidates])
+    distances = np.sqrt(np.concatenate([squares for _, squares in candidates]))
+    smallest = _distances_from_path(legs, _interpolate(run.positions, all_samples))
+    is_nearest = distances <= _MAX_DISTANCE_RATIO * smallest + _ROUNDING * legs.stations[-1]
+    ends = np.cumsum([len(samples) for samples, _ in candidates])[:-1]
+    return [
+        (samples[i], squares[i]) for (samples, squares), i in zip(candidates, np.split(is_nearest, ends), strict=True)
+    ]
 
 
-def _clearances(legs: Legs, positions: Array) -> Array:
+def _distances_from_path(legs: Legs, positions: Array) -> Array:
     """Return the distances of positions (k, d) from a path, (k,) [m]."""
     starts, u = legs.positions[:-1], legs.directions
     lengths = np.diff(legs.stations)
-    clearances = np.empty(len(positions))
-    for first in range(0, len(positions), _AT_ONCE):
-        some = positions[first : first + _AT_ONCE]
+    distances = np.empty(len(positions))
+    for first in range(0, len(positions), _BLOCK):
+        some = positions[first : first + _BLOCK]
         relative = some[:, None, :] - starts
         part = np.clip(np.einsum("ksd,sd->ks", relative, u), 0.0, lengths)
-        clearances[first : first + _AT_ONCE] = np.linalg.norm(relative - part[..., None] * u, axis=2).min(axis=1)
-    return clearances
+        distances[first : first + _BLOCK] = np.linalg.norm(relative - part[..., None] * u, axis=2).min(axis=1)
+    return distances
 
 
 def _crossings(positions: Array, point: Array, normal: Array) -> Array:
@@ -234,18 +225,18 @@ def _crossings(positions: Array, point: Array, normal: Array) -> Array:
     return np.asarray(np.append(0.0, crossings) if ahead[0] == 0 else crossings)
 
 
-def _interpolated(values: Array, samples: Array) -> Array:
+def _interpolate(values: Array, samples: Array) -> Array:
     """Return values at fractional numbers of samples (m,)."""
     before = np.minimum(samples.astype(np.int64), len(values) - 2)
     part = (samples - before).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray((1 - part) * values[before] + part * values[before + 1])
 
 
-def _in_order(candidates: list[tuple[Array, Array]], along: Array) -> Array:
-    """Choose one passage per plane, the sum of squares being the least."""
+def _select_passages(candidates: list[tuple[Array, Array]], along: Array) -> Array:
+    """Return the sample of one passage per plane, those with the least sum of squares."""
     best, last, origins = np.zeros(1), np.zeros(1), []
     for samples, squares in candidates:
-        s = _interpolated(along, samples)
+        s = _interpolate(along, samples)
         costs = best[:, None] + np.maximum(last[:, None] - s[None, :], 0.0) ** 2
         origins.append(np.argmin(costs, axis=0))
         best, last = costs.min(axis=0) + squares, s

@@ -1,15 +1,12 @@
 """Accuracy and repeatability of one pose: AP and RP."""
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 
-from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrapped
-from armwright.accuracy.cycles import Kind, checked_cycles
-from armwright.accuracy.trace import angles_of, frozen_array, position_of, positions_of
-from armwright.arrays import Array, ArrayLike, floats, reduce_by_fields
-from armwright.errors import ShapeError
+from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrap_to_pi
+from armwright.accuracy.cycles import Kind, check_cycles
+from armwright.accuracy.trace import as_angles, as_commanded_angles, as_position, as_positions, frozen_array
+from armwright.arrays import Array, ArrayLike, reduce_by_fields
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -81,14 +78,14 @@ def pose_accuracy(
     Source:
         ISO 9283:1998, 7.2.1.
     """
-    P, A = _cloud(positions, angles)
-    count = checked_cycles("pose", [len(P)], few=few, least=1)
-    goal = position_of(commanded, P.shape[1])
+    P, A = _check_cloud(positions, angles)
+    count = check_cycles("pose", [len(P)], few=few, least=1)
+    goal = as_position(commanded, P.shape[1])
     barycentre = P.mean(axis=0)
     return PoseAccuracy(
         position=float(np.linalg.norm(barycentre - goal)),
         components=barycentre - goal,
-        angles=from_commanded(A, commanded_angles),
+        angles=angle_errors(A, commanded_angles),
         barycentre=barycentre,
         cycles=count,
     )
@@ -112,13 +109,13 @@ def pose_repeatability(
     Source:
         ISO 9283:1998, 7.2.2: the radius is the mean distance *plus* three deviations.
     """
-    P, A = _cloud(positions, angles)
+    P, A = _check_cloud(positions, angles)
     return repeatability("pose", P, A, few=few)
 
 
 def repeatability(kind: Kind, P: Array, A: Array, *, few: bool) -> PoseRepeatability:
     """Return RP of a cloud (n, d) with angles (n, k), as part of a test of any kind."""
-    count = checked_cycles(kind, [len(P)], few=few, least=2)
+    count = check_cycles(kind, [len(P)], few=few, least=2)
     barycentre = P.mean(axis=0)
     distances = np.linalg.norm(P - barycentre, axis=1)
     deviation = float(distances.std(ddof=1))
@@ -132,16 +129,11 @@ def repeatability(kind: Kind, P: Array, A: Array, *, few: bool) -> PoseRepeatabi
     )
 
 
-def _cloud(positions: ArrayLike, angles: ArrayLike | None) -> tuple[Array, Array]:
-    P = positions_of(positions)
-    return P, angles_of(angles, len(P))
+def _check_cloud(positions: ArrayLike, angles: ArrayLike | None) -> tuple[Array, Array]:
+    P = as_positions(positions)
+    return P, as_angles(angles, len(P))
 
 
-def from_commanded(A: Array, commanded: ArrayLike | None) -> Array:
+def angle_errors(A: Array, commanded: ArrayLike | None) -> Array:
     """Return the means of angles (n, k) less the commanded ones (k,), on the circle [rad]."""
-    goal = np.empty(0) if commanded is None else floats(commanded, "commanded angles")
-    if goal.shape != A.shape[1:]:
-        raise ShapeError(
-            f"commanded angles: expected {A.shape[1]} numbers, as many as were measured, got shape {goal.shape}"
-        )
-    return wrapped(mean_angles(A) - goal)
+    return wrap_to_pi(mean_angles(A) - as_commanded_angles(commanded, A.shape[1]))

@@ -1,19 +1,17 @@
 """Coming to rest: stabilisation time, overshoot, minimum posing time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
-from armwright.accuracy.cycles import Kind, checked_cycles
-from armwright.accuracy.trace import Trace, frozen_array, positive, refuse_mixed_dimensions
-from armwright.arrays import Array, reduce_by_fields
+from armwright.accuracy.cycles import Kind, check_cycles
+from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
+from armwright.arrays import Array, positive, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # The attained pose is the mean over this last part of a record, in which nothing may happen any more.
-TAIL = 0.1
+REST_SHARE = 0.1
 # On the edge of the band by so little is rounding.
 _ROUNDING = 1e-9
 
@@ -84,8 +82,8 @@ def settling(runs: Sequence[Trace], band: float, *, few: bool = False) -> Settli
     Source:
         ISO 9283:1998, 7.4 and 7.5.
     """
-    band = _checked("settling", runs, band, few=few)
-    arrivals = [_arrival(run, band, j) for j, run in enumerate(runs)]
+    band = _check_runs("settling", runs, band, few=few)
+    arrivals = [_find_arrival(run, band, j) for j, run in enumerate(runs)]
     entered, settled, overshoots = (np.array(column) for column in zip(*arrivals, strict=True))
     return Settling(
         time=float((settled - entered).mean()),
@@ -117,11 +115,11 @@ def posing_time(runs: Sequence[Trace], band: float, *, few: bool = False) -> Pos
     Source:
         ISO 9283:1998, 9.
     """
-    band = _checked("posing", runs, band, few=few)
+    band = _check_runs("posing", runs, band, few=few)
     times, distances = [], []
     for j, run in enumerate(runs):
-        _, settled, _ = _arrival(run, band, j)
-        times.append(settled - _leaving(run, band))
+        _, settled, _ = _find_arrival(run, band, j)
+        times.append(settled - _departure_time(run, band))
         distances.append(float(np.linalg.norm(attained_position(run) - run.positions[0])))
     return PosingTime(
         time=float(np.mean(times)), distance=float(np.mean(distances)), times=times, band=band, cycles=len(runs)
@@ -131,16 +129,16 @@ def posing_time(runs: Sequence[Trace], band: float, *, few: bool = False) -> Pos
 def attained_position(run: Trace) -> Array:
     """Return where a record comes to rest: the mean position of its last tenth (2,) or (3,) [m]."""
     t = run.timed("settling")
-    return np.asarray(run.positions[t >= t[-1] - TAIL * (t[-1] - t[0])].mean(axis=0))
+    return np.asarray(run.positions[t >= t[-1] - REST_SHARE * (t[-1] - t[0])].mean(axis=0))
 
 
-def _checked(kind: Kind, runs: Sequence[Trace], band: float, *, few: bool) -> float:
-    checked_cycles(kind, [len(runs)], few=few, least=1)
+def _check_runs(kind: Kind, runs: Sequence[Trace], band: float, *, few: bool) -> float:
+    check_cycles(kind, [len(runs)], few=few, least=1)
     refuse_mixed_dimensions([run.positions for run in runs], kind)
-    return positive(band, f"{kind}: the band", "m")
+    return positive(band, f"{kind}: band", "m")
 
 
-def _arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, float]:
+def _find_arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, float]:
     """Return when a run enters the band, when it does so for good, and how far it swings out between the two."""
     t = run.timed("settling")
     relative = run.positions - attained_position(run)
@@ -150,18 +148,18 @@ def _arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, float]:
         raise InvalidValueError(
             f"settling: run {cycle + 1} begins within {band * 1e3:g} mm of its end; start the record before the arrival"
         )
-    if t[outside[-1]] >= t[-1] - TAIL * (t[-1] - t[0]):
+    if t[outside[-1]] >= t[-1] - REST_SHARE * (t[-1] - t[0]):
         raise InvalidValueError(
             f"settling: run {cycle + 1} is still more than {band * 1e3:g} mm away in the last tenth of its record; "
             "record longer, or use a wider band"
         )
-    entries = _entries(t, relative, band)
+    entries = _entry_times(t, relative, band)
     entered = float(np.nanmin(entries))
     swings = float(distances[t >= entered].max())
     return entered, float(entries[outside[-1]]), swings if swings > band * (1 + _ROUNDING) else 0.0
 
 
-def _entries(t: Array, relative: Array, band: float) -> Array:
+def _entry_times(t: Array, relative: Array, band: float) -> Array:
     """Return when a run goes into the ball of the band between each sample and the next (n-1,), NaN where it does not.
 
     A fast run may be through the ball between two samples, which counts.
@@ -175,7 +173,7 @@ def _entries(t: Array, relative: Array, band: float) -> Array:
     return np.asarray(t[:-1] + np.where(part <= 1, part, np.nan) * np.diff(t))
 
 
-def _leaving(run: Trace, band: float) -> float:
+def _departure_time(run: Trace, band: float) -> float:
     """Return when a run leaves the band about its first position."""
     t, distances = run.timed("posing"), np.linalg.norm(run.positions - run.positions[0], axis=1)
     after = int(np.argmax(distances > band))

@@ -1,7 +1,5 @@
 """Tables of measured poses and paths: their columns, and their rows in SI units."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -54,7 +52,7 @@ class Row:
 
     __slots__ = ("_nominal", "_row", "_table")
 
-    def __init__(self, table: Table, row: int, *, nominal: bool = False) -> None:
+    def __init__(self, table: "Table", row: int, *, nominal: bool = False) -> None:
         """Refer to a row of a table, counted from 0, or to the pose of its nominal columns."""
         self._table, self._row, self._nominal = table, row, nominal
 
@@ -168,11 +166,11 @@ def read_tables(
             line and column.
     """
     for header in read_headers(paths, _SCHEMA, columns=columns):
-        yield _table(header, skip_incomplete=skip_incomplete)
+        yield _read_table(header, skip_incomplete=skip_incomplete)
 
 
-def _table(header: Header, *, skip_incomplete: bool) -> Table:
-    name, nominal = _name(header), header.columns_present(f"{name}_nominal" for name in (*_COORDINATES, *ANGLES))
+def _read_table(header: Header, *, skip_incomplete: bool) -> Table:
+    name, nominal = _name_column(header), header.columns_present(f"{name}_nominal" for name in (*_COORDINATES, *ANGLES))
     identifiers = header.columns_present(("test", "cycle"))
     header.require(("x", "y") if nominal else ("test", "cycle", "x", "y"))
     measured = header.columns_present((*_COORDINATES, *ANGLES))
@@ -190,7 +188,7 @@ def _table(header: Header, *, skip_incomplete: bool) -> Table:
         columns.choice("test", row, tuple(_KINDS))
     return Table(
         columns=columns,
-        cycles=_cycles(columns) if "cycle" in columns else _counted(columns, name),
+        cycles=_read_cycles(columns) if "cycle" in columns else _count_cycles(columns, name),
         coordinates=header.columns_present(_COORDINATES),
         angles=header.columns_present(ANGLES),
         nominal=bool(nominal),
@@ -216,7 +214,7 @@ def _required_cells() -> Callable[[CellText], Sequence[RequiredCells]]:
     return required_cells
 
 
-def _name(header: Header) -> str:
+def _name_column(header: Header) -> str:
     """Return which column names what was measured: pose or path.
 
     Raises:
@@ -231,7 +229,7 @@ def _name(header: Header) -> str:
     return name
 
 
-def _cycles(columns: UnitTable) -> array[int]:
+def _read_cycles(columns: UnitTable) -> "array[int]":
     """Return the numbers of the cycles; 0 for what was commanded.
 
     Raises:
@@ -249,7 +247,7 @@ def _cycles(columns: UnitTable) -> array[int]:
     return cycles
 
 
-def _counted(columns: UnitTable, name: str) -> array[int]:
+def _count_cycles(columns: UnitTable, name: str) -> "array[int]":
     """Return the numbers of the cycles where a file does not have them: rows of one pose, counted."""
     counts: dict[tuple[str | float | None, ...], int] = {}
     cycles = array("q")

@@ -1,20 +1,18 @@
 """Measured positions and traces: checked, copied and read-only."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, read_only, reduce_by_fields
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 # Three angles have names; a measurement may hold fewer.
 ANGLES = ("a", "b", "c")
 
 
-def positions_of(value: ArrayLike, what: str = "positions") -> Array:
+def as_positions(value: ArrayLike, what: str = "positions") -> Array:
     """Return measured positions as read-only float64.
 
     Args:
@@ -33,7 +31,7 @@ def positions_of(value: ArrayLike, what: str = "positions") -> Array:
     return array
 
 
-def position_of(value: ArrayLike, size: int, what: str = "commanded position") -> Array:
+def as_position(value: ArrayLike, size: int, what: str = "commanded position") -> Array:
     """Return one position of ``size`` numbers [m].
 
     Raises:
@@ -46,7 +44,7 @@ def position_of(value: ArrayLike, size: int, what: str = "commanded position") -
     return array
 
 
-def angles_of(value: ArrayLike | None, rows: int, what: str = "angles") -> Array:
+def as_angles(value: ArrayLike | None, rows: int, what: str = "angles") -> Array:
     """Return measured angles as read-only float64 (n, k) [rad], k from 0 to 3; none where there is nothing.
 
     Raises:
@@ -59,16 +57,18 @@ def angles_of(value: ArrayLike | None, rows: int, what: str = "angles") -> Array
     return array
 
 
-def positive(value: float, what: str, unit: str) -> float:
-    """Return a number above 0.
+def as_commanded_angles(value: ArrayLike | None, count: int) -> Array:
+    """Return the commanded angles (k,) of a pose [rad]; none where there is nothing.
 
     Raises:
-        InvalidValueError: it is not.
+        ShapeError: they are not ``count``, the number of measured angles.
     """
-    checked = number(value, what)
-    if not 0 < checked < np.inf:
-        raise InvalidValueError(f"{what} must be above 0 {unit}, got {checked:g}")
-    return checked
+    array = np.empty(0) if value is None else floats(value, "commanded angles")
+    if array.shape != (count,):
+        raise ShapeError(
+            f"commanded angles: expected {count} numbers, as many as were measured, got shape {array.shape}"
+        )
+    return array
 
 
 def refuse_mixed_dimensions(parts: Sequence[Array], what: str) -> None:
@@ -83,7 +83,7 @@ def refuse_mixed_dimensions(parts: Sequence[Array], what: str) -> None:
 
 
 def _trace_positions(value: ArrayLike) -> Array:
-    return positions_of(value, "trace: positions")
+    return as_positions(value, "trace: positions")
 
 
 def _trace_angles(value: ArrayLike | None) -> Array | None:
@@ -130,7 +130,7 @@ class Trace:
             raise ShapeError(f"trace: expected at least two samples, got {rows}")
         if self.times is not None and len(self.times) != rows:
             raise ShapeError(f"trace: {rows} positions but {len(self.times)} times")
-        angles_of(self.angles, rows, "trace: angles")
+        as_angles(self.angles, rows, "trace: angles")
 
     __reduce__ = reduce_by_fields
 
@@ -150,7 +150,7 @@ class Trace:
         return self.times
 
 
-def unwrapped(angles: Array | None, rows: int) -> Array:
+def unwrap_angles(angles: Array | None, rows: int) -> Array:
     """Return angles (n, k) along a trace without jumps of a revolution, so that they can be interpolated."""
     return np.empty((rows, 0)) if angles is None else np.asarray(np.unwrap(angles, axis=0))
 

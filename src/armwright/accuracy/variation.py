@@ -1,17 +1,15 @@
 """How a pose moves when something else changes: direction of approach (vAP), robot (E), time (dAP, dRP)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 
 import attrs
 import numpy as np
 
-from armwright.accuracy.angles import mean_angles, wrapped
-from armwright.accuracy.cycles import DIRECTIONS, ROBOTS, Kind, checked_cycles, checked_parts
-from armwright.accuracy.pose import from_commanded, repeatability
-from armwright.accuracy.trace import angles_of, frozen_array, position_of, positions_of, refuse_mixed_dimensions
+from armwright.accuracy.angles import mean_angles, wrap_to_pi
+from armwright.accuracy.cycles import DIRECTIONS, ROBOTS, Kind, check_cycles, check_parts
+from armwright.accuracy.pose import angle_errors, repeatability
+from armwright.accuracy.trace import as_angles, as_position, as_positions, frozen_array, refuse_mixed_dimensions
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
@@ -82,7 +80,7 @@ def multidirectional_variation(
     Source:
         ISO 9283:1998, 7.2.3.
     """
-    checked_parts("multidirectional", len(positions), DIRECTIONS, few=few, what="directions of approach")
+    check_parts("multidirectional", len(positions), DIRECTIONS, few=few, what="directions of approach")
     return _variation("multidirectional", positions, angles, few=few)
 
 
@@ -104,7 +102,7 @@ def exchangeability(
     Source:
         ISO 9283:1998, 7.7.
     """
-    checked_parts("exchangeability", len(positions), ROBOTS, few=few, what="robots")
+    check_parts("exchangeability", len(positions), ROBOTS, few=few, what="robots")
     return _variation("exchangeability", positions, angles, few=few)
 
 
@@ -136,22 +134,22 @@ def pose_drift(
         ISO 9283:1998, 7.6.
     """
     t = floats(times, "times", LARGEST)
-    clouds = [positions_of(cloud) for cloud in positions]
+    clouds = [as_positions(cloud) for cloud in positions]
     if t.shape != (len(clouds),):
         raise ShapeError(f"times: expected one per measurement, {len(clouds)}, got shape {t.shape}")
     if len(t) < 2 or not (np.diff(t) > 0).all():
         raise InvalidValueError("drift: expected at least two measurements, each later than the one before")
     refuse_mixed_dimensions(clouds, "drift")
-    goal = position_of(commanded, clouds[0].shape[1])
-    angle_clouds = _angles_of_all("drift", clouds, angles)
+    goal = as_position(commanded, clouds[0].shape[1])
+    angle_clouds = _check_angle_clouds("drift", clouds, angles)
     results = [repeatability("drift", P, A, few=few) for P, A in zip(clouds, angle_clouds, strict=True)]
     accuracy = np.array([np.linalg.norm(result.barycentre - goal) for result in results])
     radius = np.array([result.radius for result in results])
-    deviations = [from_commanded(A, commanded_angles) for A in (angle_clouds[0], angle_clouds[-1])]
+    deviations = [angle_errors(A, commanded_angles) for A in (angle_clouds[0], angle_clouds[-1])]
     return PoseDrift(
         accuracy_change=float(abs(accuracy[-1] - accuracy[0])),
         repeatability_change=float(abs(radius[-1] - radius[0])),
-        accuracy_change_angles=np.abs(wrapped(deviations[1] - deviations[0])),
+        accuracy_change_angles=np.abs(wrap_to_pi(deviations[1] - deviations[0])),
         repeatability_change_angles=np.abs(results[-1].angles - results[0].angles),
         times=t,
         accuracy=accuracy,
@@ -163,10 +161,10 @@ def pose_drift(
 def _variation(
     kind: Kind, positions: Sequence[ArrayLike], angles: Sequence[ArrayLike] | None, *, few: bool
 ) -> Variation:
-    clouds = [positions_of(cloud) for cloud in positions]
-    angle_clouds = _angles_of_all(kind, clouds, angles)
+    clouds = [as_positions(cloud) for cloud in positions]
+    angle_clouds = _check_angle_clouds(kind, clouds, angles)
     refuse_mixed_dimensions(clouds, kind)
-    count = checked_cycles(kind, [len(P) for P in clouds], few=few, least=1)
+    count = check_cycles(kind, [len(P) for P in clouds], few=few, least=1)
     centres = np.array([P.mean(axis=0) for P in clouds])
     means = np.array([mean_angles(A) for A in angle_clouds])
     pairs = list(combinations(range(len(clouds)), 2))
@@ -175,16 +173,16 @@ def _variation(
     return Variation(
         position=distances[most],
         pair=pairs[most],
-        angles=np.max([np.abs(wrapped(means[h] - means[k])) for h, k in pairs], axis=0),
+        angles=np.max([np.abs(wrap_to_pi(means[h] - means[k])) for h, k in pairs], axis=0),
         barycentres=centres,
         cycles=count,
     )
 
 
-def _angles_of_all(kind: Kind, clouds: Sequence[Array], angles: Sequence[ArrayLike] | None) -> list[Array]:
+def _check_angle_clouds(kind: Kind, clouds: Sequence[Array], angles: Sequence[ArrayLike] | None) -> list[Array]:
     """Return the angles (n, k) of each cloud of positions; none where none were measured."""
     if angles is not None and len(angles) != len(clouds):
         raise ShapeError(f"{kind}: {len(clouds)} clouds of positions but {len(angles)} of angles")
-    angle_clouds = [angles_of(None if angles is None else angles[h], len(P)) for h, P in enumerate(clouds)]
+    angle_clouds = [as_angles(None if angles is None else angles[h], len(P)) for h, P in enumerate(clouds)]
     refuse_mixed_dimensions(angle_clouds, f"{kind}, angles")
     return angle_clouds

@@ -1,19 +1,17 @@
 """Weaving: how far stroke and frequency of a swinging run are from the commanded ones, WS and WF."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
-from armwright.accuracy.cycles import checked_cycles
-from armwright.accuracy.trace import Trace, frozen_array, positive, refuse_mixed_dimensions
-from armwright.arrays import Array, reduce_by_fields
+from armwright.accuracy.cycles import check_cycles
+from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
+from armwright.arrays import Array, positive, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # A swing turns round where it has come back by this part of the whole width: more than from the middle to a side.
-_BACK = 0.6
+_REVERSAL_SHARE = 0.6
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -61,22 +59,22 @@ def weaving_deviation(commanded: Trace, runs: Sequence[Trace], speed: float, *, 
     Source:
         ISO 9283:1998, 11.
     """
-    count = checked_cycles("weaving", [len(runs)], few=few, least=1)
+    count = check_cycles("weaving", [len(runs)], few=few, least=1)
     refuse_mixed_dimensions([commanded.positions, *(run.positions for run in runs)], "weaving")
     speed = positive(speed, "weaving: the commanded speed", "m/s")
     line = commanded.positions[-1] - commanded.positions[0]
     if not np.linalg.norm(line) > 0:
         raise InvalidValueError("weaving: the commanded weave ends at its start, so it has no centre line")
     forward = line / np.linalg.norm(line)
-    sideways = _sideways(commanded.positions - commanded.positions[0], forward)
-    swings, reversals = _swings(commanded.positions @ sideways, "the commanded path")
+    sideways = _weaving_direction(commanded.positions - commanded.positions[0], forward)
+    swings, reversals = _strokes_and_reversals(commanded.positions @ sideways, "the commanded path")
     stations = (commanded.positions @ forward)[reversals]
     pitch = 2 * (stations[-1] - stations[0]) / (len(reversals) - 1)
     if not pitch > 0:
         raise InvalidValueError("weaving: the commanded weave does not advance along its centre line")
     strokes, frequencies = [], []
     for j, run in enumerate(runs):
-        widths, extremes = _swings(run.positions @ sideways, f"run {j + 1}")
+        widths, extremes = _strokes_and_reversals(run.positions @ sideways, f"run {j + 1}")
         t = run.timed(f"weaving: run {j + 1}")[extremes]
         strokes.append(float(widths.mean()))
         frequencies.append(float((len(extremes) - 1) / (2 * (t[-1] - t[0]))))
@@ -92,7 +90,7 @@ def weaving_deviation(commanded: Trace, runs: Sequence[Trace], speed: float, *, 
     )
 
 
-def _sideways(relative: Array, forward: Array) -> Array:
+def _weaving_direction(relative: Array, forward: Array) -> Array:
     """Return the direction across the middle line in which a weave is widest."""
     across = relative - (relative @ forward)[:, None] * forward
     _, widths, axes = np.linalg.svd(across - across.mean(axis=0), full_matrices=False)
@@ -101,26 +99,26 @@ def _sideways(relative: Array, forward: Array) -> Array:
     return np.asarray(axes[0])
 
 
-def _swings(side: Array, name: str) -> tuple[Array, Array]:
+def _strokes_and_reversals(offsets: Array, name: str) -> tuple[Array, Array]:
     """Return the widths from side to side and the samples at which a run reverses.
 
     Raises:
         InvalidValueError: there are fewer than three reversals.
     """
-    back = _BACK * np.ptp(side)
+    back = _REVERSAL_SHARE * np.ptp(offsets)
     reversals: list[int] = []
     low = high = 0
     rising: bool | None = None
-    for i, value in enumerate(side.tolist()):
-        low = i if value < side[low] else low
-        high = i if value > side[high] else high
-        if rising is not False and value < side[high] - back:
+    for i, value in enumerate(offsets.tolist()):
+        low = i if value < offsets[low] else low
+        high = i if value > offsets[high] else high
+        if rising is not False and value < offsets[high] - back:
             reversals.append(high)
             rising, low = False, i
-        elif rising is not True and value > side[low] + back:
+        elif rising is not True and value > offsets[low] + back:
             reversals.append(low)
             rising, high = True, i
     if len(reversals) < 3:
         raise InvalidValueError(f"weaving: {name} reverses {len(reversals)} times; expected at least three reversals")
     extremes = np.array(reversals)
-    return np.abs(np.diff(side[extremes])), extremes
+    return np.abs(np.diff(offsets[extremes])), extremes

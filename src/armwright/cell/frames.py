@@ -1,7 +1,5 @@
 """The frame tree: where everything is, and what hangs on what. A tree never changes; a change gives a new one."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
@@ -141,11 +139,11 @@ class FrameTree:
             name = node.parent
         return np.eye(4) if X is None else X
 
-    def declare(self, name: str) -> FrameTree:
+    def declare(self, name: str) -> "FrameTree":
         """Return the tree with a frame that hangs on WORLD and has no value yet; a known frame stays as it is."""
         return self if name in self else self._with(name, Node(parent=WORLD, relation=None))
 
-    def place(self, name: str, X_WF: ArrayLike) -> FrameTree:
+    def place(self, name: str, X_WF: ArrayLike) -> "FrameTree":
         """Return the tree with a frame set to a pose in the world; it goes on hanging on what it hung on.
 
         A frame that hangs rigidly takes its parent along, and that its own, up to ``leader``.
@@ -165,7 +163,7 @@ class FrameTree:
             name = node.parent
         return name
 
-    def without(self, name: str) -> FrameTree:
+    def without(self, name: str) -> "FrameTree":
         """Return the tree without a frame; what hung on it keeps its pose and hangs on WORLD."""
         nodes = dict(self.nodes)
         for child, node in self.nodes.items():
@@ -180,7 +178,7 @@ class FrameTree:
         # What nothing hangs on can hang anywhere: no long path up for the common case.
         return child == parent or (self._children.get(child, 0) > 0 and child in self.ancestors(parent))
 
-    def affix(self, child: str, parent: str, relation: ArrayLike | None = None, *, rigid: bool = False) -> FrameTree:
+    def affix(self, child: str, parent: str, relation: ArrayLike | None = None, *, rigid: bool = False) -> "FrameTree":
         """Return the tree with ``child`` hanging on ``parent``.
 
         Args:
@@ -201,7 +199,7 @@ class FrameTree:
             self.world(parent)
         return self._with(child, Node(parent=parent, relation=relation, rigid=rigid))
 
-    def unfix(self, child: str) -> FrameTree:
+    def unfix(self, child: str) -> "FrameTree":
         """Return the tree with ``child`` cut loose: it keeps its pose and hangs on WORLD."""
         return self._with(child, Node(parent=WORLD, relation=self.world(child)))
 
@@ -211,7 +209,7 @@ class FrameTree:
         except KeyError:
             raise UnknownNameError("frame", name, [WORLD, *self.nodes]) from None
 
-    def _with(self, name: str, node: Node) -> FrameTree:
+    def _with(self, name: str, node: Node) -> "FrameTree":
         # Only what hangs on a changed frame stands elsewhere.
         worlds = {} if self._children.get(name, 0) else {**self._worlds}
         worlds.pop(name, None)

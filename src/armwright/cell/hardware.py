@@ -1,7 +1,5 @@
 """What the interpreter asks of a cell: the one small protocol that a simulated or a real cell answers."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, Protocol
 
 from armwright.arrays import Array

@@ -1,7 +1,5 @@
 """The cell as its file describes it: arms on their bases, frames, what the camera will see, devices, obstacles."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Literal, TypeAlias
 

@@ -1,7 +1,5 @@
 """Cell files: TOML for people, JSON for programs; both say the same."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Mapping

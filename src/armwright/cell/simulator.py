@@ -1,7 +1,5 @@
 """The kinematic simulator: a cell in which everything goes as the cell file says."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import attrs
@@ -77,7 +75,7 @@ class Simulator:
         self._on: set[str] = set()
         self._answers = {name: list(answers) for name, answers in cell.visions.items()}
 
-    def copy(self) -> Simulator:
+    def copy(self) -> "Simulator":
         """Return a simulator in the same state; what one of them does from now on does not change the other."""
         other = Simulator(self._cell)
         other._runs, other._on = dict(self._runs), set(self._on)

@@ -102,7 +102,7 @@ def _assessed(
 
     try:
         assessment = assess(tests, few=few, band=None if band_mm is None else band_mm * 1e-3, corners=corners_mm * 1e-3)
-        return assessment.within({symbol: _in_si(assessment, *bound) for symbol, bound in bounds.items()})
+        return assessment.with_limits({symbol: _in_si(assessment, *bound) for symbol, bound in bounds.items()})
     except TooFewError as error:
         raise TooFewError(str(error).replace("few=True", "--few")) from error
 

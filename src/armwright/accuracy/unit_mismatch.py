@@ -1,13 +1,11 @@
 """Commanded and attained values that are probably in different units."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from armwright.arrays import Array
 
 # How many of the second unit are one of the first.
-_LENGTHS = {
+_LENGTH_RATIOS = {
     "metres and millimetres": 1000.0,
     "metres and centimetres": 100.0,
     "metres and inches": 1 / 0.0254,
@@ -16,11 +14,11 @@ _LENGTHS = {
 }
 _DEGREES = 180 / np.pi
 # How well a ratio must fit, and two directions agree.
-_FIT, _ALIGNED = 0.02, 0.999
+_RATIO_TOLERANCE, _MIN_COSINE = 0.02, 0.999
 # Nearer to the origin, or in a path smaller than this [m], a large ratio may be an honest error.
-_FAR = 0.05
+_MIN_EXTENT = 0.05
 # Angles smaller than this [rad] say nothing of their unit.
-_LARGE_ANGLE = np.radians(10)
+_MIN_ANGLE = np.radians(10)
 
 
 def length_unit_question(commanded: Array, attained: Array) -> str:
@@ -37,14 +35,14 @@ def length_unit_question(commanded: Array, attained: Array) -> str:
     if len(commanded) > 1:
         commanded_norm, attained_norm = (float(np.linalg.norm(np.ptp(P, axis=0))) for P in (commanded, attained))
     else:
-        commanded_norm, attained_norm = _outward(commanded[0], attained.mean(axis=0))
-    if min(commanded_norm, attained_norm) > 0 and max(commanded_norm, attained_norm) > _FAR:
-        for units, factor in _LENGTHS.items():
+        commanded_norm, attained_norm = _aligned_norms(commanded[0], attained.mean(axis=0))
+    if min(commanded_norm, attained_norm) > 0 and max(commanded_norm, attained_norm) > _MIN_EXTENT:
+        for units, factor in _LENGTH_RATIOS.items():
             for larger, ratio in (
                 ("attained", attained_norm / commanded_norm),
                 ("commanded", commanded_norm / attained_norm),
             ):
-                if abs(ratio / factor - 1) < _FIT:
+                if abs(ratio / factor - 1) < _RATIO_TOLERANCE:
                     return f"the {larger} positions are {factor:.4g} times as large as the others: {units}?"
     return ""
 
@@ -53,15 +51,15 @@ def angle_unit_question(commanded: Array, attained: Array) -> str:
     """Ask whether commanded angles (k,) and attained ones (n, k) are in different units; empty where not [rad]."""
     for commanded_norm, attained_norm in zip(np.abs(commanded), np.abs(attained.mean(axis=0)), strict=True):
         small, large = sorted((float(commanded_norm), float(attained_norm)))
-        if small > 0 and large > _LARGE_ANGLE and abs(large / small / _DEGREES - 1) < _FIT:
+        if small > 0 and large > _MIN_ANGLE and abs(large / small / _DEGREES - 1) < _RATIO_TOLERANCE:
             larger = "attained" if attained_norm > commanded_norm else "commanded"
             return f"the {larger} angles are {_DEGREES:.3g} times as large as the others: radians and degrees?"
     return ""
 
 
-def _outward(commanded: Array, attained: Array) -> tuple[float, float]:
+def _aligned_norms(commanded: Array, attained: Array) -> tuple[float, float]:
     """Return the distances from the origin of two positions in one direction from it; nothing of others."""
     commanded_norm, attained_norm = float(np.linalg.norm(commanded)), float(np.linalg.norm(attained))
-    if not commanded @ attained > _ALIGNED * commanded_norm * attained_norm:
+    if not commanded @ attained > _MIN_COSINE * commanded_norm * attained_norm:
         return 0.0, 0.0
     return commanded_norm, attained_norm
