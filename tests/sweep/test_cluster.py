@@ -14,7 +14,7 @@ from armwright.sweep.errors import SweepError
 from armwright.sweep.progress import Progress
 from armwright.sweep.run import run
 from armwright.sweep.task import Status
-from armwright.sweep.worker import work
+from armwright.sweep.worker import evaluate_pickled
 from sweep_tasks import Fall, calls_of
 
 pytest.importorskip("xarray")
@@ -93,7 +93,7 @@ def test_killed_worker(tmp_path: Path) -> None:
 
 def test_cluster_that_goes_away(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the scheduler goes away in the midst of a sweep, nobody waits for it, and finished blocks stay."""
-    monkeypatch.setattr(executors, "PATIENCE", 2.0)
+    monkeypatch.setattr(executors, "CLUSTER_TIMEOUT", 2.0)
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
@@ -121,7 +121,7 @@ def test_cluster_that_goes_away(speeds: Design, tmp_path: Path, monkeypatch: pyt
 
 def test_nobody_answers(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no scheduler it is said which address did not answer."""
-    monkeypatch.setattr(executors, "PATIENCE", 0.3)
+    monkeypatch.setattr(executors, "CLUSTER_TIMEOUT", 0.3)
 
     with pytest.raises(SweepError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:1'"):
         run(Fall(), speeds, tmp_path / "out", scheduler="tcp://127.0.0.1:1")
@@ -135,7 +135,7 @@ def clients() -> list[Any]:
 
 def test_silence(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where something listens and never speaks, nobody waits for ever, and no client is left to the collector."""
-    monkeypatch.setattr(executors, "PATIENCE", 0.5)
+    monkeypatch.setattr(executors, "CLUSTER_TIMEOUT", 0.5)
     before = clients()
     with socket.create_server(("127.0.0.1", 0)) as deaf:
         address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
@@ -178,7 +178,7 @@ def test_address_that_is_none(speeds: Design, tmp_path: Path) -> None:
 
 def test_cluster_without_workers(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A cluster without workers would keep everybody waiting."""
-    monkeypatch.setattr(executors, "PATIENCE", 0.5)
+    monkeypatch.setattr(executors, "CLUSTER_TIMEOUT", 0.5)
     with (
         distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as cluster,
         pytest.raises(SweepError, match=r"the Dask scheduler at 'inproc://.*' has had no worker for 0.5 s"),
@@ -189,7 +189,7 @@ def test_cluster_without_workers(speeds: Design, tmp_path: Path, monkeypatch: py
 def test_worker_of_another_version() -> None:
     """A worker with another armwright refuses to work: its bits could differ."""
     with pytest.raises(SweepError, match=r"a worker has armwright .*, here it is 0.0.1; results could differ"):
-        work("0.0.1", b"", np.zeros((1, 1)))
+        evaluate_pickled("0.0.1", b"", np.zeros((1, 1)))
 
 
 def test_worker_that_cannot_load_the_task() -> None:
@@ -197,4 +197,4 @@ def test_worker_that_cannot_load_the_task() -> None:
     from armwright.version import __version__
 
     with pytest.raises(SweepError, match=r"a worker cannot load the task: ModuleNotFoundError.*imports? a task from"):
-        work(__version__, b"cno_such_module\nTask\n.", np.zeros((1, 1)))
+        evaluate_pickled(__version__, b"cno_such_module\nTask\n.", np.zeros((1, 1)))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from armwright.sweep.designs import Design
-from armwright.sweep.executors import parallel
+from armwright.sweep.executors import evaluate_in_parallel
 from armwright.sweep.run import run
 from armwright.sweep.task import Rows, evaluate
 from sweep_tasks import Fall, Threads
@@ -54,7 +54,7 @@ def test_few_blocks_at_a_time() -> None:
             yield number, np.array([[float(number)]])
 
     handed = []
-    for number, rows in parallel(Threaded(), Fall(), blocks()):
+    for number, rows in evaluate_in_parallel(Threaded(), Fall(), blocks()):
         handed.append(number)
         assert len(begun) - len(handed) < 2 * 3
         assert rows["depth"].tolist() == [4.905 - number]

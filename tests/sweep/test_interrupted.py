@@ -21,7 +21,7 @@ from armwright.errors import ExitStatus, FileFormatError, OutputError
 from armwright.sweep import folder as folder_module
 from armwright.sweep.designs import Design, full_factorial
 from armwright.sweep.errors import SweepError
-from armwright.sweep.folder import locked_folder
+from armwright.sweep.folder import lock_folder
 from armwright.sweep.progress import Progress
 from armwright.sweep.results import load
 from armwright.sweep.run import run
@@ -392,7 +392,7 @@ def test_folder_that_is_a_file(speeds: Design, tmp_path: Path) -> None:
 def test_two_in_one_process(speeds: Design, tmp_path: Path) -> None:
     """Two threads of one process are kept apart too."""
     with (
-        locked_folder(tmp_path / "out", Fall(), speeds, 8),
+        lock_folder(tmp_path / "out", Fall(), speeds, 8),
         pytest.raises(SweepError, match=f"in use: process {os.getpid()} on"),
     ):
         run(Fall(), speeds, tmp_path / "out", workers=1)

@@ -18,13 +18,13 @@ from armwright.errors import InvalidValueError, KindError, ShapeError, one_of, s
 MAX_RUNS = 10_000_000
 
 
-def _names(value: Sequence[str]) -> tuple[str, ...]:
+def _parameter_names(value: Sequence[str]) -> tuple[str, ...]:
     if isinstance(value, str):
         raise KindError(f"names: expected a sequence of parameter names, one per column, got the string {shown(value)}")
     return tuple(value)
 
 
-def _points(value: Any) -> Array:
+def _design_points(value: Any) -> Array:
     points = floats(value, "points")
     if points.ndim != 2 or 0 in points.shape:
         raise ShapeError(
@@ -46,8 +46,8 @@ class Design:
         ranges: by parameter, the levels of a full factorial or the two bounds of the others; empty for ``given``.
     """
 
-    names: tuple[str, ...] = attrs.field(converter=_names)
-    points: Array = attrs.field(converter=_points, eq=array_key)
+    names: tuple[str, ...] = attrs.field(converter=_parameter_names)
+    points: Array = attrs.field(converter=_design_points, eq=array_key)
     units: Mapping[str, str] = attrs.field(factory=dict, hash=False)
     kind: str = "given"
     seed: int | None = None
@@ -116,7 +116,7 @@ def latin_hypercube(
     Source:
         McKay, Beckman & Conover (1979), as in ``scipy.stats.qmc.LatinHypercube``.
     """
-    return _sampled("latin hypercube", bounds, integer(n, "n", least=1), seed, units)
+    return _sample("latin hypercube", bounds, integer(n, "n", least=1), seed, units)
 
 
 def sobol(
@@ -146,10 +146,10 @@ def sobol(
         raise InvalidValueError(
             f"n: a Sobol design needs a power of two of points, got {n}; the nearest are {below} and {2 * below}"
         )
-    return _sampled("sobol", bounds, n, seed, units)
+    return _sample("sobol", bounds, n, seed, units)
 
 
-def _sampled(
+def _sample(
     kind: str, bounds: Mapping[str, tuple[float, float]], n: int, seed: int, units: Mapping[str, str] | None
 ) -> Design:
     """Return a sample of the unit cube, scaled to the bounds."""

@@ -1,7 +1,7 @@
 """Executors of a sweep: this process, processes of this machine, or a Dask cluster.
 
 They take blocks of a design and return their rows, in any order. A sweep outlives its workers: a block whose worker
-died is done again row by row, with nothing else at work, so that the row that kills its worker is known.
+died is evaluated again row by row, alone, so that the row that kills its worker is known.
 """
 
 import asyncio
@@ -29,17 +29,17 @@ from armwright.errors import ArmwrightError, KindError, shown
 from armwright.sweep.errors import SweepError
 from armwright.sweep.extras import extra
 from armwright.sweep.task import Rows, Status, Task, evaluate, failed_row
-from armwright.sweep.worker import initialize, work
+from armwright.sweep.worker import evaluate_pickled, initialize_process
 from armwright.version import __version__
 
 # The number of a block, and its (m, k) points.
 Block: TypeAlias = tuple[int, Array]
 
-# Time for a Dask cluster to answer, and to have a worker [s].
-PATIENCE = 20.0
-# Blocks waiting or at work, per worker: no worker waits, and memory does not grow with the sweep.
-_PER_WORKER = 2
-_KILLED = "the worker process died each time it was tried"
+# Timeout for a Dask cluster to answer, and to have a worker [s].
+CLUSTER_TIMEOUT = 20.0
+# Blocks in the queue of each worker: no worker waits, and memory does not grow with the sweep.
+_BLOCKS_PER_WORKER = 2
+_KILLED_MESSAGE = "the worker process died each time it was tried"
 
 
 def evaluate_blocks(
@@ -48,7 +48,7 @@ def evaluate_blocks(
     """Evaluate blocks and return the number and the rows of each, in the order in which they are done.
 
     Args:
-        task: what is done.
+        task: evaluated at the points.
         blocks: of the design.
         workers: processes of this machine; 1 is this process itself.
         scheduler: address of a Dask scheduler, whose workers do it instead.
@@ -58,39 +58,41 @@ def evaluate_blocks(
         SweepError: the workers do not start or cannot go on, or the task returned something else than its outputs.
     """
     if scheduler is not None:
-        with cluster(task, scheduler) as executor:
-            yield from parallel(executor, task, blocks)
+        with connect_to_cluster(task, scheduler) as executor:
+            yield from evaluate_in_parallel(executor, task, blocks)
     elif workers > 1:
-        with closing(Processes(task, workers)) as executor:
-            yield from parallel(executor, task, blocks)
+        with closing(WorkerProcesses(task, workers)) as executor:
+            yield from evaluate_in_parallel(executor, task, blocks)
     else:
         with extra("threadpoolctl").threadpool_limits(1):
             for number, points in blocks:
                 yield number, evaluate(task, points)
 
 
-def parallel(executor: "Processes | Cluster", task: Task, blocks: Iterable[Block]) -> Iterator[tuple[int, Rows]]:
+def evaluate_in_parallel(
+    executor: "WorkerProcesses | Cluster", task: Task, blocks: Iterable[Block]
+) -> Iterator[tuple[int, Rows]]:
     """Evaluate blocks by workers; see ``evaluate_blocks``."""
     interrupted = []
-    for block, rows in _completed(executor, blocks, lambda: _PER_WORKER * executor.size()):
+    for block, rows in _complete_blocks(executor, blocks, lambda: _BLOCKS_PER_WORKER * executor.size()):
         if rows is None:
             interrupted.append(block)
         else:
             yield block[0], rows
     for number, points in interrupted:
-        killed = failed_row(task, Status.KILLED, _KILLED)
-        alone = _completed(executor, enumerate(np.split(points, len(points))), lambda: 1)
+        killed = failed_row(task, Status.KILLED, _KILLED_MESSAGE)
+        alone = _complete_blocks(executor, enumerate(np.split(points, len(points))), lambda: 1)
         yield number, np.concatenate([killed if row is None else row for _, row in alone])
 
 
-def _completed(
-    executor: "Processes | Cluster", blocks: Iterable[Block], most: Callable[[], int]
+def _complete_blocks(
+    executor: "WorkerProcesses | Cluster", blocks: Iterable[Block], capacity: Callable[[], int]
 ) -> Iterator[tuple[Block, Rows | None]]:
-    """Evaluate blocks, so many at a time, and return each with its rows; None where its worker died."""
+    """Evaluate blocks, at most ``capacity()`` at a time, and give each with its rows; None where its worker died."""
     queue = iter(blocks)
     running: dict[Future[Rows], Block] = {}
     while True:
-        while len(running) < most() and (block := next(queue, None)):
+        while len(running) < capacity() and (block := next(queue, None)):
             running[executor.submit(block[1])] = block
         if not running:
             return
@@ -98,15 +100,15 @@ def _completed(
             rows: Rows | None
             try:
                 rows = future.result()
-            except executor.died:
+            except executor.worker_death:
                 rows = None
             yield running.pop(future), rows
 
 
-class Processes:
+class WorkerProcesses:
     """Worker processes of this machine, each with one thread."""
 
-    died: type[Exception] = BrokenExecutor
+    worker_death: type[Exception] = BrokenExecutor
 
     def __init__(self, task: Task, workers: int) -> None:
         """Start the processes.
@@ -123,7 +125,7 @@ class Processes:
         context = multiprocessing.get_context("spawn")  # a fork of threads that hold locks may wait for ever
         self._watched, self._alive = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(
-            self._workers, mp_context=context, initializer=initialize, initargs=(self._watched,)
+            self._workers, mp_context=context, initializer=initialize_process, initargs=(self._watched,)
         )
         try:
             self._pool.submit(os.getpid).result()
@@ -143,14 +145,14 @@ class Processes:
     def submit(self, points: Array) -> Future[Rows]:
         """Begin a block of (m, k) points and return the future of its rows."""
         try:
-            return self._pool.submit(work, __version__, self._payload, points)
+            return self._pool.submit(evaluate_pickled, __version__, self._payload, points)
         except BrokenExecutor:  # a pool that lost a process does no more
             self.close()
             self._start()
-            return self._pool.submit(work, __version__, self._payload, points)
+            return self._pool.submit(evaluate_pickled, __version__, self._payload, points)
 
     def close(self) -> None:
-        """End the processes, in the midst of their work if need be."""
+        """End the processes, also during their work."""
         self._alive.close()
         self._pool.shutdown(cancel_futures=True)
         self._watched.close()
@@ -163,17 +165,17 @@ class Cluster:
     Attributes:
         size: number of threads of all workers, which may come and go.
         submit: begins a block of (m, k) points and returns the future of its rows.
-        died: error of a future whose worker died.
+        worker_death: error of a future whose worker died.
     """
 
     size: Callable[[], int]
     submit: Callable[[Array], Future[Rows]]
-    died: type[Exception]
+    worker_death: type[Exception]
 
 
 @contextmanager
-def cluster(task: Task, address: str) -> Iterator[Cluster]:
-    """Be a client of a Dask cluster.
+def connect_to_cluster(task: Task, address: str) -> Iterator[Cluster]:
+    """Connect to a Dask cluster.
 
     Raises:
         KindError: the task cannot be pickled.
@@ -189,14 +191,14 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
         _check_scheduler(address)
         # Where the workers are threads of this process, its threads are theirs.
         with closing(kind.__new__(kind)) as client, extra("threadpoolctl").threadpool_limits(1):
-            client.__init__(address, timeout=PATIENCE, set_as_default=False)
-            failure = f"the Dask scheduler at '{address}' has had no worker for {PATIENCE:g} s"
-            client.wait_for_workers(1, timeout=PATIENCE)
+            client.__init__(address, timeout=CLUSTER_TIMEOUT, set_as_default=False)
+            failure = f"the Dask scheduler at '{address}' has had no worker for {CLUSTER_TIMEOUT:g} s"
+            client.wait_for_workers(1, timeout=CLUSTER_TIMEOUT)
             failure = f"the Dask cluster at '{address}' cannot continue; finished blocks are kept"
             yield Cluster(
                 size=lambda: max(1, sum(client.nthreads().values())),
-                submit=partial(client.get_executor(pure=False).submit, work, __version__, payload),
-                died=extra("distributed").KilledWorker,
+                submit=partial(client.get_executor(pure=False).submit, evaluate_pickled, __version__, payload),
+                worker_death=extra("distributed").KilledWorker,
             )
     except ArmwrightError:
         raise
@@ -215,8 +217,8 @@ def _check_scheduler(address: str) -> None:
     async def identity() -> Any:
         arguments = distributed.Security().get_connection_args("client")
         async with (
-            asyncio.timeout(PATIENCE),
-            distributed.rpc(address, timeout=PATIENCE, connection_args=arguments) as scheduler,
+            asyncio.timeout(CLUSTER_TIMEOUT),
+            distributed.rpc(address, timeout=CLUSTER_TIMEOUT, connection_args=arguments) as scheduler,
         ):
             return await scheduler.identity()
 

@@ -4,7 +4,7 @@
     blocks/0000007.npy    the rows of one block, and a checksum behind them
     results.nc            the results, made of the blocks when all are finished
     run.json              the SHA-256 hash of the results
-    lock                  held by the process at work
+    lock                  locked by the process that runs the sweep, with its name
 
 Every file is written under another name and moved when it is whole and on the disk. Everything is checked when it is
 read back; a damaged file is named and not changed, for its numbers may have taken hours.
@@ -40,13 +40,13 @@ from armwright.version import __version__
 
 _FORMAT = 3
 MANIFEST, _BLOCKS, RESULTS, _LOCK = "sweep.json", "blocks", "results.nc", "lock"
-# The name under which a file is written ends with this.
+# Suffix of the temporary name of a file that is being written.
 _PARTIAL = ".tmp"
-# What the lock says begins with this; an empty one was just made.
-_HOLDER = "process "
+# The text of a lock file begins with this; a new one is empty.
+_HOLDER_PREFIX = "process "
 
 
-def identity(task: Task, design: Design) -> dict[str, Any]:
+def sweep_identity(task: Task, design: Design) -> dict[str, Any]:
     """Return the identity of a sweep as JSON holds it: two sweeps of which this is equal have equal results.
 
     Raises:
@@ -67,26 +67,26 @@ def identity(task: Task, design: Design) -> dict[str, Any]:
         "axes": {name: attrs.asdict(axis) for name, axis in task.axes.items()},
         "design": {"runs": len(design), **attrs.asdict(design)},
     }
-    as_read: dict[str, Any] = json.loads(json.dumps(fields, default=_hashed))
+    as_read: dict[str, Any] = json.loads(json.dumps(fields, default=_array_hash))
     return as_read
 
 
-def _hashed(array: Array) -> list[int | str]:
+def _array_hash(array: Array) -> list[int | str]:
     """Return the shape and the SHA-256 hash of an array."""
     return [*array.shape, hashlib.sha256(array.tobytes()).hexdigest()]
 
 
 @attrs.frozen(kw_only=True)
 class Folder:
-    """A folder that this process holds.
+    """The folder of a sweep, locked by this process.
 
     Attributes:
         path: of the folder.
-        task: what is done; its outputs are what blocks hold.
+        task: of the sweep; its outputs are in the blocks.
         design: the points.
-        sweep: see ``identity``.
+        sweep: see ``sweep_identity``.
         block: rows per block.
-        made: when and with which versions it was begun.
+        provenance: when and with which versions it was begun.
     """
 
     path: Path
@@ -94,7 +94,7 @@ class Folder:
     design: Design
     sweep: Mapping[str, Any]
     block: int
-    made: Mapping[str, str]
+    provenance: Mapping[str, str]
 
     @cached_property
     def blocks(self) -> list[range]:
@@ -148,8 +148,8 @@ class Folder:
 
 
 @contextlib.contextmanager
-def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterator[Folder]:
-    """Hold the folder of a sweep, begun now or earlier, while other processes are kept out.
+def lock_folder(path: Path, task: Task, design: Design, block: int) -> Iterator[Folder]:
+    """Lock the folder of a sweep, begun now or earlier, against other processes.
 
     Args:
         path: made where it is missing, with its parents.
@@ -163,7 +163,7 @@ def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterato
         OutputError: the folder cannot be made or written to.
         SweepError: the folder is of another sweep or of something else, or another process holds it.
     """
-    sweep = identity(task, design)
+    sweep = sweep_identity(task, design)
     path = path.absolute()
     manifest = path / MANIFEST
     try:
@@ -179,7 +179,7 @@ def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterato
         raise OutputError(f"cannot write to '{path}': {folder_error_text(error, path)}") from error
     with lock:
         holder = lock.read(1000).strip()
-        if holder and not holder.startswith(_HOLDER):
+        if holder and not holder.startswith(_HOLDER_PREFIX):
             raise SweepError(f"'{path / _LOCK}' is not the lock of a sweep; use a separate folder for the sweep")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # it ends with the process, however that ends
@@ -188,10 +188,10 @@ def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterato
             raise SweepError(f"'{path}' is in use: {holder} works on it; wait until it is done") from error
         lock.seek(0)
         lock.truncate()
-        lock.write(f"{_HOLDER}{os.getpid()} on {platform.node()}, since {_now()}\n")
+        lock.write(f"{_HOLDER_PREFIX}{os.getpid()} on {platform.node()}, since {_utc_timestamp()}\n")
         lock.flush()
         fields = _read_manifest(manifest, sweep) if manifest.exists() else _write_manifest(manifest, sweep, block)
-        yield Folder(path=path, task=task, design=design, sweep=sweep, block=fields["block"], made=fields["made"])
+        yield Folder(path=path, task=task, design=design, sweep=sweep, block=fields["block"], provenance=fields["made"])
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
@@ -233,7 +233,7 @@ def _sync(path: Path) -> None:
 def _write_manifest(path: Path, sweep: dict[str, Any], block: int) -> dict[str, Any]:
     """Begin a folder, and return what its manifest says."""
     made = {
-        "date": _now(),
+        "date": _utc_timestamp(),
         "armwright": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
@@ -277,5 +277,5 @@ def _differences(key: str, there: Any, here: Any) -> Iterator[str]:
         yield f"{key} is {shown(there)} in the folder, {shown(here)} here"
 
 
-def _now() -> str:
+def _utc_timestamp() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 @attrs.frozen(kw_only=True)
 class Progress:
-    """How much of a sweep is finished.
+    """The progress of a sweep.
 
     Attributes:
         runs: of the whole sweep.
@@ -23,7 +23,7 @@ class Progress:
     failed: int = 0
     seconds: float = 0.0
 
-    def counting(self, status: npt.NDArray[np.int8]) -> "Progress":
+    def with_runs(self, status: npt.NDArray[np.int8]) -> "Progress":
         """Return the progress after some more runs, of each of which the status is given."""
         return attrs.evolve(self, done=self.done + len(status), failed=self.failed + int(np.count_nonzero(status)))
 

@@ -71,33 +71,33 @@ def write_results(folder: Folder) -> None:
     """
 
     def write(partial: Path) -> None:
-        _write(folder, partial)
+        _write_blocks(folder, partial)
         # The record comes first: results without it could not be checked, and one without results harms nobody.
-        text = record_text({RESULTS: sha256(partial) or ""}, {"versions": dict(folder.made)})
+        text = record_text({RESULTS: sha256(partial) or ""}, {"versions": dict(folder.provenance)})
         write_whole(folder.path / RECORD, lambda record: record.write_text(text, encoding="utf-8"))
 
     write_whole(folder.path / RESULTS, write)
 
 
-def _write(folder: Folder, path: Path) -> None:
+def _write_blocks(folder: Folder, path: Path) -> None:
     """Write some blocks at a time, so that the results may be larger than the memory.
 
     The runs are the records of the file, which stand one after the other behind its header. So the file is that of the
     first blocks, followed by the records of the others, with their number corrected.
     """
-    letters = max(len(text.encode()) for rows in _chunks(folder) for text in rows["message"].tolist())
+    letters = max(len(text.encode()) for rows in _read_chunks(folder) for text in rows["message"].tolist())
     nothing = failed_row(folder.task, Status.FAILED, "")[:0]
-    header = len(_netcdf(folder, 0, nothing, letters))
+    header = len(_netcdf_bytes(folder, 0, nothing, letters))
     done = 0
     with path.open("wb") as file:
-        for rows in _chunks(folder):
-            file.write(_netcdf(folder, done, rows, letters)[header if done else 0 :])
+        for rows in _read_chunks(folder):
+            file.write(_netcdf_bytes(folder, done, rows, letters)[header if done else 0 :])
             done += len(rows)
         file.seek(_RECORD_COUNT)
         file.write(done.to_bytes(4, "big"))
 
 
-def _chunks(folder: Folder) -> Iterator[Rows]:
+def _read_chunks(folder: Folder) -> Iterator[Rows]:
     """Read the blocks, some at a time."""
     size = failed_row(folder.task, Status.FAILED, "").nbytes * folder.block
     some = _CHUNK // size + 1
@@ -106,7 +106,7 @@ def _chunks(folder: Folder) -> Iterator[Rows]:
         yield np.concatenate([folder.read_block(number) for number in numbers[first : first + some]])
 
 
-def _netcdf(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:
+def _netcdf_bytes(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:
     """Return a file of some runs, as classic netCDF with 64-bit offsets.
 
     Args:
@@ -138,9 +138,9 @@ def _netcdf(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:
     provenance = {
         "Conventions": "CF-1.11",
         "title": task.name,
-        "source": f"armwright {folder.made['armwright']}",
-        "date_created": folder.made["date"],
-        "versions": json.dumps(dict(folder.made), ensure_ascii=False),
+        "source": f"armwright {folder.provenance['armwright']}",
+        "date_created": folder.provenance["date"],
+        "versions": json.dumps(dict(folder.provenance), ensure_ascii=False),
         "settings": json.dumps(folder.sweep["settings"], ensure_ascii=False),
         "design": json.dumps(folder.sweep["design"], ensure_ascii=False),
     }

@@ -1,4 +1,4 @@
-"""Running a sweep: each block once, on cores or on a Dask cluster, with everything finished on the disk."""
+"""Running a sweep: each block once, on cores or on a Dask cluster, with every finished block on the disk."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from armwright.errors import InvalidValueError, KindError
 from armwright.sweep.designs import Design
 from armwright.sweep.executors import evaluate_blocks
 from armwright.sweep.extras import check_extras
-from armwright.sweep.folder import RESULTS, Folder, locked_folder
+from armwright.sweep.folder import RESULTS, Folder, lock_folder
 from armwright.sweep.progress import Progress
 from armwright.sweep.results import load, write_results
 from armwright.sweep.task import Task, check_task
@@ -37,7 +37,7 @@ def run(
     scheduler: str | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> "xarray.Dataset":
-    """Do a task at all points of a design, and store the results in a folder.
+    """Evaluate a task at all points of a design, and store the results in a folder.
 
     Every finished block of rows is on the disk at once. After a kill, a full disk or an interruption the same call
     goes on with what is missing; after the end it returns the results. The numbers are the same bits on any workers.
@@ -46,8 +46,7 @@ def run(
         task: what is done.
         design: its points.
         folder: of this sweep alone; made where it is missing.
-        block: rows that are done in one call of the task and stored in one file. A folder that was begun with another
-            number keeps that.
+        block: rows per call of the task and per file. A folder that was begun with another number keeps that.
         workers: processes of this machine; 1 is this process itself; as many as there are cores when left out.
         scheduler: address of a Dask scheduler whose workers do it instead, such as ``tcp://10.0.0.1:8786``.
         progress: called at the start and after every block.
@@ -79,24 +78,26 @@ def run(
             raise InvalidValueError(
                 "specify either workers, processes of this machine, or a scheduler, which has its own workers"
             )
-    with locked_folder(Path(folder), task, design, block) as sweep:
+    with lock_folder(Path(folder), task, design, block) as sweep:
         if (sweep.path / RESULTS).exists():
             if progress:
                 progress(Progress(runs=len(design), done=len(design), resumed=len(design), failed=0, seconds=0.0))
         else:
-            _finish(sweep, workers, scheduler, progress or (lambda _: None))
+            _run_missing_blocks(sweep, workers, scheduler, progress or (lambda _: None))
             write_results(sweep)
     return load(folder)
 
 
-def _finish(sweep: Folder, workers: int | None, scheduler: str | None, progress: Callable[[Progress], None]) -> None:
-    """Do the blocks that are missing."""
+def _run_missing_blocks(
+    sweep: Folder, workers: int | None, scheduler: str | None, progress: Callable[[Progress], None]
+) -> None:
+    """Evaluate and store the blocks that are missing."""
     began = time.monotonic()
     now = Progress(runs=len(sweep.design))
     missing = []
     for number, runs in enumerate(sweep.blocks):
         if sweep.block_path(number).exists():
-            now = now.counting(sweep.read_block(number)["status"])
+            now = now.with_runs(sweep.read_block(number)["status"])
         else:
             missing.append((number, sweep.design.points[runs.start : runs.stop]))
     now = attrs.evolve(now, resumed=now.done)
@@ -107,5 +108,5 @@ def _finish(sweep: Folder, workers: int | None, scheduler: str | None, progress:
     with closing(blocks):  # workers end on an error too
         for number, rows in blocks:
             sweep.write_block(number, rows)
-            now = attrs.evolve(now.counting(rows["status"]), seconds=time.monotonic() - began)
+            now = attrs.evolve(now.with_runs(rows["status"]), seconds=time.monotonic() - began)
             progress(now)

@@ -78,13 +78,13 @@ class Axis:
 
 
 class Task(Protocol):
-    """What is done at the points of a design.
+    """A function of the points of a design, with a description of its outputs.
 
     A task can be pickled, and each row of what it returns depends on that row of the points alone.
 
     Attributes:
         name: of the task.
-        settings: all else its results depend on, as JSON can hold it; they are a part of the identity of a sweep.
+        settings: all else that its results depend on, as JSON data; part of the identity of a sweep.
         outputs: by name, what it returns.
         axes: by name, the axes of those outputs.
     """
@@ -158,26 +158,26 @@ def evaluate(task: Task, points: Array) -> Rows:
         if len(points) == 1:
             return failed_row(task, Status.FAILED, f"{type(error).__name__}: {error}")
         return np.concatenate([evaluate(task, point) for point in np.split(points, len(points))])
-    return _checked(task, returned, len(points))
+    return _check_outputs(task, returned, len(points))
 
 
 def failed_row(task: Task, status: Status, message: str) -> Rows:
     """Return the row of a run without results: NaN everywhere."""
-    row = _empty_rows(task, [_short(message)])
+    row = _empty_rows(task, [_one_line(message)])
     row["status"] = status
     for name in task.outputs:
         row[name] = np.nan
     return row
 
 
-def _checked(task: Task, returned: Mapping[str, Any], runs: int) -> Rows:
+def _check_outputs(task: Task, returned: Mapping[str, Any], runs: int) -> Rows:
     """Return the outputs of a task as rows, if they are those that it declares."""
     if not isinstance(returned, Mapping):
         raise SweepError(f"task '{task.name}' returned {shown(returned)}; expected outputs by name")
     names, expected = (", ".join(sorted(names)) for names in ({*returned} - {FAILURE}, task.outputs))
     if names != expected:
         raise SweepError(f"task '{task.name}' returned {names or 'nothing'}; its outputs are {expected}")
-    messages = [_short(str(text)) for text in returned.get(FAILURE, ("",) * runs)]
+    messages = [_one_line(str(text)) for text in returned.get(FAILURE, ("",) * runs)]
     if len(messages) != runs:
         raise SweepError(f"task '{task.name}': '{FAILURE}': expected {runs} texts, one per run, got {len(messages)}")
     rows = _empty_rows(task, messages)
@@ -210,7 +210,7 @@ def _shapes(task: Task) -> dict[str, tuple[int, ...]]:
     return {name: tuple(len(task.axes[dim].values) for dim in output.dims) for name, output in task.outputs.items()}
 
 
-def _short(text: str) -> str:
+def _one_line(text: str) -> str:
     """Return a text on one line, not too long, without what a file cannot hold."""
     line = " ".join(text.replace("\0", " ").split()).encode("utf-8", "replace").decode()
     return line if len(line) <= _MAX_MESSAGE_LENGTH else f"{line[: _MAX_MESSAGE_LENGTH - 3]}..."

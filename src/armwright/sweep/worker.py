@@ -1,4 +1,4 @@
-"""What happens in a worker: a process of this machine, or a worker of a Dask cluster."""
+"""The code that runs in a worker: a process of this machine, or a worker of a Dask cluster."""
 
 import os
 import pickle
@@ -19,7 +19,7 @@ from armwright.version import __version__
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
-def initialize(alive: Connection) -> None:
+def initialize_process(alive: Connection) -> None:
     """Prepare a process of this machine: one thread for its work, and it ends with the process that started it.
 
     Args:
@@ -37,8 +37,8 @@ def initialize(alive: Connection) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def work(version: str, payload: bytes, points: Array) -> Rows:
-    """Do a task at some points.
+def evaluate_pickled(version: str, payload: bytes, points: Array) -> Rows:
+    """Evaluate a pickled task at some points.
 
     Args:
         version: of armwright where the sweep was started.
@@ -51,13 +51,13 @@ def work(version: str, payload: bytes, points: Array) -> Rows:
     """
     if version != __version__:
         raise SweepError(f"a worker has armwright {__version__}, here it is {version}; results could differ")
-    task = _loaded(payload)
+    task = _load_task(payload)
     extra("threadpoolctl").threadpool_limits(1)  # in this process from now on; what was loaded meanwhile too
     return evaluate(task, points)
 
 
 @lru_cache(maxsize=4)
-def _loaded(payload: bytes) -> Task:
+def _load_task(payload: bytes) -> Task:
     try:
         task: Task = pickle.loads(payload)  # noqa: S301 - made by the process that sweeps
     except Exception as error:
