@@ -22,7 +22,7 @@ from armwright.study.puma_moves import study_poses
 
 @pytest.fixture(scope="module")
 def through_the_wrist() -> tuple[Array, Array]:
-    """A line of the PUMA on which the hand turns about the axis that its nearly straight wrist cannot turn about."""
+    """A line of the PUMA on which the tool turns about the axis that its nearly straight wrist cannot turn about."""
     arm = load_arm("puma560-seed")
     q = np.array([0.3, 1.0, 2.2, 0.4, 0.001, -0.3])
     J = jacobian(arm, q)
@@ -48,8 +48,8 @@ def test_the_line_names_the_cause(through_the_wrist: tuple[Array, Array]) -> Non
 
 
 @pytest.mark.parametrize("by", ["via", "damped"])
-def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
-    """By a via pose and by damped rates the hand gets there, inside all limits, at a price that is told."""
+def test_a_detour(through_the_wrist: tuple[Array, Array], by: str) -> None:
+    """By a via pose and by damped rates the tool gets there, inside all limits, at a price that the report states."""
     arm = load_arm("puma560-seed")
     q, X = through_the_wrist
 
@@ -77,7 +77,7 @@ def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
         assert all(leg.certificate.holds for leg in way.legs)
 
 
-def test_a_way_round_near_the_joint_move() -> None:
+def test_a_detour_near_the_joint_move() -> None:
     """Where the wrist has to be turned over on the way, two certified lines by a pose near the joint move do it.
 
     Seed 002 from B to C: joint 5 goes from 11.6 to -20.2 degrees; no pose beside the line helps.
@@ -127,7 +127,7 @@ def test_a_line_that_needs_none() -> None:
     assert way.price.distance <= 1e-3
 
 
-def test_no_way_round() -> None:
+def test_no_detour() -> None:
     """Where the goal itself cannot be reached there is no way round, and the reason is that of the line."""
     arm = load_arm("puma560-seed")
     q = np.array([0.0, 0.3, 0.2, 0.0, 0.8, 0.0])
@@ -146,7 +146,7 @@ def test_unknown_way() -> None:
 
 
 def test_no_crawling() -> None:
-    """Lines past the wrist's singularity are run in seconds: the hand is slowed where it passes, and nowhere else.
+    """Lines past the wrist's singularity are run in seconds: the tool is slowed where it passes, and nowhere else.
 
     Slowed from end to end as the joints ask for beside the singularity, they would take a minute and more.
     """

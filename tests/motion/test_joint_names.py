@@ -58,7 +58,7 @@ def test_what_stops_a_line() -> None:
     beyond = forward(PUMA, [2.9, 0.3, 0.2, 0.0, 0.8, 0.0])
     with pytest.raises(PathError) as limits:
         straight_line(PUMA, [2.7, 0.3, 0.2, 0.0, 0.8, 0.0], beyond)
-    # The wrist is nearly straight half way: the hand turns from one side to the other, beside it by a milliradian.
+    # The wrist is nearly straight half way: the tool turns from one side to the other, beside it by a milliradian.
     straight = forward(PUMA, [0.0, 0.3, 0.2, 0.0, 0.0, 0.0])
     start, goal = (
         straight

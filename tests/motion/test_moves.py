@@ -130,8 +130,8 @@ def test_slowed_until_the_limits_hold(puma: CompiledArm) -> None:
 @pytest.mark.parametrize("ends", ["rest", "running"])
 @pytest.mark.parametrize("name", ["puma560-seed", "ur5", *["stanford"] * WHOLE])
 @pytest.mark.drawn(0.25)
-def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str, sample: Sample) -> None:
-    """On random moves no sample, far denser than the looks, is beyond the bounds; the branch stays what it is."""
+def test_tool_follows_the_planned_path(name: str, ends: str, orientation: str, sample: Sample) -> None:
+    """On random moves no sample is beyond the bounds, far denser than the certificate's; the branch stays what it is."""
     arm = compile_arm(load_arm(name))
     run = 0
     for rng in sample.cases(30):
@@ -170,7 +170,7 @@ def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str,
         for at in (0.4, 1.5, 2.9):
             labels = [b.label for b in inverse(arm.arm, move.tool_path(at), move.trajectory(at)).branches]
             assert move.label in labels
-    sample.record(f"moves of the {name} with {ends} ends, {orientation}, looked at 20,000 times", run, 0)
+    sample.record(f"moves of the {name} with {ends} ends, {orientation}, at 20,000 samples", run, 0)
     assert run >= 6 or not sample.whole
 
 
@@ -189,7 +189,7 @@ def test_via_poses_are_missed_by_the_blend(puma: CompiledArm) -> None:
 
 
 def test_times_by_the_tool(puma: CompiledArm) -> None:
-    """Without times the hand runs at the speed of the tool, or slower where a limit asks for it."""
+    """Without times the tool runs at the speed of the tool, or slower where a limit asks for it."""
     X = np.repeat(forward(puma.arm, [0.6, 0.2, 0.6, 0.3, 0.9, 0.1])[None], 2, axis=0)
     X[1, :3, 3] += (0.0, -0.3, 0.0)
 
@@ -222,7 +222,7 @@ def test_a_certificate_that_does_not_hold(puma: CompiledArm) -> None:
 
 
 def test_seven_joints() -> None:
-    """An arm without a closed form follows the hand's path as well."""
+    """An arm without a closed form follows the tool's path as well."""
     arm = load_arm(Path(__file__).parents[2] / "examples" / "seven_joints.urdf")
     q = np.array([0.1, 0.5, 0.2, 1.2, 0.3, 1.0, 0.2])
     X = np.repeat(forward(arm, q)[None], 3, axis=0)
@@ -237,7 +237,7 @@ def test_seven_joints() -> None:
 
 
 @pytest.mark.parametrize("by", ["via", "damped"])
-def test_stops_and_ways_round(puma: CompiledArm, by: str) -> None:
+def test_stops_and_detours(puma: CompiledArm, by: str) -> None:
     """Where the blended move has no branch, stops and a way round lead to the last pose, inside the limits."""
     X = forward(puma.arm, SEED_Q[1:])
 
@@ -251,7 +251,7 @@ def test_stops_and_ways_round(puma: CompiledArm, by: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::armwright.errors.RotationWarning")
-def test_no_way_round(puma: CompiledArm, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_detour(puma: CompiledArm, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no way round is found either, both poses of the way are named with what stops it."""
     # Poses beside the line alone do not help from B to C.
     monkeypatch.setattr(detour, "_ON_THE_WAY", ())

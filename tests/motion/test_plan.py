@@ -76,7 +76,7 @@ def test_half_steps_at_both_ends(stanford: Arm) -> None:
 @pytest.mark.parametrize("deviation", [2e-3, 1e-4])
 @pytest.mark.drawn(0.4)
 def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.random.Generator) -> None:
-    """On random lines 20 times denser looks find nothing worse than the planner says, or than was asked."""
+    """On random lines 20 times denser samples find nothing worse than the planner says, or than was asked."""
     arm = load_arm(name)
     done = 0
     for q in random_configurations(arm, rng, 60):
@@ -101,7 +101,7 @@ def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.ra
 
 @pytest.mark.parametrize("name", ["stanford", "puma560", "ur5"])
 def test_coarser_lines_are_no_slower(name: str, rng: np.random.Generator) -> None:
-    """Who allows more than a millimetre waits no longer for it, and the hand is turned by 25 mrad at most."""
+    """Who allows more than a millimetre waits no longer for it, and the tool is turned by 25 mrad at most."""
     arm, done = load_arm(name), 0
     for q in random_configurations(arm, rng, 20):
         A = forward(arm, q)
@@ -119,8 +119,8 @@ def test_coarser_lines_are_no_slower(name: str, rng: np.random.Generator) -> Non
     assert done
 
 
-def test_turn_on_the_spot(stanford: Arm) -> None:
-    """A path without length turns the hand where it is, evenly about one axis."""
+def test_rotation_in_place(stanford: Arm) -> None:
+    """A path without length turns the tool where it is, evenly about one axis."""
     A, B = at(0.5, 0.1, 0.2), at(0.5, 0.1, 0.2, turn=1.0)
 
     found = coarse_line(stanford, start(stanford, A), B, deviation=1e-3, speed=100)
@@ -132,7 +132,7 @@ def test_turn_on_the_spot(stanford: Arm) -> None:
 
 @pytest.mark.parametrize("length", [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 3e-3])
 @pytest.mark.parametrize("turn", [0.0, 1e-3, np.pi / 2])
-def test_very_short_ways(stanford: Arm, length: float, turn: float) -> None:
+def test_very_short_paths(stanford: Arm, length: float, turn: float) -> None:
     """A line of next to no length, with or without a turn, is a short slow move and no singularity."""
     A, B = at(0.45, 0.1, 0.25), at(0.45, 0.1 + length, 0.25, turn)
 
@@ -163,7 +163,7 @@ def test_turn_and_small_shift_together(stanford: Arm) -> None:
 
     X = forward(stanford, found.trajectory(np.linspace(0, found.trajectory.duration, 500)))
     assert distance_from_line(X[:, :3, 3], A[:3, 3], B[:3, 3]).max() <= 1e-3
-    assert np.abs(X[:, :3, 2] - A[:3, 2]).max() < 5e-3  # the axis of the turn is that of the hand
+    assert np.abs(X[:, :3, 2] - A[:3, 2]).max() < 5e-3  # the axis of the turn is that of the tool
 
 
 @pytest.mark.parametrize("x", [2000.0, 1e5, 1e9, 1e300])
@@ -319,7 +319,7 @@ def test_the_first_obstacle_of_the_nearest_configuration(stanford: Arm) -> None:
     np.testing.assert_allclose(stopped.place, (x, x, 0.1), atol=POSE)
 
 
-def test_a_configuration_with_a_free_line_comes_before_a_way_round(rng: np.random.Generator) -> None:
+def test_a_configuration_with_a_free_line_comes_before_a_detour(rng: np.random.Generator) -> None:
     """Where another configuration has the line free, it is run, without a detour although one was allowed."""
     arm = load_arm("puma560-seed")
     tried = 0

@@ -15,7 +15,7 @@ ROUNDING = 1e-12
 # Limits may be passed by this part of them: rounding.
 AT_LIMIT = 1e-9
 
-ways = st.lists(st.floats(-5, 5).filter(lambda x: x == 0 or abs(x) > 1e-6), min_size=1, max_size=4).filter(any)
+displacements = st.lists(st.floats(-5, 5).filter(lambda x: x == 0 or abs(x) > 1e-6), min_size=1, max_size=4).filter(any)
 limits = st.floats(0.05, 20)
 
 
@@ -40,7 +40,7 @@ def test_triangle_by_hand() -> None:
         assert move(0.5)[0] == pytest.approx(0.5)
 
 
-@given(way=ways, speed=limits, acceleration=limits)
+@given(way=displacements, speed=limits, acceleration=limits)
 def test_trapezoids_keep_limits_and_use_them(way: list[float], speed: float, acceleration: float) -> None:
     """No joint passes a limit, some joint is at one, all joints start and stop together on a straight line."""
     start = np.arange(len(way), dtype=float)
@@ -60,7 +60,7 @@ def test_trapezoids_keep_limits_and_use_them(way: list[float], speed: float, acc
     np.testing.assert_allclose(part[np.nonzero(way)], part[np.flatnonzero(way)[0]], atol=1e-7)
 
 
-@given(way=ways, speed=limits, acceleration=limits, longer=st.floats(1, 50))
+@given(way=displacements, speed=limits, acceleration=limits, longer=st.floats(1, 50))
 def test_trapezoids_of_given_duration(way: list[float], speed: float, acceleration: float, longer: float) -> None:
     """With more time than needed a move lasts exactly so long, speeds up as hard, and runs slower."""
     duration = longer * shortest_trapezoid(way, speed, acceleration)

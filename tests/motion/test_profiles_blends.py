@@ -1,4 +1,4 @@
-"""Straight ways with quartic blends: the three points of the course, and any number of them."""
+"""Straight lines with quartic blends: the three points of the course, and any number of them."""
 
 import re
 
@@ -46,7 +46,7 @@ def of_the_course(t: float) -> Array:
 
 
 def random_points(rng: np.random.Generator, count: int, joints: int) -> tuple[Array, Array, Array]:
-    """Times, points, and blends that leave some of the ways straight."""
+    """Times, points, and blends that leave parts of the lines straight."""
     lasting = rng.uniform(0.3, 1.0, size=count - 1)
     shortest = np.minimum(np.append(lasting, np.inf), np.append(np.inf, lasting))
     blend = rng.uniform(0.05, 0.5, size=count) * shortest
@@ -80,7 +80,7 @@ def test_the_path_misses_the_point_in_the_middle() -> None:
 @pytest.mark.parametrize("ends", ["rest", "running"])
 @pytest.mark.parametrize("count", [2, 3, 4, 9])
 def test_any_number_of_points(ends: Ends, count: int, rng: np.random.Generator) -> None:
-    """Position, speed and acceleration are continuous, no joint is faster than on the ways, all within its time."""
+    """Position, speed and acceleration are continuous, no joint is faster than on the lines, all within its time."""
     for _ in range(20):
         times, points, blend = random_points(rng, count, 3)
 
@@ -97,7 +97,7 @@ def test_any_number_of_points(ends: Ends, count: int, rng: np.random.Generator) 
         np.testing.assert_allclose(move.peaks(1), np.abs(move(middle, 1)).max(axis=0), rtol=1e-9)
 
 
-def test_straight_ways_between_blends(rng: np.random.Generator) -> None:
+def test_straight_lines_between_blends(rng: np.random.Generator) -> None:
     """Farther than the blend from a via point the motion is on the straight line between its points."""
     times, points, blend = random_points(rng, 5, 2)
     move = blended(times, points, blend, ends="running")
@@ -126,7 +126,7 @@ def test_a_start_and_a_stop() -> None:
     np.testing.assert_allclose(move([0, 0.5, 1.5, 2])[:, 0], (0, 0.25 / 1.5, 1 - 0.25 / 1.5, 1), atol=SAME)
 
 
-def test_a_point_on_the_way_is_not_missed() -> None:
+def test_an_intermediate_point_is_not_missed() -> None:
     """Where the rate does not change there is nothing to blend: the motion goes through the point."""
     times, points = [0, 1, 3], [[0.0, 0.0], [1.0, 2.0], [3.0, 6.0]]
 
@@ -163,7 +163,7 @@ def test_equal_rates_pass_nearest_at_the_point() -> None:
     assert via_distances(times, points, 0.4, ends="running")[1] == pytest.approx(3 / 16 * 0.4 * np.sqrt(2))
 
 
-def test_a_place_to_wait_at_is_not_missed() -> None:
+def test_a_point_to_wait_at_is_not_missed() -> None:
     """Where the path waits before it goes on, or after it has come, it has been at the point."""
     points = [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0], [3.0, 1.0]]
 

@@ -1,4 +1,4 @@
-"""Straight ways with rounded corners."""
+"""Straight paths with rounded corners."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def corner(blend: float, *places: tuple[float, float, float]) -> CertifiedMotion
 
 @pytest.mark.parametrize("blend", [0.005, 0.02, 0.05])
 def test_a_corner_is_left_no_sooner_than_allowed(blend: float) -> None:
-    """Farther from the corner than the blend the hand is on the straight ways, and it passes it at less than that."""
+    """Farther from the corner than the blend the tool is on the straight lines, and it passes it at less than that."""
     A, B, C = (0.45, 0.0, 0.25), (0.45, 0.2, 0.25), (0.45, 0.2, 0.10)
     move = corner(blend, B, C)
     hand = forward(ARM, move.trajectory(np.linspace(0, move.trajectory.duration, 2001)))[:, :3, 3]
@@ -48,7 +48,7 @@ def test_a_corner_is_left_no_sooner_than_allowed(blend: float) -> None:
 
 
 def test_no_stop_at_the_corner() -> None:
-    """Position, speed and acceleration have no jump, and the hand never stands still on the way."""
+    """Position, speed and acceleration have no jump, and the tool never stands still on the way."""
     move = corner(0.03, (0.45, 0.2, 0.25), (0.45, 0.2, 0.10))
     t = np.linspace(0.1, 0.9, 500) * move.trajectory.duration
 
@@ -64,8 +64,8 @@ def test_limits() -> None:
     assert (move.trajectory.peaks(2) <= ARM.limits.acceleration * (1 + 1e-9)).all()
 
 
-def test_a_short_way_is_rounded_from_its_middle() -> None:
-    """A blend longer than the ways begins where they are half over."""
+def test_a_short_line_is_rounded_from_its_middle() -> None:
+    """A blend longer than the lines begins at their middle."""
     move = corner(5.0, (0.45, 0.1, 0.25), (0.45, 0.1, 0.15))
 
     assert move.certificate.deviation > 0.005

@@ -106,7 +106,7 @@ def refused(fast: CompiledArm, q: Array, B: Array, deviation: float) -> PathErro
 def blamed(fast: CompiledArm, A: Array, B: Array, fraction: float) -> set[tuple[str, int]]:
     """Return each singularity near a place of a line with each joint that moves much in the motion that goes idle.
 
-    All configurations of the closed form are looked at, densely about the place, and their Jacobians decide.
+    All configurations of the closed form are sampled, densely about the position, and their Jacobians decide.
     """
     arm, found = fast.arm, set()
     around = np.clip(fraction + np.sinh(np.linspace(-8, 8, 401)) / np.sinh(8) * 0.03, 0, 1)
@@ -209,7 +209,7 @@ def test_the_configurations_of_a_close_look_belong_together() -> None:
         assert angle_between(off[:3, :3], on[:3, :3]) <= allowed.orientation
 
 
-def test_an_arm_without_a_closed_form_is_looked_at_as_well() -> None:
+def test_an_arm_without_a_closed_form_is_checked_as_well() -> None:
     """Moved out of its closed form by a hair, the PUMA is stopped by the same joints, at the same place."""
     puma = load_arm("puma560-seed")
     q, _, B = upright(puma)

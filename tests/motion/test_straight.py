@@ -49,9 +49,11 @@ def plain_line(puma: Arm, **manner: float) -> CertifiedMotion:
     return straight_line(puma, q, X, **manner)
 
 
-def strayed(line: CertifiedMotion, fast: CompiledArm, X_A: Array, X_B: Array, looks: int) -> tuple[float, float, float]:
-    """Return how far the hand is off a line, turned off what belongs to its place, and how far it runs back."""
-    X = fast.forward(line.trajectory(np.linspace(0.0, line.trajectory.duration, looks)))
+def strayed(
+    line: CertifiedMotion, fast: CompiledArm, X_A: Array, X_B: Array, samples: int
+) -> tuple[float, float, float]:
+    """Return how far the tool is off a line, how far it is rotated from the planned orientation, and how far it runs back."""
+    X = fast.forward(line.trajectory(np.linspace(0.0, line.trajectory.duration, samples)))
     way, come = X_B[:3, 3] - X_A[:3, 3], X[:, :3, 3] - X_A[:3, 3]
     along = come @ way / (way @ way)
     s = np.clip(along, 0, 1)
@@ -64,11 +66,11 @@ def strayed(line: CertifiedMotion, fast: CompiledArm, X_A: Array, X_B: Array, lo
 
 @pytest.mark.share(0.02)
 @pytest.mark.drawn(0.34)
-def test_bounds_hold_for_a_hundred_times_the_looks(fast: CompiledArm, sample: Sample) -> None:
+def test_bounds_hold_for_a_hundred_times_the_samples(fast: CompiledArm, sample: Sample) -> None:
     """On no line is a pose beyond the certified bounds: off the line, turned for its place on it, run backwards.
 
-    Lines of 10 um to half a metre, turning by up to a radian, looked at a hundred times as often as the certificate
-    did. The turn is that from the orientation that belongs to the position on the line nearest to the hand.
+    Lines of 10 um to half a metre, turning by up to a radian, sampled a hundred times as densely as the certificate
+    did. The turn is that from the orientation that belongs to the position on the line nearest to the tool.
     """
     arm, run, worst = fast.arm, 0, 0.0
     for rng in sample.cases(LINES):
@@ -83,8 +85,8 @@ def test_bounds_hold_for_a_hundred_times_the_looks(fast: CompiledArm, sample: Sa
             continue
         certificate = line.certificate
         assert certificate.holds
-        looks = 100 * min(certificate.samples, 300)
-        off, twisted, back = strayed(line, fast, X_A, X_B, looks)
+        samples = 100 * min(certificate.samples, 300)
+        off, twisted, back = strayed(line, fast, X_A, X_B, samples)
         assert off <= certificate.deviation + ROUNDING
         if np.linalg.norm(X_B[:3, 3] - X_A[:3, 3]) <= deviation:
             continue
@@ -93,11 +95,11 @@ def test_bounds_hold_for_a_hundred_times_the_looks(fast: CompiledArm, sample: Sa
         assert back <= certificate.backward + ROUNDING
         run += 1
         worst = max(worst, off / certificate.deviation, twisted / certificate.rotation)
-    sample.record(f"lines of the {arm.name} looked at 100 times as often", run, 0, worst_of_bound=f"{worst:.3f}")
+    sample.record(f"lines of the {arm.name} at 100 times as many samples", run, 0, worst_of_bound=f"{worst:.3f}")
 
 
 def test_short_line_with_a_large_turn() -> None:
-    """Ten millimetres with a turn of a radian: the turn is right for where the hand is, not for where it should be."""
+    """Ten millimetres with a turn of a radian: the turn is right for where the tool is, not for where it should be."""
     fast = compile_arm(load_arm("puma560"))
     q = np.radians([10.0, -30.0, 40.0, 20.0, 50.0, 10.0])
     X_A = forward(fast.arm, q)

@@ -32,7 +32,7 @@ SPEED, ACCELERATION, EFFORT = PUMA.limits.speed, PUMA.limits.acceleration, PUMA.
 ROUNDING = 1e-9
 # The part of the time that a grid of 300 intervals costs.
 GRID = 7e-3
-# Between looks efforts may be passed by this part of their limits.
+# Between samples efforts may be passed by this part of their limits.
 SEEN = 1e-3
 
 
@@ -259,7 +259,7 @@ def test_toppra_solves_the_same_problem(rng: np.random.Generator) -> None:
 
 
 def test_corners_and_rests() -> None:
-    """At a corner the arm stops, and the two ways take their times; a rest on the way is left out."""
+    """At a corner the arm stops, and the two lines take their times; a rest on the path is left out."""
     corner = Trajectory(
         times=(0.0, 1.0, 2.0), coefficients=np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 2.0]]])
     )

@@ -1,4 +1,4 @@
-"""Paths of the hand planned in time."""
+"""Paths of the tool planned in time."""
 
 from itertools import pairwise
 
@@ -29,14 +29,14 @@ def random_path(seed: int, ends: str, orientation: Orientation) -> tuple[ToolPat
 
 
 def body_rates(path: ToolPath, t: Array) -> Array:
-    """Return the angular velocity in the axes of the hand at times, by central differences."""
+    """Return the angular velocity in the axes of the tool at times, by central differences."""
     h = 1e-5
     before, after = path(t - h)[..., :3, :3], path(t + h)[..., :3, :3]
     return rotation_vector(np.swapaxes(before, -1, -2) @ after) / (2 * h)
 
 
 @given(seeds, ends, orientations)
-def test_ends_and_straight_ways(seed: int, ends: str, orientation: Orientation) -> None:
+def test_ends_and_straight_lines(seed: int, ends: str, orientation: Orientation) -> None:
     """The path begins and ends at its first and last pose, and is no other path when run slower."""
     path, poses = random_path(seed, ends, orientation)
 
@@ -47,7 +47,7 @@ def test_ends_and_straight_ways(seed: int, ends: str, orientation: Orientation) 
 
 @given(seeds, ends)
 def test_between_the_blends_about_one_axis(seed: int, ends: str) -> None:
-    """On a straight way the hand turns as SciPy's Slerp does between the two poses."""
+    """On a straight line the tool rotates as SciPy's Slerp does between the two poses."""
     path, poses = random_path(seed, ends, "geodesic")
     # The way between the second and the third pose, off their blends; it belongs to one pose and then to the other.
     t = np.linspace(1.4, 1.5, 21)
@@ -103,7 +103,7 @@ def test_the_seeds_angles() -> None:
     assert by_nearest[0] < 0.5 * by_matlab[0]
 
 
-def test_places_are_blended() -> None:
+def test_positions_are_blended() -> None:
     """Places are those of the blended trajectory, exactly."""
     path, poses = random_path(1, "rest", "geodesic")
     t = np.linspace(-1, 4, 77)
@@ -115,7 +115,7 @@ def test_places_are_blended() -> None:
 @settings(max_examples=10)
 @given(seeds, ends, orientations)
 def test_bounds_hold_between_knots(seed: int, ends: str, orientation: Orientation) -> None:
-    """On each interval by itself the bounds hold; on straight ways the place and turns about an axis are even."""
+    """On each interval by itself the bounds hold; on lines positions and rotations about an axis are even."""
     path, _ = random_path(seed, ends, orientation)
     t = np.linspace(1e-3, 3 - 1e-3, 3001)
     rates = np.linalg.norm(body_rates(path, t), axis=-1)

@@ -36,7 +36,7 @@ def test_quintic_peaks() -> None:
 
 
 def test_peaks_are_the_largest_of_the_segments(rng: np.random.Generator) -> None:
-    """Segments that cannot hold the largest value are not looked at, and nothing is missed by that."""
+    """Segments that cannot hold the largest value are not evaluated, and nothing is missed by that."""
     for _ in range(50):
         segments, powers, joints = (int(rng.integers(1, most)) for most in (30, 11, 8))
         times = np.concatenate([[0.0], np.cumsum(rng.uniform(0, 0.2, segments))])
@@ -148,12 +148,12 @@ def test_no_extreme_is_missed(terms: list[float], fading: int, length: float) ->
     parts = np.array(terms)
     parts[-1] *= 10.0**-fading
     trajectory = Trajectory(times=(0.0, length), coefficients=(parts / length ** np.arange(len(parts)))[None, :, None])
-    looks = np.polynomial.Polynomial(parts)(np.linspace(0, 1, 2001))
+    values = np.polynomial.Polynomial(parts)(np.linspace(0, 1, 2001))
 
     lowest, highest = trajectory.extremes()
 
-    assert (lowest[0] <= looks.min() + 1e-13) & (highest[0] >= looks.max() - 1e-13)
-    assert (lowest[0] >= looks.min() - 1e-4) & (highest[0] <= looks.max() + 1e-4)
+    assert (lowest[0] <= values.min() + 1e-13) & (highest[0] >= values.max() - 1e-13)
+    assert (lowest[0] >= values.min() - 1e-4) & (highest[0] <= values.max() + 1e-4)
 
 
 @pytest.mark.parametrize("places", [(0.5, 0.5), (0.3, 0.3, 0.3), (0.2, 0.2, 0.8, 0.8), (0.4, 0.6, 0.6, 0.6, 0.9)])
@@ -191,7 +191,7 @@ def test_running_in_another_time() -> None:
         np.testing.assert_allclose(other.peaks(1), move.peaks(1) * move.duration / duration)
 
 
-def test_turning_round(rng: np.random.Generator) -> None:
+def test_reversed_trajectory(rng: np.random.Generator) -> None:
     """Backwards, a motion is at the same places at the mirrored times, its speed and jerk of the other sign."""
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, size=5))])
     move = xspline(times, rng.normal(size=(6, 3)), rng.normal(size=3), rng.normal(size=3))

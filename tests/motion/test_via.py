@@ -66,7 +66,7 @@ def reached(arm: Arm, q: Array, X: Array, Y: Array) -> bool:
 
 
 def random_way(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
-    """A configuration, and poses from there past 1 to 6 others; half of the ways turn the hand."""
+    """A configuration, and poses from there past 1 to 6 others; half of the paths rotate the tool."""
     vias, turning = int(rng.integers(1, 7)), bool(rng.integers(2))
     lower, upper = np.maximum(arm.limits.lower, -3.0), np.minimum(arm.limits.upper, 3.0)
     while True:
@@ -84,7 +84,7 @@ def random_way(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def faults(arm: Arm, stage: PlannedStage, X: Array) -> list[str]:
-    """What a path past frames does that it should not, by where the hand is seen alone."""
+    """What a path past frames does that it should not, by where the tool is seen alone."""
     run, found = stage.trajectory, []
     hand = forward(arm, run(np.linspace(0, run.duration, LOOKS)))
     places = beside_legs(hand, X, CORNER)
@@ -108,8 +108,8 @@ def faults(arm: Arm, stage: PlannedStage, X: Array) -> list[str]:
 @pytest.mark.share(0.03)
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5", "seven joints"])
 @pytest.mark.drawn(0.34)
-def test_random_ways_are_smooth_and_never_slower(name: str, sample: Sample) -> None:
-    """Beside each leg the hand swings out at its ends alone, and the way is no slower than the legs with stops."""
+def test_random_paths_are_smooth_and_never_slower(name: str, sample: Sample) -> None:
+    """Beside each leg the tool swings out at its ends alone, and the path is no slower than the legs with stops."""
     arm = arm_called(name)
     count = failures = stops = 0
     slowest = middle = 0.0
@@ -137,7 +137,7 @@ def test_random_ways_are_smooth_and_never_slower(name: str, sample: Sample) -> N
         middle = max([middle, *(leg.middle for leg in beside_legs(hand, X, CORNER))])
         failures += bool(found)
         assert not found, found
-    what = f"ways of {arm.name} past 1 to 6 frames: off the legs, turning points, limits, slower than with stops"
+    what = f"paths of {arm.name} past 1 to 6 frames: off the legs, turning points, limits, slower than with stops"
     sample.record(what, count, failures, part_of_time_with_stops=slowest, off_the_middle_mm=middle * 1e3, stops=stops)
     assert stops <= 0.02 * count + 2
 
@@ -145,7 +145,7 @@ def test_random_ways_are_smooth_and_never_slower(name: str, sample: Sample) -> N
 @pytest.mark.share(0.03)
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
 def test_wider_corners_are_no_slower(name: str, sample: Sample) -> None:
-    """The farther the hand may be from the frames, the sooner it is there."""
+    """The farther the tool may be from the frames, the sooner it is there."""
     arm, worst, count = load_arm(name), 0.0, 0
     for rng in sample.cases(40):
         q, X = random_way(arm, rng)
@@ -158,7 +158,7 @@ def test_wider_corners_are_no_slower(name: str, sample: Sample) -> None:
         slower = float(((lasting[1:] - 1e-3) / np.minimum.accumulate(lasting)[:-1]).max())
         worst, count = max(worst, slower), count + 1
         assert slower <= NO_SLOWER, lasting
-    sample.record(f"ways of {arm.name} with corners of 1 to 40 mm: wider and slower", count, 0, most=worst)
+    sample.record(f"paths of {arm.name} with corners of 1 to 40 mm: wider and slower", count, 0, most=worst)
 
 
 def corner_of_ur5() -> tuple[Arm, Array, Array]:
@@ -196,7 +196,7 @@ def test_a_leg_that_comes_back_does_not_count() -> None:
 
 
 def test_speed_is_even_behind_a_corner() -> None:
-    """On the straight 300 mm behind the corner the hand gathers speed once and loses it once."""
+    """On the straight 300 mm behind the corner the tool gathers speed once and loses it once."""
     arm, q, X = corner_of_ur5()
     run = by_via(arm, q, X).trajectory
     t = np.linspace(0, run.duration, LOOKS)
@@ -207,7 +207,7 @@ def test_speed_is_even_behind_a_corner() -> None:
     assert (np.diff(rising.astype(int)) != 0).sum() <= 1
 
 
-def test_a_way_there_and_back() -> None:
+def test_a_path_there_and_back() -> None:
     """A way that turns straight round comes no nearer to its frame than allowed, without a corner in time."""
     arm, _, X = corner_of_ur5()
     X = X[[0, 1, 0]]
@@ -236,7 +236,7 @@ def test_tiny_legs_beside_long_ones() -> None:
 
 
 def test_very_different_turns() -> None:
-    """Legs that turn the hand by half a turn, a leg on the spot and legs that do not turn go into one another."""
+    """Legs that turn the tool by half a turn, a leg on the spot and legs that do not turn go into one another."""
     arm, q, X = corner_of_ur5()
     turned = [
         homogeneous(rotation_from_vector([0, 0, a]) @ DOWN, p)
@@ -264,7 +264,7 @@ def test_speed_changes_the_timing_alone() -> None:
 
 @pytest.mark.parametrize("corner", [1e-4, 1e-3, 5e-3, 0.1])
 def test_the_corner_is_what_was_asked(corner: float) -> None:
-    """Whatever is allowed, the hand passes the frame within it, and takes no longer than with a stop there."""
+    """Whatever is allowed, the tool passes the frame within it, and takes no longer than with a stop there."""
     arm, q, X = corner_of_ur5()
     stage = by_via(arm, q, X, corner=corner)
 
@@ -277,8 +277,8 @@ def test_the_corner_is_what_was_asked(corner: float) -> None:
     assert stage.trajectory.duration <= with_stops(arm, q, X)
 
 
-def test_a_corner_past_a_turn_on_the_spot_is_told_as_it_is() -> None:
-    """Beside a leg on which the hand hardly moves, as it turns, rates along the other leg are no distance from it."""
+def test_report_of_a_corner_after_a_rotation_in_place() -> None:
+    """Beside a leg on which the tool hardly moves, as it rotates, rates along the other leg are no distance from it."""
     arm, q, X = corner_of_ur5()
     turned = homogeneous(rotation_from_vector([0, 0, 0.6]) @ DOWN, X[1, :3, 3] + 0.25 * (X[1, :3, 3] - X[0, :3, 3]))
     Y = np.stack([X[0], X[1], turned])
@@ -328,7 +328,7 @@ def puma_beside_its_wrist(off: float) -> tuple[Arm, Array, Array]:
 
 
 def test_a_start_beside_a_singularity() -> None:
-    """Where a joint is fast beside a singularity the hand is slowed there, and does not stop at every frame for it."""
+    """Where a joint is fast beside a singularity the tool is slowed there, and does not stop at every frame for it."""
     arm = load_arm("ur5")
     q = np.radians([20.0, -60.0, 80.0, -20.0, 0.2, 30.0])
     X = [forward(arm, q)]
