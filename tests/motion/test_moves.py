@@ -131,7 +131,7 @@ def test_slowed_until_the_limits_hold(puma: CompiledArm) -> None:
 @pytest.mark.parametrize("name", ["puma560-seed", "ur5", *["stanford"] * WHOLE])
 @pytest.mark.drawn(0.25)
 def test_tool_follows_the_planned_path(name: str, ends: str, orientation: str, sample: Sample) -> None:
-    """On random moves no sample is beyond the bounds, far denser than the certificate's; the branch stays what it is."""
+    """On random moves no sample, far denser than the certificate's, is out of bounds; the branch stays what it is."""
     arm = compile_arm(load_arm(name))
     run = 0
     for rng in sample.cases(30):

@@ -52,7 +52,7 @@ def plain_line(puma: Arm, **manner: float) -> CertifiedMotion:
 def strayed(
     line: CertifiedMotion, fast: CompiledArm, X_A: Array, X_B: Array, samples: int
 ) -> tuple[float, float, float]:
-    """Return how far the tool is off a line, how far it is rotated from the planned orientation, and how far it runs back."""
+    """Return how far the tool is off a line, its rotation off the planned orientation, and how far it runs back."""
     X = fast.forward(line.trajectory(np.linspace(0.0, line.trajectory.duration, samples)))
     way, come = X_B[:3, 3] - X_A[:3, 3], X[:, :3, 3] - X_A[:3, 3]
     along = come @ way / (way @ way)
