@@ -9,8 +9,8 @@ from scipy.stats import binom
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.measurement_file import RestMeasurement
-from armwright.clearance.estimation.model_errors import POWER, model_errors, offsets_of_wrong_model
-from armwright.clearance.estimation.static_estimate import estimate_at_rest, rest_offsets
+from armwright.clearance.estimation.model_errors import POWER, error_kinds, model_errors, resting_tips
+from armwright.clearance.estimation.static_estimate import closed_at_poses, estimate_at_rest, rest_offsets
 from armwright.clearance.linkage import Linkage
 from armwright.errors import ContradictionError
 from clearance.arms import ARM_A, STARTS
@@ -22,6 +22,14 @@ EXAMPLE = Path(__file__).parents[3] / "examples" / "five_bar_rest.csv"
 # Up to here a fault is small enough that its shift of the tip is proportional to it.
 SMALL = {"1": 0.5, "m": 2e-3, "rad": 5e-3}
 NOISE = 1e-6
+
+
+def offsets_of_wrong_model(linkage: Linkage, poses: Array, c: Array, name: str, amount: float) -> Array:
+    """The offsets (k, 2) of the resting tip of an arm that exceeds its model by an amount of a model error."""
+    kind = next(kind for kind in error_kinds(linkage) if kind.name == name)
+    change = amount / kind.size
+    tips = resting_tips(kind.changed(change), linkage, closed_at_poses(linkage, poses), change * kind.zeros, c)
+    return tips - poses
 
 
 def is_refused(linkage: Linkage, poses: Array, offsets: Array, noise: float) -> bool:

@@ -9,7 +9,6 @@ from armwright.arrays import Array
 from armwright.clearance.estimation import static_estimate
 from armwright.clearance.estimation.static_estimate import (
     Estimate,
-    best_poses,
     estimate_at_rest,
     rest_matrix,
     rest_offsets,
@@ -138,29 +137,6 @@ def test_map_is_the_derivative(five_bar: Linkage) -> None:
     np.testing.assert_allclose(np.stack(columns, axis=-1), rest_matrix(five_bar, STARTS), rtol=0, atol=1e-4)
 
 
-def test_best_poses(five_bar: Linkage, rng: np.random.Generator) -> None:
-    """Four poses that are chosen determine all clearances together better than any of a hundred random fours."""
-    x, y = np.meshgrid(np.linspace(-0.18, 0.18, 7), np.linspace(-0.7, -0.45, 6))
-    positions = np.stack([x.ravel(), y.ravel()], axis=-1)
-    B = rest_matrix(five_bar, positions)
-
-    def information(numbers: list[int]) -> float:
-        return float(np.linalg.slogdet(np.einsum("kai,kaj->ij", B[numbers], B[numbers]))[1])
-
-    best = best_poses(five_bar, positions, 4)
-    random = [information(rng.choice(len(positions), 4, replace=False).tolist()) for _ in range(100)]
-
-    assert len(set(best)) == 4
-    assert information(best) > max(random)
-    offsets = rest_offsets(five_bar, positions[best], ARM_A)
-    assert estimate_at_rest(five_bar, positions[best], offsets).deviations.max() < 1.8e-6
-
-
-def test_all_poses_can_be_taken(five_bar: Linkage) -> None:
-    """Asked for as many poses as there are, all come, each once."""
-    assert sorted(best_poses(five_bar, STARTS, 3)) == [0, 1, 2]
-
-
 def test_told_or_not(five_bar: Linkage) -> None:
     """Poses 10 µm apart identify no clearance with a noise of 1 µm; good ones identify all three."""
     near = STARTS[:1] + np.array([(0.0, 0.0), (1e-5, 0.0), (0.0, 1e-5)])
@@ -190,8 +166,6 @@ def test_bad_input(five_bar: Linkage) -> None:
         estimate_at_rest(five_bar, STARTS, offsets, 0.0)
     with pytest.raises(InvalidValueError, match="the loops do not close"):
         rest_offsets(five_bar, [(0.0, -2.0)], ARM_A)
-    with pytest.raises(InvalidValueError, match="count: expected 1 to 3 poses, got 4"):
-        best_poses(five_bar, STARTS, 4)
     with pytest.raises(InvalidValueError, match="level: expected a probability between 0 and 1, got 90"):
         estimate_at_rest(five_bar, STARTS, offsets).interval(90)
 

@@ -17,14 +17,14 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2, f, ncf, ncx2
 
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arrays import Array, ArrayLike
 from armwright.clearance.estimation.misfit import CONTRADICTION
 from armwright.clearance.estimation.static_estimate import Estimate, closed_at_poses, rest_matrix_at
 from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Body, Linkage, Load
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
-from armwright.errors import InvalidValueError, one_of
+from armwright.errors import InvalidValueError
 
 # The probability with which readings contradict a detected model error.
 POWER = 0.9
@@ -138,28 +138,6 @@ def _detection_limit(remainder: Callable[[float], float], linear: float, least: 
         if size > _MAX_GROWTH * linear:
             break
     return float(np.inf)
-
-
-def offsets_of_wrong_model(
-    linkage: Linkage, poses: ArrayLike, clearances: ArrayLike, name: str, amount: float
-) -> Array:
-    """Return (k, 2) the offsets of the resting tip of an arm that differs from its model [m].
-
-    Args:
-        linkage: the nominal model, with p pins.
-        poses: (k, 2) positions of its tip by the model, without clearance [m].
-        clearances: (p,) [m].
-        name: of the model error; see ``ModelError``.
-        amount: excess of the arm over its model, in the unit of the model error.
-
-    Raises:
-        UnknownNameError: there is no such model error.
-    """
-    kinds = {kind.name: kind for kind in error_kinds(linkage)}
-    kind = kinds[one_of("model error", name, kinds)]
-    change, positions, c = amount / kind.size, floats(poses, "poses"), floats(clearances, "clearances")
-    tips = resting_tips(kind.changed(change), linkage, closed_at_poses(linkage, positions), change * kind.zeros, c)
-    return np.asarray(tips - positions, dtype=np.float64)
 
 
 def _noncentrality(freedom: int, noise_freedom: float) -> float:

@@ -240,32 +240,6 @@ def _fit_clearances(linkage: Linkage, q: Array, offsets: Array, B: Array, weight
     return np.asarray(best, dtype=np.float64), np.asarray(smallest, dtype=np.float64)
 
 
-def best_poses(linkage: Linkage, candidates: ArrayLike, count: int) -> list[int]:
-    """Return the numbers of the poses with the most information about all clearances: D-optimal, chosen one by one.
-
-    Args:
-        linkage: with p pins.
-        candidates: (k, 2) positions of its tip [m].
-        count: how many to choose.
-
-    Raises:
-        InvalidValueError: the count exceeds the candidates.
-    """
-    positions = floats(candidates, "candidates")
-    if not 0 < count <= len(positions):
-        raise InvalidValueError(f"count: expected 1 to {len(positions)} poses, got {count}")
-    B = rest_matrix(linkage, positions)
-    gains = B.mT @ B
-    information = 1e-9 * np.eye(B.shape[-1])
-    chosen: list[int] = []
-    for _ in range(count):
-        determinants = np.linalg.slogdet(information + gains)[1]
-        determinants[chosen] = -np.inf
-        chosen.append(int(np.argmax(determinants)))
-        information = information + gains[chosen[-1]]
-    return chosen
-
-
 def closed_at_poses(linkage: Linkage, poses: ArrayLike) -> Array:
     """Return (k, n) closed coordinates with the tip at each pose, each from the one before."""
     configurations = [assembly_guess(linkage)]
