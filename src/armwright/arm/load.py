@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
-from armwright.arm.tensors import impossible_moments
+from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
@@ -186,12 +186,7 @@ def _link(table: Table) -> Link:
         inertia = about_com(inertia, mass, com)
     moments = impossible_moments(mass, com, inertia)
     if moments is not None:
-        said = ", ".join(f"{moment:.3g}" for moment in moments)
-        raise table.error(
-            "inertia_kgm2",
-            f"a body cannot have the principal moments {said} kg m² about its centre of mass: none may be negative, or "
-            "exceed the sum of the other two; check inertia_about and com",
-        )
+        raise table.error("inertia_kgm2", f"{moments_message(moments)}; check inertia_about and com")
     return Link(mass=mass, com=com, inertia=inertia, name=name)
 
 

@@ -32,3 +32,12 @@ def impossible_moments(mass: float, com: Array, inertia: Array) -> Array | None:
     single = np.count_nonzero(np.abs(moments) > slack) == 1
     negative, exceeds = moments[0] < -slack, moments[2] > moments[0] + moments[1] + slack
     return moments if negative or (exceeds and not single) else None
+
+
+def moments_message(moments: Array) -> str:
+    """Return what is wrong with principal moments (3,) about the centre of mass that no body has [kg m²]."""
+    values = ", ".join(f"{moment:.3g}" for moment in moments)
+    return (
+        f"a body cannot have the principal moments {values} kg m² about its centre of mass: none may be negative, or "
+        "exceed the sum of the other two"
+    )

@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.arm.dh import turn
 from armwright.arm.model import Limits, Link, Motor
-from armwright.arm.tensors import impossible_moments
+from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.urdf.elements import Element, read_elements
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
@@ -234,13 +234,7 @@ def body_of(link: Element) -> Link:
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     moments = impossible_moments(mass, X[:3, 3], tensor)
     if moments is not None:
-        said = ", ".join(f"{moment:.3g}" for moment in moments)
-        why = element.error(
-            "",
-            f"a body cannot have the principal moments {said} kg m² about its centre of mass: none may be negative, or "
-            "exceed the sum of the other two",
-        )
-        return Link(unknown=str(why))
+        return Link(unknown=str(element.error("", moments_message(moments))))
     R = X[:3, :3]
     return Link(mass=mass, com=X[:3, 3], inertia=R @ tensor @ R.T, complete=False)
 
