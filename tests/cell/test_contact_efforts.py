@@ -142,12 +142,12 @@ def test_the_wrench_at_the_tool(share: float) -> None:
     recording, cell = pressing(arm)
     (stage,) = recording.stages
     hardware = Simulator(cell)
-    hardware.begin("ARM_1", stage.motion, 0.0, PART)
-    whole = hardware.wrenches("ARM_1", 0.0)
+    hardware.start_motion("ARM_1", stage.motion, 0.0, PART)
+    whole = hardware.tool_wrenches("ARM_1", 0.0)
     tick = round(share * (len(whole) - 1))
 
-    np.testing.assert_allclose(hardware.wrenches("ARM_1", tick * cell.period), whole[tick:], atol=AGREES)
-    np.testing.assert_allclose(hardware.wrenches("ARM_1", 1e3), whole[-1:], atol=AGREES)
+    np.testing.assert_allclose(hardware.tool_wrenches("ARM_1", tick * cell.period), whole[tick:], atol=AGREES)
+    np.testing.assert_allclose(hardware.tool_wrenches("ARM_1", 1e3), whole[-1:], atol=AGREES)
     up = TILTED[:3, :3].T @ (0.0, 0.0, 1.0)
     np.testing.assert_allclose(np.cross(whole[-1, :3], up), 0.0, atol=AGREES)
-    assert hardware.force("ARM_1", 1e3)[2] == pytest.approx(float(whole[-1, :3] @ up))
+    assert hardware.contact_force("ARM_1", 1e3)[2] == pytest.approx(float(whole[-1, :3] @ up))

@@ -45,41 +45,41 @@ def test_camera_answers_one_after_the_other(tmp_path: Path) -> None:
         bench(tmp_path, BENCH.replace("time_s = 0.25", 'time_s = 0.25\nafter_last = "same"'))
     )
 
-    places = [hardware.look("OBJ")[0][:3, 3] for _ in range(4)]
+    places = [hardware.locate("OBJ")[0][:3, 3] for _ in range(4)]
 
     # The camera stands at x = 1 and is turned a quarter to the left: 0.1 m along its x is 0.1 m along y of the world.
     np.testing.assert_allclose(places, [(1, 0.1, 0), (1, 0.2, 0), (1, 0.2, 0), (1, 0.2, 0)], atol=1e-12)
-    assert hardware.look("OBJ")[1] == 0.25
+    assert hardware.locate("OBJ")[1] == 0.25
 
 
 def test_camera_answers_run_out(tmp_path: Path) -> None:
     """After its last answer the camera finds nothing more, and says how many there were."""
     hardware = Simulator(bench(tmp_path))
-    hardware.look("OBJ")
-    hardware.look("OBJ")
+    hardware.locate("OBJ")
+    hardware.locate("OBJ")
 
     with pytest.raises(DeviceError, match=r"the camera found nothing more for OBJ: cell 'bench' has 2 answers for it"):
-        hardware.look("OBJ")
+        hardware.locate("OBJ")
 
 
 def test_two_simulators_of_one_cell(tmp_path: Path) -> None:
     """What one simulator has seen and switched does not change what another one finds."""
     place = bench(tmp_path)
     first = Simulator(place)
-    first.look("OBJ")
+    first.locate("OBJ")
     first.operate("PRESS", on=True)
 
     second = Simulator(place)
 
-    assert second.look("OBJ")[0][1, 3] == pytest.approx(0.1)
-    assert second.running() == frozenset()
+    assert second.locate("OBJ")[0][1, 3] == pytest.approx(0.1)
+    assert second.active_devices() == frozenset()
 
 
 @pytest.mark.parametrize("frame", ["EMPTY", "CUP"])
 def test_camera_that_finds_nothing(frame: str, tmp_path: Path) -> None:
     """A frame without an answer is not found; the message lists what the camera knows."""
     with pytest.raises(DeviceError, match=f"the camera found nothing for {frame}; in cell 'bench' it finds EMPTY, OBJ"):
-        Simulator(bench(tmp_path)).look(frame)
+        Simulator(bench(tmp_path)).locate(frame)
 
 
 def test_camera_without_any_answer(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_camera_without_any_answer(tmp_path: Path) -> None:
     text = "[arms.ARM_1]\njoint_positions = [0, 0, 0.3, 0, 0, 0]\n"
 
     with pytest.raises(DeviceError, match=r"in cell 'bench\.toml' it finds nothing"):
-        Simulator(bench(tmp_path, text)).look("OBJ")
+        Simulator(bench(tmp_path, text)).locate("OBJ")
 
 
 def test_any_device_where_none_is_listed(tmp_path: Path) -> None:
@@ -96,10 +96,10 @@ def test_any_device_where_none_is_listed(tmp_path: Path) -> None:
 
     assert hardware.operate("TORCH", on=True) == 0
     assert hardware.operate("PRESS", on=True) == 0
-    assert hardware.running() == {"TORCH", "PRESS"}
+    assert hardware.active_devices() == {"TORCH", "PRESS"}
     hardware.operate("TORCH", on=False)
     hardware.operate("TORCH", on=False)
-    assert hardware.running() == {"PRESS"}
+    assert hardware.active_devices() == {"PRESS"}
 
 
 def test_only_listed_devices(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_only_listed_devices(tmp_path: Path) -> None:
     hardware.operate("LAMP", on=True)
     with pytest.raises(DeviceError, match=r"cell 'bench' has no device PERSS; did you mean PRESS\?"):
         hardware.operate("PERSS", on=True)
-    assert hardware.running() == {"LAMP"}
+    assert hardware.active_devices() == {"LAMP"}
 
 
 def test_no_devices_at_all(tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_arms_move_alone(tmp_path: Path) -> None:
     goal = [0.5, -0.2, 0.4, 0.1, 0.2, 0.3]
 
     motion = quintic(hardware.configuration("ARM_1", 5.0), goal, 2.0)
-    hardware.begin("ARM_1", motion, 5.0, np.eye(4))
+    hardware.start_motion("ARM_1", motion, 5.0, np.eye(4))
 
     np.testing.assert_array_equal(hardware.configuration("ARM_1", 6.0), motion(1.0))
     for later in (7.0, 100.0):
@@ -139,8 +139,8 @@ def test_a_trajectory_that_begins_elsewhere(tmp_path: Path) -> None:
     hardware = Simulator(bench(tmp_path))
     start = np.array((0.1, 0, 0.3, 0, 0, 0))
 
-    with pytest.raises(AssertionError, match=r"ARM_1 stands 0\.1 away from where its trajectory begins"):
-        hardware.begin("ARM_1", quintic(start, start, 1.0), 0.0, np.eye(4))
+    with pytest.raises(AssertionError, match=r"ARM_1 is 0\.1 away from the start of its trajectory"):
+        hardware.start_motion("ARM_1", quintic(start, start, 1.0), 0.0, np.eye(4))
 
 
 def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
@@ -157,26 +157,26 @@ def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
     plane = (X_WB @ forward(arm, motion(1.0)))[2, 3]
     hardware = Simulator(attrs.evolve(cell, contact=ContactPlane(height=plane, stiffness=1000.0)))
 
-    hardware.begin("ARM_1", motion, 3.0, np.eye(4))
+    hardware.start_motion("ARM_1", motion, 3.0, np.eye(4))
 
-    assert hardware.touches_at("ARM_1") == pytest.approx(4.0, abs=1e-9)
-    assert hardware.force("ARM_1", 4.0)[2] == pytest.approx(0, abs=1e-6)
+    assert hardware.contact_time("ARM_1") == pytest.approx(4.0, abs=1e-9)
+    assert hardware.contact_force("ARM_1", 4.0)[2] == pytest.approx(0, abs=1e-6)
     for later, local in ((4.5, 1.5), (5.0, 2.0), (60.0, 2.0)):
         np.testing.assert_array_equal(hardware.configuration("ARM_1", later), motion(local))
         depth = plane - (X_WB @ forward(arm, motion(local)))[2, 3]
-        np.testing.assert_allclose(hardware.force("ARM_1", later), (0, 0, 1000 * depth), atol=1e-6)
-        np.testing.assert_allclose(hardware.pressed("ARM_1", later), (depth, 1000 * depth), atol=1e-9)
+        np.testing.assert_allclose(hardware.contact_force("ARM_1", later), (0, 0, 1000 * depth), atol=1e-6)
+        np.testing.assert_allclose(hardware.peak_contact("ARM_1", later), (depth, 1000 * depth), atol=1e-9)
     # Deeper than 5 mm it has come on the first tick at which it is.
     heights = np.array([(X_WB @ forward(arm, motion(k * 1e-3)))[2, 3] for k in range(2001)])
-    assert hardware.too_deep_at("ARM_1") == pytest.approx(3.0 + np.flatnonzero(heights < plane - 5e-3)[0] * 1e-3)
+    assert hardware.excess_depth_time("ARM_1") == pytest.approx(3.0 + np.flatnonzero(heights < plane - 5e-3)[0] * 1e-3)
 
     # On its way out it presses less and less; what is let go does not press at all.
-    hardware.begin("ARM_1", motion.reversed(), 60.0, np.eye(4))
-    assert hardware.touches_at("ARM_1") is None
-    assert hardware.too_deep_at("ARM_1") is None
+    hardware.start_motion("ARM_1", motion.reversed(), 60.0, np.eye(4))
+    assert hardware.contact_time("ARM_1") is None
+    assert hardware.excess_depth_time("ARM_1") is None
     depth = plane - (X_WB @ forward(arm, motion(1.5)))[2, 3]
-    np.testing.assert_allclose(hardware.force("ARM_1", 60.5), (0, 0, 1000 * depth), atol=1e-6)
-    assert not hardware.force("ARM_1", 61.001).any()
+    np.testing.assert_allclose(hardware.contact_force("ARM_1", 60.5), (0, 0, 1000 * depth), atol=1e-6)
+    assert not hardware.contact_force("ARM_1", 61.001).any()
 
 
 def test_what_is_let_go_does_not_press(tmp_path: Path) -> None:
@@ -190,22 +190,22 @@ def test_what_is_let_go_does_not_press(tmp_path: Path) -> None:
     plane = float((X_WB @ forward(arm, motion(0.9)) @ X_HP)[2, 3])
     low = attrs.evolve(cell.arms["ARM_1"], start=ends[0])
     hardware = Simulator(attrs.evolve(cell, arms={"ARM_1": low}, contact=ContactPlane(height=plane)))
-    hardware.begin("ARM_1", motion, 0.0, X_HP)
-    pressed = hardware.force("ARM_1", 1.0)[2]
+    hardware.start_motion("ARM_1", motion, 0.0, X_HP)
+    pressed = hardware.contact_force("ARM_1", 1.0)[2]
     assert pressed > 1
 
-    hardware.begin("ARM_1", hold(motion(1.0), 1.0), 1.0, np.eye(4))
-    assert hardware.force("ARM_1", 2.0)[2] == pytest.approx(pressed, rel=1e-9)
-    hardware.fingers("ARM_1", closed=False)
-    assert hardware.force("ARM_1", 2.0)[2] == 0
+    hardware.start_motion("ARM_1", hold(motion(1.0), 1.0), 1.0, np.eye(4))
+    assert hardware.contact_force("ARM_1", 2.0)[2] == pytest.approx(pressed, rel=1e-9)
+    hardware.move_fingers("ARM_1", closed=False)
+    assert hardware.contact_force("ARM_1", 2.0)[2] == 0
 
 
 def test_fingers_take_their_time(tmp_path: Path) -> None:
     """Opening and closing take as long as the cell file says, and 0.3 s where it says nothing."""
     hardware = Simulator(bench(tmp_path))
 
-    assert (hardware.fingers("ARM_1", closed=False), hardware.fingers("ARM_1", closed=True)) == (0.2, 0.5)
-    assert (hardware.fingers("ARM_2", closed=False), hardware.fingers("ARM_2", closed=True)) == (0.3, 0.3)
+    assert (hardware.move_fingers("ARM_1", closed=False), hardware.move_fingers("ARM_1", closed=True)) == (0.2, 0.5)
+    assert (hardware.move_fingers("ARM_2", closed=False), hardware.move_fingers("ARM_2", closed=True)) == (0.3, 0.3)
 
 
 def test_a_start_that_does_not_fit_the_arm(tmp_path: Path) -> None:

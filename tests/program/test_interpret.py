@@ -327,7 +327,7 @@ def test_tools_are_off_after_an_error() -> None:
     with pytest.raises(RunError):
         interpret(compiled.code, cell, hardware)
 
-    assert hardware.running() == frozenset()
+    assert hardware.active_devices() == frozenset()
 
 
 def test_tools_are_off_at_the_end() -> None:

@@ -55,8 +55,8 @@ def test_the_corner_of_the_cell(corner: float) -> None:
 
 def test_corners_of_twenty_deviations() -> None:
     """A cell that tells no corner allows twenty times what a straight line may be off."""
-    assert attrs.evolve(CELL, deviation=2e-4).corner_room == pytest.approx(4e-3)
-    assert attrs.evolve(CELL, corner=7e-3).corner_room == 7e-3
+    assert attrs.evolve(CELL, deviation=2e-4).corner_deviation == pytest.approx(4e-3)
+    assert attrs.evolve(CELL, corner=7e-3).corner_deviation == 7e-3
 
 
 def test_the_report_keeps_its_spline() -> None:

@@ -44,8 +44,8 @@ def static_compliance(
         few: take fewer than 3 repetitions of each load, or fewer than 10 loads.
 
     Raises:
-        KindError: something is no real number.
-        ShapeError: the shapes do not belong together.
+        KindError: an argument is not real numbers.
+        ShapeError: the shapes are inconsistent.
         InvalidValueError: no measurement is without load, a load is negative, or there are too few.
 
     Source:

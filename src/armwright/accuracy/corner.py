@@ -54,7 +54,7 @@ def corner_deviations(
         few: take fewer than 3 cycles.
 
     Raises:
-        KindError: the band is no number.
+        KindError: the band is not a number.
         ShapeError: path and runs have different numbers of columns.
         InvalidValueError: there are too few cycles, the path has no corner, or a run ends before a corner.
 

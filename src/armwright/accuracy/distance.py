@@ -72,8 +72,8 @@ def distance_accuracy(
         few: take fewer than 30 cycles.
 
     Raises:
-        KindError: something is no real number.
-        ShapeError: the shapes do not belong together.
+        KindError: an argument is not real numbers.
+        ShapeError: the shapes are inconsistent.
         InvalidValueError: there are too few cycles, or a number is not finite.
 
     Source:
@@ -107,8 +107,8 @@ def distance_repeatability(
         few: take fewer than 30 cycles.
 
     Raises:
-        KindError: something is no real number.
-        ShapeError: the shapes do not belong together.
+        KindError: an argument is not real numbers.
+        ShapeError: the shapes are inconsistent.
         InvalidValueError: there are too few cycles, or a number is not finite.
 
     Source:

@@ -123,7 +123,7 @@ def read_measurements(
         The tests, in the order in which they begin.
 
     Raises:
-        FileFormatError: a file is missing, broken, or says what cannot be; the text has file, line and column.
+        FileFormatError: a file is missing or invalid; the message has file, line and column.
         InvalidValueError: there are no files.
     """
     files = [paths] if isinstance(paths, str | Path) else list(paths)

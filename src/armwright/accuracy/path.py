@@ -152,7 +152,7 @@ def path_velocity(
         few: take fewer than 10 cycles.
 
     Raises:
-        KindError: the speed is no number.
+        KindError: the speed is not a number.
         ShapeError: path and runs have different numbers of columns.
         InvalidValueError: there are too few cycles, the speed is not above 0, a run misses a plane or has no times.
 

@@ -71,8 +71,8 @@ def pose_accuracy(
         few: take fewer than 30 cycles.
 
     Raises:
-        KindError: something is no real number.
-        ShapeError: the shapes do not belong together.
+        KindError: an argument is not real numbers.
+        ShapeError: the shapes are inconsistent.
         InvalidValueError: there are too few cycles, a number is not finite, or angles scatter by more than 90 deg.
 
     Source:
@@ -102,8 +102,8 @@ def pose_repeatability(
         few: take fewer than 30 cycles.
 
     Raises:
-        KindError: something is no real number.
-        ShapeError: the shapes do not belong together.
+        KindError: an argument is not real numbers.
+        ShapeError: the shapes are inconsistent.
         InvalidValueError: there are too few cycles, a number is not finite, or angles scatter by more than 90 deg.
 
     Source:

@@ -75,7 +75,7 @@ def settling(runs: Sequence[Trace], band: float, *, few: bool = False) -> Settli
         few: take fewer than 3 cycles.
 
     Raises:
-        KindError: the band is no number.
+        KindError: the band is not a number.
         ShapeError: the runs have different numbers of columns.
         InvalidValueError: there are too few cycles, a record begins inside the band or ends outside, or has no times.
 
@@ -108,7 +108,7 @@ def posing_time(runs: Sequence[Trace], band: float, *, few: bool = False) -> Pos
         few: take fewer than 3 cycles.
 
     Raises:
-        KindError: the band is no number.
+        KindError: the band is not a number.
         ShapeError: the runs have different numbers of columns.
         InvalidValueError: there are too few cycles, a record ends outside the band, or has no times.
 

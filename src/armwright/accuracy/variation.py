@@ -73,8 +73,8 @@ def multidirectional_variation(
         few: take fewer than 3 directions, or fewer than 30 cycles of each.
 
     Raises:
-        KindError: something is no real number.
-        ShapeError: the shapes do not belong together.
+        KindError: an argument is not real numbers.
+        ShapeError: the shapes are inconsistent.
         InvalidValueError: there are too few directions or cycles, or a number is not finite.
 
     Source:
@@ -95,8 +95,8 @@ def exchangeability(
         few: take fewer than 5 robots, or fewer than 30 cycles of each.
 
     Raises:
-        KindError: something is no real number.
-        ShapeError: the shapes do not belong together.
+        KindError: an argument is not real numbers.
+        ShapeError: the shapes are inconsistent.
         InvalidValueError: there are too few robots or cycles, or a number is not finite.
 
     Source:
@@ -126,8 +126,8 @@ def pose_drift(
         few: take fewer than 10 cycles per measurement.
 
     Raises:
-        KindError: something is no real number.
-        ShapeError: the shapes do not belong together.
+        KindError: an argument is not real numbers.
+        ShapeError: the shapes are inconsistent.
         InvalidValueError: there are fewer than two measurements, too few cycles, or times that do not rise.
 
     Source:

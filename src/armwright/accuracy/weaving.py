@@ -52,7 +52,7 @@ def weaving_deviation(commanded: Trace, runs: Sequence[Trace], speed: float, *, 
         few: take fewer than 3 cycles.
 
     Raises:
-        KindError: the speed is no number.
+        KindError: the speed is not a number.
         ShapeError: path and runs have different numbers of columns.
         InvalidValueError: there are too few cycles, the speed is not above 0, something does not weave or has no times.
 

@@ -1,4 +1,4 @@
-"""What a program acts on: frames, arms, devices, camera; cell files; the kinematic simulator."""
+"""Robot cells: frame tree, arms, devices, camera; cell files; the kinematic simulator."""
 
 from armwright.lazy_namespace import attach
 

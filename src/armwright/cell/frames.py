@@ -1,4 +1,4 @@
-"""The frame tree: where everything is, and what hangs on what. A tree never changes; a change gives a new one."""
+"""The frame tree: the pose of every frame relative to its parent. A tree is immutable; a change returns a new tree."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -13,71 +13,71 @@ from armwright.spatial.poses import inverse_pose
 WORLD = "WORLD"
 
 
-def _relation(value: ArrayLike) -> Array:
+def _as_relation(value: ArrayLike) -> Array:
     if isinstance(value, np.ndarray) and value.shape == (4, 4) and not value.flags.writeable:
-        # Nobody can change it: it was checked before, or worked out here.
+        # It was checked before or computed here, and cannot be changed.
         return value
     return of_shape(value, (4, 4), "relation")
 
 
-def _kept(X: Array) -> Array:
-    """Return a pose that was worked out here, and that nobody shall change."""
+def _freeze(X: Array) -> Array:
+    """Return a computed pose, made read-only."""
     X.setflags(write=False)
     return X
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Node:
-    """One frame.
+    """A frame.
 
     Attributes:
-        parent: the frame it hangs on.
-        relation: (4, 4) its pose seen from the parent; None while the frame has no value.
-        rigid: whether the parent comes along when the frame is given another pose.
+        parent: the frame to which it is attached.
+        relation: (4, 4) its pose relative to the parent; None while the frame has no value.
+        rigid: whether the parent moves too when the frame is assigned another pose.
     """
 
     parent: str
-    relation: Array | None = attrs.field(converter=attrs.converters.optional(_relation))
+    relation: Array | None = attrs.field(converter=attrs.converters.optional(_as_relation))
     rigid: bool = False
 
 
 @attrs.frozen(eq=False)
 class FrameTree:
-    """Frames by name, each with one parent, the root of all WORLD.
+    """Frames by name, each with one parent; the root is WORLD.
 
     Attributes:
         nodes: every frame but WORLD.
     """
 
     nodes: Mapping[str, Node] = attrs.field(factory=dict)
-    # Poses in the world that have been worked out, and how many frames hang on each: what a tree knows of itself. A
-    # changed tree takes over what still holds, so that a chain costs its length and not the square of it.
+    # Caches: computed poses in the world, and the number of children of each frame. A changed tree takes over what is
+    # still valid, so that building a chain takes time linear in its length.
     _worlds: dict[str, Array] = attrs.field(factory=dict, repr=False)
     _children: Mapping[str, int] = attrs.field(repr=False)
 
     @_children.default
-    def _counted(self) -> Mapping[str, int]:
+    def _count_children(self) -> Mapping[str, int]:
         return Counter(node.parent for node in self.nodes.values())
 
     def __contains__(self, name: str) -> bool:
-        """Whether a frame of that name is known."""
+        """Whether there is a frame of that name."""
         return name == WORLD or name in self.nodes
 
     def __iter__(self) -> Iterator[str]:
-        """Walk through the names, parents before children."""
+        """Iterate over the names, parents before children."""
         yield WORLD
         depths = {WORLD: 0}
         for name in self.nodes:
-            way = []
+            path = []
             while name not in depths:
-                way.append(name)
-                name = self.nodes[name].parent  # noqa: PLW2901 - the way up
+                path.append(name)
+                name = self.nodes[name].parent  # noqa: PLW2901 - up the tree
             depth = depths[name]
-            depths |= {below: depth + number for number, below in enumerate(reversed(way), 1)}
+            depths |= {descendant: depth + number for number, descendant in enumerate(reversed(path), 1)}
         yield from sorted(self.nodes, key=depths.__getitem__)
 
     def has_value(self, name: str) -> bool:
-        """Whether the frame stands somewhere."""
+        """Whether the frame and all its ancestors have values."""
         while name != WORLD and name not in self._worlds:
             node = self._node(name)
             if node.relation is None:
@@ -86,10 +86,10 @@ class FrameTree:
         return True
 
     def parent(self, name: str) -> str | None:
-        """Return what the frame hangs on; None for WORLD.
+        """Return the parent of a frame; None for WORLD.
 
         Raises:
-            UnknownNameError: no such frame.
+            UnknownNameError: there is no such frame.
         """
         if name == WORLD:
             return None
@@ -98,37 +98,37 @@ class FrameTree:
     def ancestors(self, name: str) -> list[str]:
         """Return the frames from the parent of ``name`` up to WORLD."""
         chain = []
-        above = self.parent(name)
-        while above is not None:
-            chain.append(above)
-            above = self.parent(above)
+        ancestor = self.parent(name)
+        while ancestor is not None:
+            chain.append(ancestor)
+            ancestor = self.parent(ancestor)
         return chain
 
     def world(self, name: str) -> Array:
         """Return the pose of a frame in the world, (4, 4).
 
         Raises:
-            UnknownNameError: no such frame.
-            InvalidValueError: the frame, or one it hangs on, has no value yet.
+            UnknownNameError: there is no such frame.
+            InvalidValueError: the frame, or an ancestor, has no value yet.
         """
-        way = []
+        path = []
         while name != WORLD and (X_WF := self._worlds.get(name)) is None:
             node = self._node(name)
             if node.relation is None:
                 raise InvalidValueError(f"frame {name} has no value yet")
-            way.append((name, node.relation))
+            path.append((name, node.relation))
             name = node.parent
         X = None if name == WORLD else X_WF
-        for below, relation in reversed(way):
-            self._worlds[below] = X = relation if X is None else _kept(X @ relation)
+        for descendant, relation in reversed(path):
+            self._worlds[descendant] = X = relation if X is None else _freeze(X @ relation)
         return np.eye(4) if X is None else X
 
     def relation(self, child: str, ancestor: str) -> Array:
-        """Return the pose (4, 4) of ``child`` seen from ``ancestor``, one of the frames it hangs on.
+        """Return the pose (4, 4) of ``child`` relative to ``ancestor``, one of its ancestors.
 
         Raises:
-            UnknownNameError: no such frame.
-            InvalidValueError: the frame, or one it hangs on, has no value yet.
+            UnknownNameError: there is no such frame.
+            InvalidValueError: the frame, or an ancestor, has no value yet.
         """
         X, name = None, child
         while name != ancestor:
@@ -140,13 +140,13 @@ class FrameTree:
         return np.eye(4) if X is None else X
 
     def declare(self, name: str) -> "FrameTree":
-        """Return the tree with a frame that hangs on WORLD and has no value yet; a known frame stays as it is."""
-        return self if name in self else self._with(name, Node(parent=WORLD, relation=None))
+        """Return the tree with a frame that is attached to WORLD and has no value; a known frame is not changed."""
+        return self if name in self else self._with_node(name, Node(parent=WORLD, relation=None))
 
-    def place(self, name: str, X_WF: ArrayLike) -> "FrameTree":
-        """Return the tree with a frame set to a pose in the world; it goes on hanging on what it hung on.
+    def set_pose(self, name: str, X_WF: ArrayLike) -> "FrameTree":
+        """Return the tree with a frame assigned a pose in the world; its parent remains.
 
-        A frame that hangs rigidly takes its parent along, and that its own, up to ``leader``.
+        A rigidly attached frame moves its parent, and so on up to ``rigid_root``.
         """
         X = of_shape(X_WF, (4, 4), "pose")
         while (node := self.nodes.get(name)) is not None and node.rigid and node.relation is not None:
@@ -154,17 +154,17 @@ class FrameTree:
         if name == WORLD:
             raise InvalidValueError("the frame WORLD is the root and cannot be assigned a pose")
         parent = WORLD if node is None else node.parent
-        relation = X if parent == WORLD else _kept(inverse_pose(self.world(parent)) @ X)
-        return self._with(name, Node(parent=parent, relation=relation))
+        relation = X if parent == WORLD else _freeze(inverse_pose(self.world(parent)) @ X)
+        return self._with_node(name, Node(parent=parent, relation=relation))
 
-    def leader(self, name: str) -> str:
-        """Return the frame that gets another pose when ``name`` does: itself, or the end of its rigid links."""
+    def rigid_root(self, name: str) -> str:
+        """Return the frame that moves when ``name`` is assigned a pose: itself, or the end of its rigid attachments."""
         while (node := self.nodes.get(name)) is not None and node.rigid:
             name = node.parent
         return name
 
     def without(self, name: str) -> "FrameTree":
-        """Return the tree without a frame; what hung on it keeps its pose and hangs on WORLD."""
+        """Return the tree without a frame; its children keep their poses and are attached to WORLD."""
         nodes = dict(self.nodes)
         for child, node in self.nodes.items():
             if node.parent == name:
@@ -173,35 +173,35 @@ class FrameTree:
         nodes.pop(name, None)
         return FrameTree(nodes)
 
-    def would_ring(self, child: str, parent: str) -> bool:
-        """Whether a frame cannot hang on another because that one hangs on it, or is the same."""
-        # What nothing hangs on can hang anywhere: no long path up for the common case.
+    def would_close_cycle(self, child: str, parent: str) -> bool:
+        """Whether attaching a frame to another would close a cycle: the other is the same frame, or a descendant."""
+        # A frame without children closes none: the common case needs no search.
         return child == parent or (self._children.get(child, 0) > 0 and child in self.ancestors(parent))
 
     def affix(self, child: str, parent: str, relation: ArrayLike | None = None, *, rigid: bool = False) -> "FrameTree":
-        """Return the tree with ``child`` hanging on ``parent``.
+        """Return the tree with ``child`` attached to ``parent``.
 
         Args:
-            child: the frame that follows.
-            parent: the frame it follows.
-            relation: (4, 4) pose of the child seen from the parent; where both stand now when left out.
-            rigid: whether the parent comes along when the child is given another pose.
+            child: the frame to attach.
+            parent: its new parent.
+            relation: (4, 4) pose of the child relative to the parent; the default is the current one.
+            rigid: whether the parent moves too when the child is assigned another pose.
 
         Raises:
-            UnknownNameError: no such frame.
-            InvalidValueError: a ring would close, or a pose that is needed has no value.
+            UnknownNameError: there is no such frame.
+            InvalidValueError: a cycle would close, or a required pose has no value.
         """
-        if self.would_ring(child, parent):
+        if self.would_close_cycle(child, parent):
             raise InvalidValueError(f"{child} cannot be attached to {parent}, which is attached to {child}")
         if relation is None:
-            relation = _kept(inverse_pose(self.world(parent)) @ self.world(child))
+            relation = _freeze(inverse_pose(self.world(parent)) @ self.world(child))
         else:
             self.world(parent)
-        return self._with(child, Node(parent=parent, relation=relation, rigid=rigid))
+        return self._with_node(child, Node(parent=parent, relation=relation, rigid=rigid))
 
     def unfix(self, child: str) -> "FrameTree":
-        """Return the tree with ``child`` cut loose: it keeps its pose and hangs on WORLD."""
-        return self._with(child, Node(parent=WORLD, relation=self.world(child)))
+        """Return the tree with ``child`` detached: it keeps its pose and is attached to WORLD."""
+        return self._with_node(child, Node(parent=WORLD, relation=self.world(child)))
 
     def _node(self, name: str) -> Node:
         try:
@@ -209,8 +209,8 @@ class FrameTree:
         except KeyError:
             raise UnknownNameError("frame", name, [WORLD, *self.nodes]) from None
 
-    def _with(self, name: str, node: Node) -> "FrameTree":
-        # Only what hangs on a changed frame stands elsewhere.
+    def _with_node(self, name: str, node: Node) -> "FrameTree":
+        # Only descendants of a changed frame have other poses in the world.
         worlds = {} if self._children.get(name, 0) else {**self._worlds}
         worlds.pop(name, None)
         children = {**self._children}

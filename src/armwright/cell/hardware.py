@@ -1,4 +1,4 @@
-"""What the interpreter asks of a cell: the one small protocol that a simulated or a real cell answers."""
+"""The protocol by which the interpreter controls a cell, simulated or real."""
 
 from typing import NamedTuple, Protocol
 
@@ -8,15 +8,15 @@ from armwright.motion.trajectory import Trajectory
 
 
 class DeviceError(ArmwrightError, RuntimeError):
-    """A device could not do what it was asked."""
+    """A device could not carry out its command."""
 
 
-class Press(NamedTuple):
-    """How hard an arm has pressed on something.
+class PeakContact(NamedTuple):
+    """The deepest contact of an arm during a motion.
 
     Attributes:
-        depth: how deep what it moves has come into it [m]; 0 where it has not touched it.
-        force: the force there [N].
+        depth: depth of penetration [m]; 0 without contact.
+        force: contact force there [N].
     """
 
     depth: float
@@ -24,44 +24,45 @@ class Press(NamedTuple):
 
 
 class Hardware(Protocol):
-    """A cell at work. Times are in [s] of the cell's own clock, poses (4, 4) in the world."""
+    """The devices of a cell. Times are in [s] on the clock of the cell, poses (4, 4) in the world."""
 
     def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) that the sensors of an arm read."""
 
-    def begin(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
-        """Let an arm follow a trajectory that begins at its configuration, instead of what it does now.
+    def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
+        """Let an arm follow a trajectory that begins at its configuration, instead of its current motion.
 
         Args:
             arm: its name.
             trajectory: from now on.
             now: the time.
-            tip: (4, 4) what shall come to the goal, seen from the gripper: the part that may touch something.
+            tip: (4, 4) pose relative to the gripper of what is moved to the goal: the part that may touch something.
         """
 
-    def touches_at(self, arm: str) -> float | None:
-        """Return when what the arm moves comes into contact by the motion begun last; None where it does not."""
+    def contact_time(self, arm: str) -> float | None:
+        """Return when the latest motion brings the arm, or what it moves, into contact; None without contact."""
 
-    def too_deep_at(self, arm: str) -> float | None:
-        """Return the tick from which the motion begun last presses deeper than the cell allows; None if it never does.
+    def excess_depth_time(self, arm: str) -> float | None:
+        """Return the time of the first tick at which the latest motion is deeper than the cell allows; None if none is.
 
-        What stood deeper already when the motion began is too deep where it goes deeper still.
+        Where the motion starts deeper already, the depth at its start is the bound.
         """
 
-    def pressed(self, arm: str, now: float) -> Press:
-        """Return how deep and how hard the arm has pressed at most since its last motion began, until now."""
+    def peak_contact(self, arm: str, now: float) -> PeakContact:
+        """Return the deepest contact of the arm since its latest motion began, until now."""
 
-    def force(self, arm: str, now: float) -> Array:
-        """Return the force (3,) on what the arm moves, or stands pressed with, along the axes of the world [N]."""
+    def contact_force(self, arm: str, now: float) -> Array:
+        """Return the contact force (3,) on the arm and what it moves, along the axes of the world [N]."""
 
-    def wrenches(self, arm: str, now: float) -> Array:
-        """Return what pushes on the tool of an arm, (k, 6), on this servo tick and those after it; the last one stays.
+    def tool_wrenches(self, arm: str, now: float) -> Array:
+        """Return the contact wrenches on the tool of an arm, (k, 6), at this servo tick and the following ones.
 
-        Force [N] and moment [N m] at the tool point, along the axes of the base, by the motion begun last.
+        Force [N] and moment [N m] at the tool point, along the axes of the base, for the latest motion; the last wrench
+        remains constant.
         """
 
-    def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:
-        """Close or open the fingers of an arm, wholly or to a width [m]; return the time it takes.
+    def move_fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:
+        """Close or open the fingers of an arm, completely or to a width [m]; return the time it takes.
 
         Raises:
             DeviceError: the gripper did not answer.
@@ -74,12 +75,12 @@ class Hardware(Protocol):
             DeviceError: there is no such device.
         """
 
-    def look(self, frame: str) -> tuple[Array, float]:
-        """Let the camera search for what ``frame`` stands for; return its pose in the world and the time it takes.
+    def locate(self, frame: str) -> tuple[Array, float]:
+        """Let the camera locate the object of a frame; return its pose in the world and the time it takes.
 
         Raises:
             DeviceError: nothing was found.
         """
 
-    def running(self) -> frozenset[str]:
+    def active_devices(self) -> frozenset[str]:
         """Return the devices that are on."""

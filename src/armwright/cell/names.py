@@ -1,8 +1,8 @@
-"""How the names of a cell are compared, in its file and in the programs for it."""
+"""Normal forms of names in cell files and programs."""
 
 
 def arm_name(number: str) -> str:
-    """Return the one name of an arm: leading zeros make no other arm.
+    """Return the normal form of the name of an arm, without leading zeros.
 
     Args:
         number: decimal digits as written, such as ``01`` of ``arm-01``.

@@ -1,4 +1,4 @@
-"""Cell files: TOML for people, JSON for programs; both say the same."""
+"""Cell files: TOML for people, JSON for programs, with the same content."""
 
 import math
 import re
@@ -25,29 +25,29 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.spatial.poses import from_noap, homogeneous, inverse as inverse_pose
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
-# Two bases nearer than this are in one another [m].
-_APART = 0.01
-# Joints that it takes to bring the gripper to any pose.
-_PLACE_AND_TURN = 6
-# The arm of a cell that names none: the report's.
-_REPORT_ARM = "stanford"
+# Smallest distance of the bases of two arms [m].
+_MIN_BASE_DISTANCE = 0.01
+# Joints that are needed for any pose of the gripper.
+_MIN_JOINTS = 6
+# The arm of a cell whose file names none: that of the report.
+_DEFAULT_ARM = "stanford"
 _ARM_NAME = re.compile(r"ARM[-_]([0-9]+)", re.IGNORECASE | re.ASCII)
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
-# Rotations typed with two digits deviate by up to 0.018; they are made exact. More is a mistake.
-_TYPED_ROTATION = 2e-2
-# A faster servo fills a disk, a slower one controls nothing [ms].
+# Orthonormality error of a rotation: two digits deviate by up to 0.018 and are made exact; more is a mistake.
+_MAX_ROTATION_ERROR = 2e-2
+# Servo periods [ms]: a shorter one fills the disk, a longer one controls nothing.
 SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
-# No more than a corner of any use; a hundredth of a millimetre is no corner any more, but a stop.
+# Corner deviations: below a hundredth of a millimetre the arm would stop.
 CORNER_MM = (1e-2, 1e3)
-# The kind of detour of a straight line, as it is written.
+# The kind of detour of a straight line, by its word in the file.
 DETOURS: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
-# What the camera finds after its last answer, as it is written.
+# What the camera finds after its last answer, by its word in the file.
 _AFTER_LAST = ("nothing", "same")
-# A hundred times that of the earth: more is a slip of units [m/s²].
-_STRONGEST_GRAVITY = 1000.0
-# Fingers and cameras that take longer are a slip of units [s].
-_MAX_WAIT = 600.0
+# A hundred times that of the earth: more is in another unit [m/s²].
+_MAX_GRAVITY = 1000.0
+# Fingers and cameras that take longer are in another unit [s].
+_MAX_DURATION = 600.0
 
 
 def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
@@ -55,36 +55,36 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
 
     Args:
         path: the file; its format is in docs/cells.md.
-        arms_needed: whether a file without arms is refused; what a program imports may have frames alone.
+        arms_needed: whether a file without arms is refused; an imported file may have frames only.
 
     Raises:
-        FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
+        FileFormatError: the file is missing or invalid; the message has file, line and key.
     """
     path = Path(path)
     top = Document.read(path).root
-    arms = _arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
+    arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
     height = contact.number("z", default=math.nan)
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
-        gravity=_gravity(top),
-        frames=_frames(top.table("frames"), arms),
-        visions=_visions(top.table("visions")),
-        camera=_pose(camera, "pose", default=np.eye(4)),
+        gravity=_read_gravity(top),
+        frames=_read_frames(top.table("frames"), arms),
+        visions=_read_visions(top.table("visions")),
+        camera=_read_pose(camera, "pose", default=np.eye(4)),
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
-        vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_WAIT),
-        devices=_devices(top.table("devices")) if "devices" in top else None,
+        vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
+        devices=_read_devices(top.table("devices")) if "devices" in top else None,
         contact=ContactPlane(
             height=None if math.isnan(height) else height,
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
-            deepest=contact.number("deepest_mm", default=5.0, lower=1e-3, upper=1e3) * 1e-3,
+            max_depth=contact.number("deepest_mm", default=5.0, lower=1e-3, upper=1e3) * 1e-3,
         ),
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
-        corner=_corner(motion),
-        around=_around(motion),
+        corner=_read_corner(motion),
+        around=_read_around(motion),
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):
@@ -92,33 +92,33 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     return cell
 
 
-def _gravity(top: Table) -> Array:
+def _read_gravity(top: Table) -> Array:
     """Read the gravity of the world, along its axes."""
     gravity = top.vector("gravity_m_per_s2", 3, default=UPRIGHT_GRAVITY)
-    if np.linalg.norm(gravity) > _STRONGEST_GRAVITY:
+    if np.linalg.norm(gravity) > _MAX_GRAVITY:
         raise top.error(
             "gravity_m_per_s2",
-            f"expected no more than {_STRONGEST_GRAVITY:g} m/s² in all; that of the earth is [0, 0, -9.80665]",
+            f"expected no more than {_MAX_GRAVITY:g} m/s² in all; that of the earth is [0, 0, -9.80665]",
         )
     return gravity
 
 
-def _corner(motion: Table) -> float | None:
-    """Read how far a path past several frames may be from its legs; without the key it goes by the deviation."""
+def _read_corner(motion: Table) -> float | None:
+    """Read how far a path past several frames may be from its legs; without the key it depends on the deviation."""
     if "corner_mm" not in motion:
         motion.allow("corner_mm")
         return None
     return motion.number("corner_mm", lower=CORNER_MM[0], upper=CORNER_MM[1]) * 1e-3
 
 
-def _around(motion: Table) -> Around | None:
+def _read_around(motion: Table) -> Around | None:
     """Read the kind of detour of a straight line; without the key there is no detour."""
     return DETOURS[motion.choice("around", DETOURS, default="none")]
 
 
-def _arms(table: Table, folder: Path) -> dict[str, CellArm]:
+def _read_arms(table: Table, folder: Path) -> dict[str, CellArm]:
     arms: dict[str, CellArm] = {}
-    _refuse_more(table, "arms")
+    _refuse_too_many(table, "arms")
     for key in table:
         match = _ARM_NAME.fullmatch(key)
         if match is None:
@@ -126,25 +126,28 @@ def _arms(table: Table, folder: Path) -> dict[str, CellArm]:
         name = arm_name(match[1])
         if name in arms:
             raise table.error(key, f"{name} occurs twice; case, - or _ and leading zeros do not distinguish arms")
-        arms[name] = _arm(table.table(key), folder)
+        arms[name] = _read_arm(table.table(key), folder)
         for other in arms:
-            apart = float(np.linalg.norm(arms[name].base[:3, 3] - arms[other].base[:3, 3]))
-            if other != name and apart < _APART:
-                text = f"{name} and {other} have bases {apart * 1e3:.3g} mm apart; two arms need {_APART * 1e3:g}"
-                raise table.table(key).error("base", f"{text} mm or more")
+            distance = float(np.linalg.norm(arms[name].base[:3, 3] - arms[other].base[:3, 3]))
+            if other != name and distance < _MIN_BASE_DISTANCE:
+                raise table.table(key).error(
+                    "base",
+                    f"{name} and {other} have bases {distance * 1e3:.3g} mm apart; two arms need "
+                    f"{_MIN_BASE_DISTANCE * 1e3:g} mm or more",
+                )
     if not arms:
         raise table.error(None, "expected at least one arm, such as [arms.ARM_1]")
     return arms
 
 
-def _arm(table: Table, folder: Path) -> CellArm:
-    name = table.text("model", default=_REPORT_ARM)
+def _read_arm(table: Table, folder: Path) -> CellArm:
+    name = table.text("model", default=_DEFAULT_ARM)
     try:
-        # The file of an arm is looked for from the folder of the cell, wherever the command was started.
+        # The path of an arm file is relative to the folder of the cell file.
         arm = load_arm(regular_file(folder / name) if is_path(name) else name)
     except ArmwrightError as error:
         raise table.error("model", str(error)) from error
-    if arm.n < _PLACE_AND_TURN:
+    if arm.n < _MIN_JOINTS:
         raise table.error(
             "model",
             f"'{arm.name}' has {arm.n} joints; moves specify position and orientation, which needs six or more",
@@ -154,20 +157,20 @@ def _arm(table: Table, folder: Path) -> CellArm:
     except ArmwrightError as error:
         raise table.error("model", f"{error}, but the motions of a program are computed with efforts") from error
     if "tool" in table:
-        arm = attrs.evolve(arm, tool=_pose(table, "tool"))
+        arm = attrs.evolve(arm, tool=_read_pose(table, "tool"))
     table.allow("tool")
-    base = _pose(table, "base", default=np.eye(4))
-    start = _start(table, arm, base)
-    waits = {
-        name: table.number(key, default=0.3, lower=0.0, upper=_MAX_WAIT)
+    base = _read_pose(table, "base", default=np.eye(4))
+    start = _read_start(table, arm, base)
+    durations = {
+        name: table.number(key, default=0.3, lower=0.0, upper=_MAX_DURATION)
         for name, key in (("open_time", "open_s"), ("grasp_time", "grasp_s"))
     }
     table.refuse_unknown_keys()
-    return CellArm(arm=arm, base=base, start=start, **waits)
+    return CellArm(arm=arm, base=base, start=start, **durations)
 
 
-def _start(table: Table, arm: Arm, base: Array) -> Array:
-    """Read where an arm stands at the start: joint by joint, or by the pose of its hand in the world."""
+def _read_start(table: Table, arm: Arm, base: Array) -> Array:
+    """Read the initial configuration of an arm: its joint positions, or the pose of its gripper in the world."""
     if "joint_positions" in table:
         if "hand" in table:
             raise table.error("hand", "the start is specified twice, as hand and as joint_positions")
@@ -181,29 +184,29 @@ def _start(table: Table, arm: Arm, base: Array) -> Array:
     table.allow("joint_positions")
     if "hand" not in table:
         raise table.error("hand", "missing; specify the initial pose of the gripper, or the joints as joint_positions")
-    solution = inverse(arm, inverse_pose(base) @ _pose(table, "hand"))
+    solution = inverse(arm, inverse_pose(base) @ _read_pose(table, "hand"))
     if not solution.allowed:
         raise table.error("hand", solution.explain())
     return solution.best.q
 
 
-def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
-    _refuse_more(table, "frames")
+def _read_frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
+    _refuse_too_many(table, "frames")
     frames: dict[str, Node] = {}
     keys: dict[str, str] = {}
     for key in table:
-        name = _name(table, key, frames)
+        name = _read_name(table, key, frames)
         keys[name] = key
         if table.is_table(key):
-            place = table.table(key)
+            entry = table.table(key)
             frames[name] = Node(
-                parent=_name(place, "on", (), place.text("on", default=WORLD)), relation=_pose(place, "at")
+                parent=_read_name(entry, "on", (), entry.text("on", default=WORLD)), relation=_read_pose(entry, "at")
             )
-            place.refuse_unknown_keys()
+            entry.refuse_unknown_keys()
         else:
-            frames[name] = Node(parent=WORLD, relation=_pose(table, key))
+            frames[name] = Node(parent=WORLD, relation=_read_pose(table, key))
     known = {WORLD, "STATION", *arms, *frames}
-    most = limit("hanging")
+    max_depth = limit("hanging")
     for name, node in frames.items():
         if node.parent not in known:
             near = closest(node.parent, known - {name})
@@ -211,54 +214,54 @@ def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
             raise table.table(keys[name]).error(
                 "on", f"{name} is attached to {node.parent}, which is not a frame of the cell{hint}"
             )
-        way = _way_up(name, frames, most)
-        if frames[way[-1]].parent == name:
-            by = f" by way of {', '.join(way[1:])}" if len(way) > 1 else ""
+        path = _path_to_root(name, frames, max_depth)
+        if frames[path[-1]].parent == name:
+            by = f" by way of {', '.join(path[1:])}" if len(path) > 1 else ""
             raise table.table(keys[name]).error("on", f"{name} is attached to itself{by}")
-        if len(way) > most:
+        if len(path) > max_depth:
             raise table.table(keys[name]).error(
                 "on", f"{name} is too deep in the frame tree: {limit_message('hanging')}"
             )
     return frames
 
 
-def _way_up(name: str, frames: Mapping[str, Node], most: int) -> list[str]:
-    """Return the frames of the file from ``name`` upwards, none twice, and one more than ``most`` at the most."""
-    way, above = {name: None}, frames[name].parent
-    while above in frames and above not in way and len(way) <= most:
-        way[above] = None
-        above = frames[above].parent
-    return list(way)
+def _path_to_root(name: str, frames: Mapping[str, Node], max_depth: int) -> list[str]:
+    """Return the frames of the file from ``name`` towards the root, each once, at most ``max_depth`` + 1."""
+    path, parent = {name: None}, frames[name].parent
+    while parent in frames and parent not in path and len(path) <= max_depth:
+        path[parent] = None
+        parent = frames[parent].parent
+    return list(path)
 
 
-def _refuse_more(table: Table, bound: str) -> None:
+def _refuse_too_many(table: Table, bound: str) -> None:
     """Refuse a table with more keys than a limit."""
     got = sum(1 for _ in table)
     if got > limit(bound):
         raise table.error(None, f"too many: {limit_message(bound, got)}")
 
 
-def _visions(table: Table) -> dict[str, tuple[Array, ...]]:
-    _refuse_more(table, "entries")
+def _read_visions(table: Table) -> dict[str, tuple[Array, ...]]:
+    _refuse_too_many(table, "entries")
     visions: dict[str, tuple[Array, ...]] = {}
     for key in table:
-        name = _name(table, key, visions)
-        answers = enumerate(table.vectors(key, 12))
-        visions[name] = tuple(_checked(table, key, numbers, index) for index, numbers in answers)
+        name = _read_name(table, key, visions)
+        poses = enumerate(table.vectors(key, 12))
+        visions[name] = tuple(_to_pose(table, key, numbers, index) for index, numbers in poses)
     return visions
 
 
-def _devices(table: Table) -> frozenset[str]:
-    _refuse_more(table, "entries")
+def _read_devices(table: Table) -> frozenset[str]:
+    _refuse_too_many(table, "entries")
     devices: set[str] = set()
     for key in table:
-        devices.add(_name(table, key, devices))
+        devices.add(_read_name(table, key, devices))
         table.table(key).refuse_unknown_keys()
     return frozenset(devices)
 
 
-def _name(table: Table, key: str, taken: Iterable[str], text: str | None = None) -> str:
-    """Return a name as the language compares it: in upper case, and one that a program can write."""
+def _read_name(table: Table, key: str, taken: Iterable[str], text: str | None = None) -> str:
+    """Return a name in the form in which the language compares it: in upper case, and valid in a program."""
     written = key if text is None else text
     name, match = written.upper(), _ARM_NAME.fullmatch(written)
     if text is not None and match:
@@ -272,19 +275,19 @@ def _name(table: Table, key: str, taken: Iterable[str], text: str | None = None)
     return name
 
 
-def _pose(table: Table, key: str, default: Array | None = None) -> Array:
+def _read_pose(table: Table, key: str, default: Array | None = None) -> Array:
     if default is not None and key not in table:
         table.allow(key)
         return default
-    return _checked(table, key, table.vector(key, 12))
+    return _to_pose(table, key, table.vector(key, 12))
 
 
-def _checked(table: Table, key: str, numbers: Array, index: int | None = None) -> Array:
+def _to_pose(table: Table, key: str, numbers: Array, index: int | None = None) -> Array:
     X = from_noap(numbers)
     error = float(orthonormality_error(X[:3, :3]))
-    if error > _TYPED_ROTATION:
+    if error > _MAX_ROTATION_ERROR:
         by_rows = np.linalg.norm(numbers.reshape(3, 4)[:, :3], axis=-1)
-        rows = np.allclose(by_rows, 1.0, atol=_TYPED_ROTATION)
+        rows = np.allclose(by_rows, 1.0, atol=_MAX_ROTATION_ERROR)
         hint = "; they look like rows: write the columns n, o, a, p" if rows else ""
         raise table.error(key, f"the first nine numbers are not a rotation (error {error:.2g}){hint}", index)
     return homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])

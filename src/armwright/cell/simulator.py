@@ -1,179 +1,189 @@
-"""The kinematic simulator: a cell in which everything goes as the cell file says."""
+"""The kinematic simulator: a cell that behaves as its file states."""
 
 from collections.abc import Sequence
+from itertools import compress
 
 import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.hardware import DeviceError, Press
+from armwright.cell.hardware import DeviceError, PeakContact
 from armwright.cell.model import Cell
-from armwright.errors import closest
+from armwright.errors import closest, counted
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 
-# A trajectory must begin where the arm is; this is rounding [rad] or [m].
+# Largest difference of a trajectory's start from the configuration of the arm, by rounding [rad] or [m].
 _SAME_CONFIGURATION = 1e-9
-# What is less deep in the plane than this only touches it, as after a motion that ended on it [m].
-_TOUCHES = 1e-9
-# Configurations that are worked out together.
-_AT_ONCE = 16384
+# A smaller depth in the plane is a touch, as after a motion that ended on it [m].
+_DEPTH_TOLERANCE = 1e-9
+# Configurations that are computed together.
+_BLOCK = 16384
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class _Tip:
-    """What may press on the plane while an arm follows a trajectory.
+class _ContactPoint:
+    """A point that may press on the plane while an arm follows a trajectory.
 
     Attributes:
-        pose: (4, 4) seen from the gripper.
-        above: (k,) its heights above the plane on the servo ticks [m].
-        since: the first tick from which it counts; before, it stands below the plane without having come down on it.
+        pose: (4, 4) pose relative to the gripper.
+        above: (k,) its heights above the plane at the servo ticks [m].
+        first_tick: tick from which its contact counts; before, it is below the plane without having come down on it.
     """
 
     pose: Array
     above: Array
-    since: int
+    first_tick: int
 
     def depths(self) -> Array:
-        """Return how deep it presses on every tick [m]."""
-        return np.where(np.arange(len(self.above)) < self.since, 0.0, np.maximum(-self.above, 0.0))
+        """Return its depth in the plane at every tick [m]."""
+        return np.where(np.arange(len(self.above)) < self.first_tick, 0.0, np.maximum(-self.above, 0.0))
 
-    def comes_down(self) -> int | None:
+    def tick_before_contact(self) -> int | None:
         """Return the last tick before it comes down on the plane; None where it does not."""
-        into = (self.above[1:] < -_TOUCHES) & (self.above[:-1] >= -_TOUCHES)
+        into = (self.above[1:] < -_DEPTH_TOLERANCE) & (self.above[:-1] >= -_DEPTH_TOLERANCE)
         return int(into.argmax()) if into.any() else None
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class _Run:
-    """What an arm does since some time: along a trajectory, with tips that may press on the plane."""
+class _Motion:
+    """The motion of an arm since a time ``t0``: its trajectory, and points that may press on the plane."""
 
     t0: float
     trajectory: Trajectory
-    tips: tuple[_Tip, ...] = ()
+    points: tuple[_ContactPoint, ...] = ()
 
-    def local(self, now: float) -> float:
-        """Return the time along the trajectory that the arm has come to."""
+    def trajectory_time(self, now: float) -> float:
+        """Return the time on the clock of the trajectory."""
         return min(max(0.0, now - self.t0), self.trajectory.duration)
 
     def depths(self) -> Array:
-        """Return how deep it presses on every servo tick [m]."""
-        return np.max([tip.depths() for tip in self.tips], axis=0) if self.tips else np.zeros(1)
+        """Return the depth of the deepest point at every servo tick [m]."""
+        return np.max([point.depths() for point in self.points], axis=0) if self.points else np.zeros(1)
 
 
 class Simulator:
-    """Arms that go where they are sent, fingers that close, tools that switch, a camera that answers in order.
+    """Simulated arms, fingers, devices, and a camera that gives the answers of the cell file in order.
 
-    Where the cell has a plane of contact, it yields to what an arm brings down on it, with a force that grows with
-    the depth, for as long as the arm stands or moves in it.
+    A contact plane of the cell yields to what an arm brings down on it, with a force proportional to the depth, as
+    long as the arm is in it.
     """
 
     def __init__(self, cell: Cell) -> None:
-        """Set up the cell as it stands at the start."""
+        """Set up the initial state of the cell."""
         self._cell = cell
-        self._runs = {name: _Run(t0=0.0, trajectory=hold(arm.start, 0.0)) for name, arm in cell.arms.items()}
-        self._on: set[str] = set()
+        self._motions = {name: _Motion(t0=0.0, trajectory=hold(arm.start, 0.0)) for name, arm in cell.arms.items()}
+        self._active: set[str] = set()
         self._answers = {name: list(answers) for name, answers in cell.visions.items()}
 
     def copy(self) -> "Simulator":
-        """Return a simulator in the same state; what one of them does from now on does not change the other."""
+        """Return a simulator in the same state; later commands to one do not change the other."""
         other = Simulator(self._cell)
-        other._runs, other._on = dict(self._runs), set(self._on)
+        other._motions, other._active = dict(self._motions), set(self._active)
         other._answers = {name: list(answers) for name, answers in self._answers.items()}
         return other
 
     def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) of an arm."""
-        run = self._runs[arm]
-        return run.trajectory(run.local(now))
+        motion = self._motions[arm]
+        return motion.trajectory(motion.trajectory_time(now))
 
-    def begin(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
+    def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
         """Let an arm follow a trajectory that begins at its configuration."""
         gap = np.abs(trajectory(0.0) - self.configuration(arm, now)).max()
-        assert gap <= _SAME_CONFIGURATION, f"{arm} stands {gap:.3g} away from where its trajectory begins"  # noqa: S101
-        pressing = [tip.pose for tip in self._runs[arm].tips if self._depth(arm, tip, now) > _TOUCHES]
-        self._runs[arm] = _Run(t0=now, trajectory=trajectory, tips=self._tips(arm, trajectory, tip, pressing))
+        assert gap <= _SAME_CONFIGURATION, f"{arm} is {gap:.3g} away from the start of its trajectory"  # noqa: S101
+        points = self._motions[arm].points
+        pressed = [point.pose for point in points if self._depth(arm, point, now) > _DEPTH_TOLERANCE]
+        points = self._contact_points(arm, trajectory, tip, pressed)
+        self._motions[arm] = _Motion(t0=now, trajectory=trajectory, points=points)
 
-    def touches_at(self, arm: str) -> float | None:
-        """Return when what an arm moves comes down on the plane by the motion begun last; None where it does not."""
-        run = self._runs[arm]
-        ticks = ((tip, tip.comes_down()) for tip in run.tips)
-        times = [self._touch(arm, run.trajectory, tip.pose, tick) for tip, tick in ticks if tick is not None]
-        return run.t0 + min(times) if times else None
+    def contact_time(self, arm: str) -> float | None:
+        """Return when the latest motion of an arm comes down on the plane; None where it does not."""
+        motion = self._motions[arm]
+        times = [
+            self._find_contact_time(arm, motion.trajectory, point.pose, tick)
+            for point in motion.points
+            if (tick := point.tick_before_contact()) is not None
+        ]
+        return motion.t0 + min(times) if times else None
 
-    def too_deep_at(self, arm: str) -> float | None:
-        """Return the tick from which the motion begun last presses deeper than the cell allows; None where it does not.
+    def excess_depth_time(self, arm: str) -> float | None:
+        """Return the time of the first tick at which the latest motion is deeper than the cell allows; None if none is.
 
-        What stood deeper already when the motion began is too deep where it goes deeper still.
+        Where the motion starts deeper already, the depth at its start is the bound.
         """
-        run = self._runs[arm]
-        depths = run.depths()
-        deep = depths > max(self._cell.contact.deepest, depths[0]) + _TOUCHES
-        return run.t0 + int(deep.argmax()) * self._cell.period if deep.any() else None
+        motion = self._motions[arm]
+        depths = motion.depths()
+        deep = depths > max(self._cell.contact.max_depth, depths[0]) + _DEPTH_TOLERANCE
+        return motion.t0 + int(deep.argmax()) * self._cell.period if deep.any() else None
 
-    def pressed(self, arm: str, now: float) -> Press:
-        """Return how deep and how hard an arm has pressed at most since its last motion began, until now."""
-        run = self._runs[arm]
-        passed = round(run.local(now) / self._cell.period) + 1
-        depth = float(run.depths()[:passed].max())
-        return Press(depth, depth * self._cell.contact.stiffness)
+    def peak_contact(self, arm: str, now: float) -> PeakContact:
+        """Return the deepest contact of an arm since its latest motion began, until now."""
+        motion = self._motions[arm]
+        passed = round(motion.trajectory_time(now) / self._cell.period) + 1
+        depth = float(motion.depths()[:passed].max())
+        return PeakContact(depth, depth * self._cell.contact.stiffness)
 
-    def force(self, arm: str, now: float) -> Array:
-        """Return the force of the plane on what an arm moves or stands pressed with [N]: upwards, by its depth."""
-        depth = max((self._depth(arm, tip, now) for tip in self._runs[arm].tips), default=0.0)
+    def contact_force(self, arm: str, now: float) -> Array:
+        """Return the force (3,) of the plane on an arm and what it moves [N]: upwards, proportional to the depth."""
+        depth = max((self._depth(arm, point, now) for point in self._motions[arm].points), default=0.0)
         return np.array([0.0, 0.0, depth * self._cell.contact.stiffness])
 
-    def wrenches(self, arm: str, now: float) -> Array:
-        """Return what the plane does to the tool of an arm, (k, 6), on this servo tick and those after it.
+    def tool_wrenches(self, arm: str, now: float) -> Array:
+        """Return the wrenches of the plane on the tool of an arm, (k, 6), at this servo tick and the following ones.
 
-        Force [N] and moment [N m] at the tool point, along the axes of the base; the last one stays. The plane pushes
-        on what is deepest in it.
+        Force [N] and moment [N m] at the tool point, along the axes of the base; the last wrench remains constant. The
+        plane pushes on the deepest point.
         """
-        run, place, period = self._runs[arm], self._cell.arms[arm], self._cell.period
-        if not run.depths().any():
+        motion, cell_arm, period = self._motions[arm], self._cell.arms[arm], self._cell.period
+        if not motion.depths().any():
             return np.zeros((1, 6))
-        depths = np.stack([tip.depths() for tip in run.tips])[:, round(run.local(now) / period) :]
-        found, deepest = np.zeros((depths.shape[1], 6)), depths.argmax(axis=0)
-        for ticks in _chunks(np.flatnonzero(depths.any(axis=0))):
-            t = np.minimum(run.local(now) + ticks * period, run.trajectory.duration)
-            levers = np.stack([tip.pose[:3, 3] for tip in run.tips])[deepest[ticks]]
-            arms = (forward(place.arm, run.trajectory(t))[:, :3, :3] @ levers[..., None])[..., 0]
-            up = place.base[2, :3] * (depths.max(axis=0)[ticks] * self._cell.contact.stiffness)[:, None]
-            found[ticks] = np.concatenate([up, np.cross(arms, up)], axis=1)
-        return found
+        start = motion.trajectory_time(now)
+        depths = np.stack([point.depths() for point in motion.points])[:, round(start / period) :]
+        wrenches, deepest = np.zeros((depths.shape[1], 6)), depths.argmax(axis=0)
+        for ticks in _split_blocks(np.flatnonzero(depths.any(axis=0))):
+            t = np.minimum(start + ticks * period, motion.trajectory.duration)
+            offsets = np.stack([point.pose[:3, 3] for point in motion.points])[deepest[ticks]]
+            levers = (forward(cell_arm.arm, motion.trajectory(t))[:, :3, :3] @ offsets[..., None])[..., 0]
+            up = cell_arm.base[2, :3] * (depths.max(axis=0)[ticks] * self._cell.contact.stiffness)[:, None]
+            wrenches[ticks] = np.concatenate([up, np.cross(levers, up)], axis=1)
+        return wrenches
 
-    def _depth(self, arm: str, tip: _Tip, now: float) -> float:
-        """Return how deep one tip presses on the plane [m]."""
-        local, period, plane = self._runs[arm].local(now), self._cell.period, self._cell.contact.height
-        if plane is None or local < tip.since * period - _TOUCHES:
+    def _depth(self, arm: str, point: _ContactPoint, now: float) -> float:
+        """Return the depth of a point in the plane [m]."""
+        motion, period, plane = self._motions[arm], self._cell.period, self._cell.contact.height
+        t = motion.trajectory_time(now)
+        if plane is None or t < point.first_tick * period - _DEPTH_TOLERANCE:
             return 0.0
-        tick = round(local / period)
-        if abs(local - tick * period) <= _TOUCHES and tick < len(tip.above):
-            # A guard asks on every tick, and there the height is known.
-            return max(0.0, -float(tip.above[tick]))
-        return max(0.0, plane - float(self._heights(arm, self._runs[arm].trajectory, tip.pose, np.array([local]))[0]))
+        tick = round(t / period)
+        if abs(t - tick * period) <= _DEPTH_TOLERANCE and tick < len(point.above):
+            # A guard is evaluated at every tick, where the height is known.
+            return max(0.0, -float(point.above[tick]))
+        return max(0.0, plane - float(self._heights(arm, motion.trajectory, point.pose, np.array([t]))[0]))
 
-    def _tips(self, arm: str, trajectory: Trajectory, tip: Array, pressing: Sequence[Array]) -> tuple[_Tip, ...]:
-        """Return what may press on the plane: what the arm shall bring to the goal, and what it is pressed with now."""
+    def _contact_points(
+        self, arm: str, trajectory: Trajectory, tip: Array, pressed: Sequence[Array]
+    ) -> tuple[_ContactPoint, ...]:
+        """Return the points that may press on the plane: the tip, and those that press on it now."""
         plane = self._cell.contact.height
         if plane is None:
             return ()
         ticks = np.arange(round(trajectory.duration / self._cell.period) + 1)
         t = np.minimum(ticks * self._cell.period, trajectory.duration)
-        others = [pose for pose in pressing if not np.allclose(pose, tip, rtol=0, atol=_TOUCHES)]
-        tips = []
-        for pose, pressed in ((tip, len(others) < len(pressing)), *((other, True) for other in others)):
+        others = [pose for pose in pressed if not np.allclose(pose, tip, rtol=0, atol=_DEPTH_TOLERANCE)]
+        points = []
+        for pose, is_pressed in ((tip, len(others) < len(pressed)), *((other, True) for other in others)):
             above = self._heights(arm, trajectory, pose, t) - plane
-            over = above >= -_TOUCHES
-            since = 0 if pressed else int(over.argmax()) if over.any() else len(over)
-            tips.append(_Tip(pose=pose, above=above, since=since))
-        return tuple(tips)
+            is_above = above >= -_DEPTH_TOLERANCE
+            first_tick = 0 if is_pressed else int(is_above.argmax()) if is_above.any() else len(is_above)
+            points.append(_ContactPoint(pose=pose, above=above, first_tick=first_tick))
+        return tuple(points)
 
-    def _touch(self, arm: str, trajectory: Trajectory, tip: Array, tick: int) -> float:
-        """Return when a tip that is below the plane on the next tick comes to it."""
+    def _find_contact_time(self, arm: str, trajectory: Trajectory, tip: Array, tick: int) -> float:
+        """Return when a tip that is below the plane at the next tick reaches it."""
         begin, end = tick * self._cell.period, min((tick + 1) * self._cell.period, trajectory.duration)
         plane = self._cell.contact.height
-        assert plane is not None  # noqa: S101 - nothing else is touched
+        assert plane is not None  # noqa: S101 - there is no contact without a plane
 
         def above(t: float) -> float:
             return float(self._heights(arm, trajectory, tip, np.array([t]))[0]) - plane
@@ -185,20 +195,20 @@ class Simulator:
         return float(brentq(above, begin, end, xtol=1e-14))
 
     def _heights(self, arm: str, trajectory: Trajectory, tip: Array, t: Array) -> Array:
-        place = self._cell.arms[arm]
-        heights = [(place.base @ forward(place.arm, trajectory(piece)) @ tip)[:, 2, 3] for piece in _chunks(t)]
-        return np.concatenate(heights)
+        arm_in_cell = self._cell.arms[arm]
+        blocks = (arm_in_cell.base @ forward(arm_in_cell.arm, trajectory(block)) @ tip for block in _split_blocks(t))
+        return np.concatenate([poses[:, 2, 3] for poses in blocks])
 
-    def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:  # noqa: ARG002 - see below
+    def move_fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:  # noqa: ARG002 - see below
         """Close or open the fingers of an arm; return the time it takes [s].
 
-        The fingers of this simulator have one speed whatever the width: the file gives one time. What they release does
-        not press any more.
+        The fingers of this simulator take the same time for every width, that of the file. What they release does not
+        press on the plane any more.
         """
         if not closed:
-            run = self._runs[arm]
-            own = tuple(tip for tip in run.tips if np.allclose(tip.pose, np.eye(4), rtol=0, atol=_TOUCHES))
-            self._runs[arm] = attrs.evolve(run, tips=own)
+            motion = self._motions[arm]
+            is_gripper = [np.allclose(point.pose, np.eye(4), rtol=0, atol=_DEPTH_TOLERANCE) for point in motion.points]
+            self._motions[arm] = attrs.evolve(motion, points=tuple(compress(motion.points, is_gripper)))
         return self._cell.arms[arm].grasp_time if closed else self._cell.arms[arm].open_time
 
     def operate(self, device: str, *, on: bool) -> float:
@@ -212,36 +222,36 @@ class Simulator:
             near = closest(device, devices)
             hint = f"; did you mean {near}?" if near else ""
             raise DeviceError(f"cell '{self._cell.name}' has no device {device}{hint}")
-        (self._on.add if on else self._on.discard)(device)
+        (self._active.add if on else self._active.discard)(device)
         return 0.0
 
-    def look(self, frame: str) -> tuple[Array, float]:
+    def locate(self, frame: str) -> tuple[Array, float]:
         """Return the next answer of the camera for a frame, in the world, and the time it takes.
 
-        The answers of the cell file come one after the other; where it says so, the last one stays.
+        The answers of the cell file come one after the other; where it states so, the last one is repeated.
 
         Raises:
             DeviceError: the cell file has no answer for this frame, or no more.
         """
         answers = self._answers.get(frame)
         if not answers:
-            if told := len(self._cell.visions.get(frame, ())):
-                count = "1 answer" if told == 1 else f"{told} answers"
+            if count := len(self._cell.visions.get(frame, ())):
                 raise DeviceError(
-                    f"the camera found nothing more for {frame}: cell '{self._cell.name}' has {count} for it; "
+                    f"the camera found nothing more for {frame}: cell '{self._cell.name}' has "
+                    f"{counted(count, 'answer')} for it; "
                     'with `after_last = "same"` under [camera] the last one stays'
                 )
             known = ", ".join(sorted(self._answers)) or "nothing"
             raise DeviceError(f"the camera found nothing for {frame}; in cell '{self._cell.name}' it finds {known}")
         last = self._cell.camera_repeats and len(answers) == 1
-        seen = answers[0] if last else answers.pop(0)
-        return self._cell.camera @ seen, self._cell.vision_time
+        answer = answers[0] if last else answers.pop(0)
+        return self._cell.camera @ answer, self._cell.vision_time
 
-    def running(self) -> frozenset[str]:
+    def active_devices(self) -> frozenset[str]:
         """Return the devices that are on."""
-        return frozenset(self._on)
+        return frozenset(self._active)
 
 
-def _chunks(values: np.ndarray) -> list[np.ndarray]:
-    """Cut values into pieces that are worked out together."""
-    return np.array_split(values, max(1, -(-len(values) // _AT_ONCE)))
+def _split_blocks(values: np.ndarray) -> list[np.ndarray]:
+    """Split values into blocks that are computed together."""
+    return np.array_split(values, max(1, -(-len(values) // _BLOCK)))

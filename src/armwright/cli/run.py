@@ -99,7 +99,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     options = {
         "servo_ms": used_cell.period * 1e3,
         "deviation_mm": used_cell.deviation * 1e3,
-        "corner_mm": used_cell.corner_room * 1e3,
+        "corner_mm": used_cell.corner_deviation * 1e3,
         "around": used_cell.around or "none",
         "std": std.value,
         "strict": strict,

@@ -477,10 +477,10 @@ def test_an_error_stops_at_its_place() -> None:
     assert stop.diagnostic is not None
     assert stop.diagnostic.code == "E402"
     assert line(debugger) == 5
-    assert debugger.machine.hardware.running() == {"LAMP"}
+    assert debugger.machine.hardware.active_devices() == {"LAMP"}
     assert inside(debugger.evaluate("f"))["p"].value == "(9, 0, 0.2)"
     assert run(debugger, "continue").reason == "failed"
-    assert debugger.machine.hardware.running() == frozenset()
+    assert debugger.machine.hardware.active_devices() == frozenset()
     assert lines(debugger, "back", 1) == [5]
 
 

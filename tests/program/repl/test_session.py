@@ -59,7 +59,7 @@ def everything(talk: Session) -> tuple[object, ...]:
     rest = (
         dict(machine.state.events),
         machine.now,
-        machine.hardware.running(),
+        machine.hardware.active_devices(),
         len(machine.state.effects),
         len(machine.state.trees),
     )

@@ -30,7 +30,7 @@ def view_at(machine: Machine, ticks: int) -> Machine:
         if name not in moving and (last is None or view.now > last.t0 + last.duration):
             # It rests, and the frame table knows where.
             continue
-        view.state.tree = view.state.tree.place(name, view.gripper_pose(name))
+        view.state.tree = view.state.tree.set_pose(name, view.gripper_pose(name))
     return view
 
 

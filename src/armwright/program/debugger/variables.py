@@ -212,7 +212,7 @@ def _arm_variable(machine: Machine, name: str) -> Variable:
 
     def inside() -> list[Variable]:
         holds = machine.state.hands[name].held_frame
-        force = ", ".join(f"{component:.6g}" for component in machine.hardware.force(name, machine.now).tolist())
+        force = ", ".join(f"{component:.6g}" for component in machine.hardware.contact_force(name, machine.now).tolist())
         hand = value_variable(machine, "hand", machine.gripper_pose(name), "FRAME")
         return [
             *joints,
@@ -240,7 +240,7 @@ def _motion_text(machine: Machine, arm: str) -> str:
 def _run_variables(machine: Machine, process: Process) -> Iterable[Variable]:
     yield Variable(name="clock", value=f"{machine.now:.6g} s")
     yield Variable(name="servo tick", value=str(machine.state.ticks))
-    devices = ", ".join(map(machine.spelling, sorted(machine.hardware.running())))
+    devices = ", ".join(map(machine.spelling, sorted(machine.hardware.active_devices())))
     yield Variable(name="devices on", value=devices or "none")
     yield Variable(name="arm used last", value=process.last_arm or "none")
     yield Variable(name="priority", value=f"{process.priority:g}")

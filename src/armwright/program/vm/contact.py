@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.hardware import Press
+from armwright.cell.hardware import PeakContact
 from armwright.cell.model import base_name
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.controlled_stop import brake
@@ -78,13 +78,13 @@ def _send_and_watch(machine: Machine, motion: Motion, trajectory: Trajectory) ->
 
 def send_trajectory(machine: Machine, motion: Motion, trajectory: Trajectory) -> ToolWrenches:
     """Let the arm of a motion follow a trajectory instead of what it does now; return what will push on its hand."""
-    machine.hardware.begin(motion.arm, trajectory, machine.now, motion.X_HM)
+    machine.hardware.start_motion(motion.arm, trajectory, machine.now, motion.X_HM)
     return _record_wrenches(machine, motion.arm)
 
 
 def _record_wrenches(machine: Machine, arm: str) -> ToolWrenches:
     """Check what pushes on the gripper of an arm from now on, and remember it."""
-    push = ToolWrenches(machine.now, machine.hardware.wrenches(arm, machine.now))
+    push = ToolWrenches(machine.now, machine.hardware.tool_wrenches(arm, machine.now))
     machine.state.tool_wrenches[arm].append(push)
     return push
 
@@ -119,7 +119,7 @@ def recompute_efforts(machine: Machine, arm: str, stage_index: int | None) -> No
 
 def update_depth_alarm(machine: Machine, motion: Motion) -> None:
     """See when an arm presses too deep by what it has begun to do, if it ever does."""
-    deep = machine.hardware.too_deep_at(motion.arm)
+    deep = machine.hardware.excess_depth_time(motion.arm)
     motion.alarm_tick = (
         None if deep is None else max(machine.state.ticks, math.ceil(deep / machine.cell.period - _ROUNDING))
     )
@@ -127,7 +127,7 @@ def update_depth_alarm(machine: Machine, motion: Motion) -> None:
 
 def record_contact(machine: Machine, motion: Motion, tick: int | None = None) -> None:
     """Remember how hard an arm has pressed by now, or by a later tick, before it begins something else."""
-    pressed = machine.hardware.pressed(motion.arm, machine.now if tick is None else tick * machine.cell.period)
+    pressed = machine.hardware.peak_contact(motion.arm, machine.now if tick is None else tick * machine.cell.period)
     if pressed.depth > motion.deepest_contact.depth:
         motion.deepest_contact = pressed
 
@@ -140,7 +140,7 @@ def contact_report(motion: Motion) -> tuple[str, dict[str, object]]:
     return f"; pressed {_depth_text(motion.deepest_contact)}", {"contact": {"depth": depth, "force": force}}
 
 
-def _depth_text(pressed: Press) -> str:
+def _depth_text(pressed: PeakContact) -> str:
     return f"{pressed.depth * 1e3:.3g} mm deep, {pressed.force:.3g} N"
 
 
@@ -155,7 +155,7 @@ def stop_too_deep(machine: Machine, process: Process, motion: Motion) -> NoRetur
     record_contact(machine, motion, end)
     # On its path to rest it may come deeper; that is said now.
     motion.alarm_tick = None
-    allowed = machine.cell.contact.deepest
+    allowed = machine.cell.contact.max_depth
     least = _minimum_depth(machine, motion)
     notes = [f"the arm brakes within its limits; at rest it is pressed {_depth_text(motion.deepest_contact)}"]
     helps = ["end the MOVE at a smaller force, or use a lower speed"]

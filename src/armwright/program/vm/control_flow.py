@@ -64,7 +64,7 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
                 machine.state.values[slot] = read(process, operand, step)
             else:
                 machine.replace_tree(
-                    machine.state.tree.place(slot, machine.read_pose(process, operand, step)), slot, step.span
+                    machine.state.tree.set_pose(slot, machine.read_pose(process, operand, step)), slot, step.span
                 )
         bindings[key] = slot
         machine.state.types[slot] = kind
@@ -229,7 +229,7 @@ def shut_down(machine: Machine, span: Span) -> list[str]:
         abandon_wait(machine, process)
     ends = [_stop_motion(machine, process, span) for process in machine.state.processes]
     machine.state.ticks = max([*ends, *(_rest_tick(machine, arm) for arm in machine.state.segments)])
-    switched_off = sorted(machine.hardware.running())
+    switched_off = sorted(machine.hardware.active_devices())
     for device in switched_off:
         machine.hardware.operate(device, on=False)
     machine.state.has_ended = True

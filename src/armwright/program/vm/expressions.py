@@ -59,7 +59,7 @@ def _force(machine: Machine, process: Process, step: Instruction) -> None:
     arm = process.motion.arm if process.motion else process.last_arm
     value = 0.0
     if arm is not None:
-        value = float(machine.hardware.force(arm, machine.now)[_AXES[str(step.operands[1])]])
+        value = float(machine.hardware.contact_force(arm, machine.now)[_AXES[str(step.operands[1])]])
     machine.write(process, step.operands[0], value, step)
 
 

@@ -26,7 +26,7 @@ def _affix(machine: Machine, process: Process, step: Instruction) -> None:
     machine.slot_value(parent, step, process)
     if step_X is None:
         machine.slot_value(child, step, process)
-    if machine.state.tree.would_ring(child, parent):
+    if machine.state.tree.would_close_cycle(child, parent):
         note = "frames form a tree with the root WORLD; each is attached to one parent"
         label = f"{spelled(child)} cannot be attached to {'itself' if child == parent else spelled(parent)}"
         chain = [frame for frame in (parent, *machine.state.tree.ancestors(parent)) if frame != child]

@@ -223,7 +223,7 @@ class Machine:
             RunError: it cannot be placed.
         """
         self.update_frame(process, name)
-        leader = self.state.tree.leader(name)
+        leader = self.state.tree.rigid_root(name)
         if is_arm(name) or name == WORLD:
             text = f"`{self.spelling(name)}` cannot be assigned a value"
             raise self.error(process, "E218", text, span, "an arm" if is_arm(name) else "the root of all frames")
@@ -231,11 +231,11 @@ class Machine:
             attached = f"`{self.spelling(name)}` is rigidly attached to {self.spelling(leader)}"
             text = f"{attached}, which an assignment cannot move"
             raise self.error(process, "E310", text, span, "cannot be assigned a pose")
-        self.replace_tree(self.state.tree.place(name, X), name, span)
+        self.replace_tree(self.state.tree.set_pose(name, X), name, span)
 
     def update_hand_pose(self, arm: str, span: Span, *, tick: int | None = None) -> None:
         """Let the frame table know where an arm is now, or will be at a later tick."""
-        self.replace_tree(self.state.tree.place(arm, self.gripper_pose(arm, tick)), arm, span)
+        self.replace_tree(self.state.tree.set_pose(arm, self.gripper_pose(arm, tick)), arm, span)
 
     def gripper_pose(self, arm: str, tick: int | None = None) -> Array:
         """Return the pose of the gripper of an arm in the world, now or at a later tick."""
@@ -262,7 +262,7 @@ class Machine:
         mover = None if arm is None else self.moving_process(arm)
         # A condition of a MOVE finds the arm of this MOVE where it is.
         if arm is not None and mover is not None and not (mover is process and process.activation.kind == "condition"):
-            self.state.tree = self.state.tree.place(arm, self.gripper_pose(arm))
+            self.state.tree = self.state.tree.set_pose(arm, self.gripper_pose(arm))
 
     def replace_tree(self, tree: FrameTree, name: str, span: Span) -> None:
         """Take another frame tree, in which ``name`` got its pose or its parent."""

@@ -193,7 +193,7 @@ def _plan_stages(
         TR-83-008, third paper: ARM-1' = Base^-1 f2 f1^-1, where f1 is the relation from the arm to it.
     """
     cell, cell_arm = machine.cell, machine.cell.arms[arm]
-    corner = cell.corner_room if machine.code.standard is Standard.RLO_2 else None
+    corner = cell.corner_deviation if machine.code.standard is Standard.RLO_2 else None
     plans = stages_of(request.form)
     X_BW = inverse(machine.state.tree.world(base_name(arm)))
     X_MH = inverse(machine.state.tree.relation(moved, arm))
@@ -296,7 +296,7 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     push = send_trajectory(machine, motion, trajectory)
     tau = trajectory_efforts(arm, trajectory, period, push, counted)
     update_depth_alarm(machine, motion)
-    touch = machine.hardware.touches_at(motion.arm)
+    touch = machine.hardware.contact_time(motion.arm)
     if not motion.guards and (touch is not None or motion.alarm_tick is not None):
         send_trajectory(machine, motion, hold(trajectory(0.0), period))
         motion.alarm_tick = None
@@ -333,7 +333,7 @@ def _condition_holds(machine: Machine, process: Process, motion: Motion, guard: 
     tree, now = machine.state.tree, process.activation
     if guard.reads_pose and len(motion.hand_poses):
         index = min(machine.state.ticks - motion.stage_start_tick, len(motion.hand_poses) - 1)
-        machine.state.tree = tree.place(motion.arm, motion.hand_poses[index])
+        machine.state.tree = tree.set_pose(motion.arm, motion.hand_poses[index])
     process.stack.append(now.create_nested("condition"))
     evaluate_instructions(machine, process, machine.code.instructions, guard.condition)
     process.stack.pop()

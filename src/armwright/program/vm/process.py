@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.hardware import Press
+from armwright.cell.hardware import PeakContact
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.program.language.source import Span
@@ -178,7 +178,7 @@ class Motion:
     rest_tick: int | None = None
     alarm_tick: int | None = None
     first_contact: tuple[Trajectory, float] | None = None
-    deepest_contact: Press = attrs.field(factory=lambda: Press(0.0, 0.0))
+    deepest_contact: PeakContact = attrs.field(factory=lambda: PeakContact(0.0, 0.0))
     early_end: "EarlyEnd | None" = None
 
     @property
