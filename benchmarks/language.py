@@ -15,7 +15,7 @@ from armwright.program import Compilation, Source, compile, known_cell  # noqa: 
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.words import Standard
 from armwright.program.syntax.lexer import scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
 from armwright.program.vm.interpreter import Limits, Machine, interpret, run
 
@@ -74,7 +74,7 @@ def reading() -> None:
     lark = Lark((CORPUS / "rlo.lark").read_text(encoding="utf-8"), parser="lalr")
 
     def parsed() -> None:
-        plain, _ = without_numbers(source)
+        plain, _ = blank_line_numbers(source)
         parse(source, scan(source, plain, Standard.RLO_2).tokens, Standard.RLO_2)
 
     def whole() -> Compilation:

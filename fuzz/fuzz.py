@@ -33,7 +33,7 @@ with atheris.instrument_imports(include=WATCHED):
     from armwright.program.formatter.format import formatted
     from armwright.program.language.words import VOCABULARIES, Standard
     from armwright.program.syntax.lexer import scan
-    from armwright.program.syntax.line_numbers import without_numbers
+    from armwright.program.syntax.line_numbers import blank_line_numbers
     from armwright.program.syntax.parser import parse
 
 
@@ -45,7 +45,7 @@ def _text(data: bytes) -> str:
 def tokens(data: bytes) -> None:
     """Every character is in a token, a comment, a blank or a diagnostic; tokens are in order."""
     source = Source("fuzz.rlo", _text(data))
-    text, _ = without_numbers(source)
+    text, _ = blank_line_numbers(source)
     for std in Standard:
         found = scan(source, text, std)
         at = 0
@@ -57,7 +57,7 @@ def tokens(data: bytes) -> None:
 def tree(data: bytes) -> None:
     """A text has a tree, and what is wrong with it lies inside it."""
     source = Source("fuzz.rlo", _text(data))
-    text, _ = without_numbers(source)
+    text, _ = blank_line_numbers(source)
     for std in Standard:
         _, diagnostics = parse(source, scan(source, text, std).tokens, std)
         for one in diagnostics:

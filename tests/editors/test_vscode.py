@@ -11,7 +11,7 @@ from hypothesis import assume, example, given, settings, strategies as st
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace
 
 from armwright.program.language.units import UNITS
-from armwright.program.language.words import CLOSING, OPENING, SENSORS
+from armwright.program.language.words import BLOCK_CLOSERS, BLOCK_OPENERS, SENSORS
 from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
@@ -167,8 +167,8 @@ def test_folding(path: Path) -> None:
     assert depth == 0
 
 
-@pytest.mark.parametrize("opening", sorted(OPENING))
-@pytest.mark.parametrize("closing", sorted(CLOSING))
+@pytest.mark.parametrize("opening", sorted(BLOCK_OPENERS))
+@pytest.mark.parametrize("closing", sorted(BLOCK_CLOSERS))
 def test_folding_words(opening: str, closing: str) -> None:
     """What opens a stretch of statements opens a fold and indents; what closes one does the opposite."""
     markers, indent = LANGUAGE["folding"]["markers"], LANGUAGE["indentationRules"]

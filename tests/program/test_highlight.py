@@ -15,7 +15,7 @@ from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, 
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax.lexer import TokenKind, scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 from program.shelf import ACCEPTED, CORPUS
 
 PROGRAMS = [*sorted(CORPUS.glob("*.rlo")), *ACCEPTED]
@@ -193,7 +193,7 @@ def test_as_the_translator_reads(path: Path) -> None:
 
     odd = [
         (token.text, token.kind, kinds.get(token.start))
-        for token in scan(source, without_numbers(source)[0]).tokens[:-1]
+        for token in scan(source, blank_line_numbers(source)[0]).tokens[:-1]
         if not any(kinds.get(token.start) in colour for colour in COLOURS[token.kind])
     ]
 
@@ -205,7 +205,7 @@ def test_as_the_translator_reads(path: Path) -> None:
 def test_cut_like_the_translator(text: str) -> None:
     """Of any text without damage the lexer and the translator see the same tokens."""
     source = Source("t.rlo", text)
-    scanned = scan(source, without_numbers(source)[0])
+    scanned = scan(source, blank_line_numbers(source)[0])
     assume(not scanned.diagnostics)
     pieces = list(RloLexer().get_tokens_unprocessed(text))
 

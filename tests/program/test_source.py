@@ -5,7 +5,7 @@ from hypothesis import given, strategies as st
 
 from armwright.program import Source, compile as translate
 from armwright.program.language.source import Span
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
@@ -63,7 +63,7 @@ def test_no_program(text: str) -> None:
 def test_numbers_are_blanked_out() -> None:
     """Line numbers leave blanks, so that every other character stays where it was."""
     source = Source("t.rlo", "100   BEGIN\n 200\tEND.\n300\n")
-    text, odd = without_numbers(source)
+    text, odd = blank_line_numbers(source)
 
     assert text == "      BEGIN\n    \tEND.\n   \n"
     assert odd == []
@@ -74,7 +74,7 @@ def test_digits_are_no_line_numbers_elsewhere() -> None:
     text = "VAR f : FRAME ;\nBEGIN f = (1,0,0,\n0 ,1,0, 0,0,\n1 , 0,0,0) ; READ VISIONS (f) ; END."
     compilation = translate(Source("t.rlo", text))
 
-    assert without_numbers(compilation.source)[0] == text
+    assert blank_line_numbers(compilation.source)[0] == text
     assert compilation.diagnostics == ()
 
 

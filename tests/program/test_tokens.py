@@ -7,10 +7,10 @@ from hypothesis import given, strategies as st
 
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard
-from armwright.program.syntax.lexer import Scanned, Token, TokenKind, scan
+from armwright.program.syntax.lexer import ScannedText, Token, TokenKind, scan
 
 
-def scanned(text: str, standard: Standard = Standard.RLO_2) -> Scanned:
+def scanned(text: str, standard: Standard = Standard.RLO_2) -> ScannedText:
     return scan(Source("t.rlo", text), text, standard)
 
 

@@ -14,7 +14,7 @@ from armwright.program.language.units import DECLARABLE
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
 from program.sentences import Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, REJECTED
@@ -104,7 +104,7 @@ def agree(text: str) -> bool:
 
 def words_of(text: str) -> list[str]:
     source = Source("t.rlo", text)
-    bare, _ = without_numbers(source)
+    bare, _ = blank_line_numbers(source)
     return [token.text for token in scan(source, bare, Standard.RLO_2).tokens[:-1] if not token.damaged]
 
 

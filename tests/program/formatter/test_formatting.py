@@ -16,8 +16,8 @@ from armwright.program.formatter.format import WIDTH, UnformattableError, format
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.syntax import tree
-from armwright.program.syntax.lexer import Scanned, scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.lexer import ScannedText, scan
+from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
 from program.sentences import Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, OLD, REJECTED
@@ -70,9 +70,9 @@ RIGHT = [path for path in (*CORPUS_PROGRAMS, *ACCEPTED, *REJECTED) if is_right(p
 NAMES = [f"{path.parent.name}/{path.stem}" for path in RIGHT]
 
 
-def scanned(text: str, std: Standard) -> tuple[str, Scanned]:
+def scanned(text: str, std: Standard) -> tuple[str, ScannedText]:
     source = Source("t.rlo", text)
-    bare, _ = without_numbers(source)
+    bare, _ = blank_line_numbers(source)
     return bare, scan(source, bare, std)
 
 
@@ -128,7 +128,7 @@ def test_nothing_is_lost(path: Path) -> None:
 def test_conformance_programs(name: str) -> None:
     """The conformance programs, laid out by hand, differ from what they should be in blanks and lines of a MOVE."""
     before = (CORPUS / f"{name}.rlo").read_text()
-    bare, _ = without_numbers(Source(name, before))
+    bare, _ = blank_line_numbers(Source(name, before))
     after = layout(before)
     indents = [
         [len(line) - len(line.lstrip()) for line in text.rstrip().split("\n") if re.search(r"^ *(END|BEGIN|FOR)", line)]

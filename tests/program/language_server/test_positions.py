@@ -5,7 +5,7 @@ from hypothesis import given, strategies as st
 
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
-from armwright.program.language.text_edits import Edit, apply_edits, smallest_edit
+from armwright.program.language.text_edits import TextEdit, apply_edits, smallest_edit
 
 TEXTS = st.text(st.sampled_from(["a", "b", " ", "\n", "\r", "é", "€", "🤖", "\u2028", "\f"]), max_size=30)
 ENCODINGS = st.sampled_from(["utf-8", "utf-16", "utf-32"])
@@ -16,7 +16,7 @@ def test_there_and_back(text: str, encoding: str) -> None:
     """The line and column of every character lead back to it, unless it stands inside of a line end."""
     ruler = PositionCodec(text, encoding)
     for offset in range(len(text) + 1):
-        line, column = ruler.place(offset)
+        line, column = ruler.line_and_column(offset)
         if text[offset - 1 : offset + 1] != "\r\n" or offset == 0:
             assert ruler.offset(line, column) == offset
 
@@ -28,8 +28,8 @@ def test_columns_are_what_the_encoding_takes(text: str, encoding: str) -> None:
     codec = encoding if encoding == "utf-8" else f"{encoding}-le"
     ruler = PositionCodec(text, encoding)
     for offset in range(len(text)):
-        line, column = ruler.place(offset)
-        assert column == len(text[ruler.starts[line] : offset].encode(codec)) // size
+        line, column = ruler.line_and_column(offset)
+        assert column == len(text[ruler.line_starts[line] : offset].encode(codec)) // size
 
 
 @pytest.mark.parametrize(
@@ -53,6 +53,11 @@ def test_smallest_edit(before: str, after: str) -> None:
 
 def test_edits() -> None:
     """Changes are all counted in the text as it was; of two that overlap the first is made."""
-    edits = (Edit(Span(4, 5), "!"), Edit(Span(0, 1), "XY"), Edit(Span(0, 2), "no"), Edit(Span(2, 2), "-"))
+    edits = (
+        TextEdit(Span(4, 5), "!"),
+        TextEdit(Span(0, 1), "XY"),
+        TextEdit(Span(0, 2), "no"),
+        TextEdit(Span(2, 2), "-"),
+    )
 
     assert apply_edits("abcde", edits) == "XYb-cd!"

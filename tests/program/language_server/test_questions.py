@@ -12,7 +12,7 @@ from armwright.program import KnownCell, Source, compile as translate
 from armwright.program.api import analyse_flow
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
-from armwright.program.language.text_edits import Edit, apply_edits
+from armwright.program.language.text_edits import TextEdit, apply_edits
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Analysis, Settings, analyse
 from armwright.program.language_server.cell_lookup import CellCache
@@ -327,7 +327,7 @@ def test_words_that_were_meant(line: str, title: str) -> None:
     assert fix.edit is not None
     assert fix.edit.changes is not None
     [edit] = fix.edit.changes["t.rlo"]
-    changed = apply_edits(text, (Edit(span_of(analysis.codec, edit.range), edit.new_text),))
+    changed = apply_edits(text, (TextEdit(span_of(analysis.codec, edit.range), edit.new_text),))
     mended = translate(Source("t.rlo", changed), cell)
     assert edit.new_text in mended.source.text
     assert {one.code for one in mended.diagnostics} <= {"E202"}
@@ -343,7 +343,7 @@ def ask_everything(analysis: Analysis, text: str, offset: int, new: str) -> None
         assert word.start <= offset == word.end
     for signature in getattr(signature_help(text, analysis, offset), "signatures", ()):
         assert all(one.label[0] < one.label[1] <= len(signature.label) for one in signature.parameters)
-    assert len(line_tokens(analysis)) == len(analysis.codec.starts)
+    assert len(line_tokens(analysis)) == len(analysis.codec.line_starts)
     place = min(offset, len(analysis.text))
     where = position(analysis.codec, place)
     found = hover(analysis, place, markdown=True)
@@ -354,7 +354,9 @@ def ask_everything(analysis: Analysis, text: str, offset: int, new: str) -> None
     for symbol in document_symbols(analysis):
         name = symbol.selection_range
         assert symbol.range.start <= name.start <= name.end <= symbol.range.end
-    assert all(0 <= fold.start_line < fold.end_line < len(analysis.codec.starts) for fold in folding_ranges(analysis))
+    assert all(
+        0 <= fold.start_line < fold.end_line < len(analysis.codec.line_starts) for fold in folding_ranges(analysis)
+    )
     quick_fixes(analysis, "test.rlo", lsp.Range(where, where), ())
     apply_edits(analysis.text, all_fixes(analysis.compiled.diagnostics))
     try:

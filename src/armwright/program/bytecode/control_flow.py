@@ -14,7 +14,7 @@ def block(context: Context, node: tree.Block) -> None:
 def if_(context: Context, node: tree.If) -> None:
     """Generate an IF with the ELSE IFs behind it."""
     out = context.out
-    chain, otherwise = node.chain
+    chain, otherwise = node.else_if_chain
     ends: list[int] = []
     for choice in chain:
         if choice is not node:

@@ -114,7 +114,7 @@ class Emitter:
 
     def _chain(self, node: tree.Binary, into: str | None) -> Operand:
         """Write the operations of a chain, one after the other."""
-        first, chain = tree.chain(node)
+        first, chain = tree.operation_chain(node)
         # Both sides of AND and OR go to the same place, so that of the last is that of all in front of it.
         targets: list[str | None] = []
         for link in reversed(chain):
@@ -145,7 +145,7 @@ class Emitter:
     def _matrix(self, node: tree.Matrix, to: str) -> str:
         if not all(isinstance(item, tree.Number) for item in node.items):
             return self._operation(Op.MATX, to, *map(self.value, node.items), node=node)
-        numbers, metres = pose_literals.constant(node), self.units.metres
+        numbers, metres = pose_literals.pose_numbers(node), self.units.metres
         shift = [self.number(item) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
         return self._operation(Op.LOADM, to, self.constant((*numbers[:9], *shift)), node=node)
 

@@ -29,7 +29,7 @@ from armwright.program.bytecode.verifier import (
     index_of,
 )
 from armwright.program.language.kinds import VariableKind
-from armwright.program.syntax.pose_literals import EXACT
+from armwright.program.syntax.pose_literals import EXACT_TOLERANCE
 from armwright.spatial.rotations import orthonormality_error
 
 # The operands of each operation, a letter for each: N a number, P a pose or transformation, T a truth value, v any
@@ -225,7 +225,7 @@ def _wrong_ends(code: Code) -> Iterator[CodeError]:
         numbers = np.array(value)
         if not (np.abs(numbers) <= LARGEST).all():
             yield CodeError(0, f"constant c{index}: expected numbers from {-LARGEST:g} to {LARGEST:g}")
-        elif numbers.size > 1 and not orthonormality_error(numbers[:9].reshape(3, 3).T) <= EXACT:
+        elif numbers.size > 1 and not orthonormality_error(numbers[:9].reshape(3, 3).T) <= EXACT_TOLERANCE:
             yield CodeError(0, f"constant c{index}: expected a pose, but its first nine numbers are not a rotation")
 
 

@@ -19,7 +19,7 @@ from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression
 from armwright.program.syntax.lexer import TokenKind, scan
-from armwright.program.syntax.token_stream import LostError, Tokens
+from armwright.program.syntax.token_stream import PanicModeError, TokenStream
 from armwright.program.vm.expressions import evaluate_instructions
 from armwright.program.vm.machine import Machine, RunError, constant_values
 from armwright.program.vm.process import Activation, Process, Value
@@ -67,14 +67,14 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
     scanned = scan(source, text)
     _raise_errors(scanned.diagnostics)
     named = [attrs.evolve(token, kind=TokenKind.NAME) if token.key in types else token for token in scanned.tokens]
-    tokens = Tokens(source, named, {})
+    tokens = TokenStream(source, named, {})
     try:
         node = expression(tokens)
-    except LostError:
+    except PanicModeError:
         node = None
     _raise_errors(tokens.diagnostics)
-    if node is None or not tokens.done:
-        raise ExpressionError(f"`{tokens.now.text}` does not belong here")
+    if node is None or not tokens.is_at_end:
+        raise ExpressionError(f"`{tokens.current.text}` does not belong here")
     if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
         return CheckedExpression(source=source, node=node, type=None)
     names = Names(None)

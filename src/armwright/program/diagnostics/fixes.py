@@ -10,7 +10,7 @@ import attrs
 from armwright.program.api import Compilation
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source
-from armwright.program.language.text_edits import Edit, apply_edits
+from armwright.program.language.text_edits import TextEdit, apply_edits
 
 # How often a program is looked at again: one cure may bring the next slip to light.
 MAX_ROUNDS = 10
@@ -111,7 +111,7 @@ def _touches(span: tuple[int, int], taken: Sequence[tuple[int, int]]) -> bool:
 
 def _apply(source: Source, diagnostics: Iterable[Diagnostic]) -> Source:
     """Return a program with the changes made that diagnostics offer."""
-    edits = tuple(Edit(fix.span, fix.replacement) for diagnostic in diagnostics for fix in diagnostic.fixes)
+    edits = tuple(TextEdit(fix.span, fix.replacement) for diagnostic in diagnostics for fix in diagnostic.fixes)
     return Source(source.name, apply_edits(source.text, edits))
 
 

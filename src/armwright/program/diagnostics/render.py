@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
-from armwright.program.language.diagnostic import Diagnostic, Label, Severity, count_line, in_order
+from armwright.program.language.diagnostic import Diagnostic, Label, Severity, sort_diagnostics, summary_line
 from armwright.program.language.source import Source
 
 if TYPE_CHECKING:
@@ -43,9 +43,9 @@ def render_rich(diagnostics: Iterable[Diagnostic], source: Source) -> "Text":
 
 
 def _page_rows(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Row]:
-    ordered = in_order(diagnostics)
+    ordered = sort_diagnostics(diagnostics)
     # Of too many the errors come first: a warning is never shown in place of what keeps a program from running.
-    shown = in_order(sorted(ordered, key=lambda one: not one.is_error)[:MAX_SHOWN])
+    shown = sort_diagnostics(sorted(ordered, key=lambda one: not one.is_error)[:MAX_SHOWN])
     for diagnostic in shown:
         yield from _diagnostic_rows(diagnostic, source)
         yield [("", "")]
@@ -53,7 +53,7 @@ def _page_rows(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Ro
         rest = f"{len(ordered) - MAX_SHOWN} more are not shown; one mistake may have caused many"
         yield [("note", "bold"), (f": {rest}. `armwright check --format json` prints all", "")]
         yield [("", "")]
-    yield [(count_line(ordered, source), "bold" if ordered else "")]
+    yield [(summary_line(ordered, source), "bold" if ordered else "")]
 
 
 def _diagnostic_rows(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:

@@ -8,7 +8,7 @@ from armwright.program.flow_analysis.side_effects import every, parts, written_n
 from armwright.program.flow_analysis.state import FlowState, Use, Uses
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label
 from armwright.program.language.kinds import VariableKind
-from armwright.program.language.names import array, is_any
+from armwright.program.language.names import array_name, is_any_element
 from armwright.program.language.source import Source
 from armwright.program.semantics.expression_types import written
 from armwright.program.semantics.symbols import Scope, Symbols, bodies
@@ -112,7 +112,9 @@ class _Events:
         if isinstance(node, tree.Cobegin):
             self.forks.append((scope, node))
         elif isinstance(node, tree.Call):
-            self.given.update(array(name) for argument in node.arguments if (name := written_name(argument, scope)))
+            self.given.update(
+                array_name(name) for argument in node.arguments if (name := written_name(argument, scope))
+            )
         elif isinstance(node, tree.Signal | tree.Wait) and (name := written_name(node.event, scope)) is not None:
             if isinstance(node, tree.Wait):
                 self.waits.setdefault(name, []).append((scope, node))
@@ -121,7 +123,7 @@ class _Events:
 
     def is_signalled(self, name: str) -> bool:
         """Whether something may signal an event, or another element of its array."""
-        return array(name) in self.given or any(array(other) == array(name) for other in self.signals)
+        return array_name(name) in self.given or any(array_name(other) == array_name(name) for other in self.signals)
 
     def sequences(self, scope: Scope, branches: Iterable[Sequence[tree.Statement]]) -> list[list[_Step]]:
         """Return what branches signal and wait for, one after the other; only events that nobody else deals with."""
@@ -140,11 +142,11 @@ class _Events:
         procedure = scope.procedure
         if procedure is not None:
             # Several runs of a procedure share what is not its own.
-            key = array(name).rpartition(".")[2]
+            key = array_name(name).rpartition(".")[2]
             if not scope.is_local(key) or key in procedure.parameters:
                 return False
-        unclear = is_any(name) or f"{array(name)}[]" in (*self.waits, *self.signals)
-        if unclear or array(name) in self.given or name not in self.signals:
+        unclear = is_any_element(name) or f"{array_name(name)}[]" in (*self.waits, *self.signals)
+        if unclear or array_name(name) in self.given or name not in self.signals:
             return False
         nodes = [*self.signals[name], *(node for _, node in self.waits.get(name, ()))]
         return all(id(node) in here for node in nodes)
@@ -185,7 +187,7 @@ def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
     reported: set[str] = set()
     for name, waits in events.waits.items():
         scope, node = waits[0]
-        key = array(name).rpartition(".")[2]
+        key = array_name(name).rpartition(".")[2]
         kind, procedure = scope.type(key), scope.procedure
         is_parameter = procedure is not None and scope.is_local(key) and key in procedure.parameters
         if (
@@ -193,10 +195,10 @@ def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
             or kind.kind is not VariableKind.EVENT
             or is_parameter
             or events.is_signalled(name)
-            or array(name) in reported
+            or array_name(name) in reported
         ):
             continue
-        reported.add(array(name))
+        reported.add(array_name(name))
         text = written(node.event)
         message = f"nothing signals `{text}`, so this WAIT never ends"
         advice = f"write `SIGNAL {text}` in another branch"

@@ -22,7 +22,7 @@ def value(node: tree.Expression, known: Known) -> float | None:
         return None if inner is None else -inner
     if not isinstance(node, tree.Binary):
         return known(node)
-    first, operations = tree.chain(node)
+    first, operations = tree.operation_chain(node)
     result = value(first, known)
     for operation in operations:
         calculate, right = _ARITHMETIC.get(operation.operation), value(operation.right, known)
@@ -45,7 +45,7 @@ def holds(node: tree.Expression, known: Known) -> bool | None:
     if node.operation in _RELATIONS:
         left_value, right = value(node.left, known), value(node.right, known)
         return None if left_value is None or right is None else _RELATIONS[node.operation](left_value, right)
-    first, operations = tree.chain(node)
+    first, operations = tree.operation_chain(node)
     result = holds(first, known)
     for operation in operations:
         if operation.operation not in ("AND", "OR"):

@@ -11,7 +11,7 @@ from armwright.program.flow_analysis.lattice import Outcome, Uncertainty
 from armwright.program.flow_analysis.side_effects import ANY_ARM, ANYTHING, SideEffects, union
 from armwright.program.flow_analysis.state import LAST, FlowState, Uses
 from armwright.program.language.kinds import VariableKind
-from armwright.program.language.names import is_any, is_arm
+from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 
@@ -40,7 +40,7 @@ def if_(context: Context, node: tree.If) -> None:
     if state.first:
         state.forget(context.writes(node))
         return
-    chain, otherwise = node.chain
+    chain, otherwise = node.else_if_chain
     ways: list[Outcome | None] = []
     with state.perhaps():
         for statement in chain:
@@ -197,7 +197,7 @@ def _given_at_once(context: Context, statements: Sequence[tree.Statement]) -> It
     """Give the variables that have a value before anything can fail."""
     for link in itertools.takewhile(lambda statement: isinstance(statement, tree.Assign | tree.Print), statements):
         name = context.state.variable(link.target) if isinstance(link, tree.Assign) else None
-        if name is not None and not is_any(name):
+        if name is not None and not is_any_element(name):
             yield name
 
 

@@ -8,7 +8,7 @@ import attrs
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, labels
 from armwright.program.language.kinds import VariableKind
-from armwright.program.language.names import array, is_any
+from armwright.program.language.names import array_name, is_any_element
 from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import Scope, Symbols, bodies
 from armwright.program.syntax import tree
@@ -97,7 +97,7 @@ class _Branch:
 def _alike(branch: tuple[str, _Location], other: tuple[str, _Location]) -> bool:
     """Whether two events may be the same."""
     names = {branch[0], other[0]}
-    any_element = any(is_any(name) for name in names) and len({array(name) for name in names}) == 1
+    any_element = any(is_any_element(name) for name in names) and len({array_name(name) for name in names}) == 1
     return _ANY in names or len(names) == 1 or any_element
 
 
@@ -208,14 +208,14 @@ def _writes(step: _Step, scope: Scope) -> Iterator[_Write]:
         targets = node.targets
     for target in targets:
         name = written_name(target, own)
-        if name is None or is_any(name) or not isinstance(target, tree.Name | tree.Index):
+        if name is None or is_any_element(name) or not isinstance(target, tree.Name | tree.Index):
             continue
         head = target.name if isinstance(target, tree.Index) else target
         kind = own.type(head.key)
         # In a procedure that is called only the variables of the program are those of everybody.
         if kind is None or kind.kind is VariableKind.EVENT or (own is not scope and own.is_local(head.key)):
             continue
-        is_locked = bool(step.locked & {name, array(name)})
+        is_locked = bool(step.locked & {name, array_name(name)})
         span = node.head if isinstance(node, tree.For) else node.span
         text = head.text + (f"[{name.partition('[')[2]}" if isinstance(target, tree.Index) else "")
         yield _Write(name, text, step.call or span, value, is_locked, step.place)

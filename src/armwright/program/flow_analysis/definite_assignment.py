@@ -4,7 +4,7 @@ from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.kinds import VariableKind
-from armwright.program.language.names import is_any, is_arm
+from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.semantics.expression_types import written
 from armwright.program.syntax import tree
 
@@ -47,7 +47,7 @@ def _kind(state: FlowState, node: tree.Expression) -> VariableKind | None:
 
 def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
     name = state.variable(node)
-    if name is None or is_any(name) or is_arm(name):
+    if name is None or is_any_element(name) or is_arm(name):
         return
     if state.table.valued[name]:
         parting = state.table.sure[name]

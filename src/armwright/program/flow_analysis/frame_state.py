@@ -24,7 +24,7 @@ from armwright.program.flow_analysis.facts import (
 from armwright.program.flow_analysis.lattice import Facts, FactTable, same
 from armwright.program.flow_analysis.poses import HERE, Pose, after, inverse
 from armwright.program.language.diagnostic import Label, labels
-from armwright.program.language.names import is_any, is_arm
+from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import STATION, WORLD, KnownCell
 
@@ -84,7 +84,7 @@ class FrameState:
 
     def would_ring(self, child: str, parent: str) -> bool:
         """Whether hanging ``child`` on ``parent`` certainly closes a ring."""
-        if is_any(child):
+        if is_any_element(child):
             return False
         # What nothing hangs on can be hung anywhere: no long path up for the common case.
         return child == parent or (self._children.get(child, 0) > 0 and child in self.above(parent))
@@ -97,8 +97,8 @@ class FrameState:
     def unknown(self, name: str) -> bool:
         """Whether one cannot know what a frame hangs on."""
         if not self._doubts and not self._facts.wipes:
-            return is_any(name)
-        while not is_any(name):
+            return is_any_element(name)
+        while not is_any_element(name):
             link = self.links[name]
             if link is None:
                 return False
@@ -131,7 +131,7 @@ class FrameState:
         for _ in range(_MAX_CHAIN_LENGTH):
             if name == WORLD or pose is None:
                 return pose
-            if is_any(name) or is_arm(name) or (step := self._steps[name]) is None:
+            if is_any_element(name) or is_arm(name) or (step := self._steps[name]) is None:
                 return None
             pose, link = after(step, pose), self.links[name]
             if link is None:
@@ -167,10 +167,10 @@ class FrameState:
         self, child: str, parent: str, span: Span | None, *, rigid: bool = False, step: Pose | None = None
     ) -> None:
         """Hang a frame on another, at a step from it where that is certain."""
-        if is_any(child):
+        if is_any_element(child):
             self.forget(child)
             return
-        self.links.put(child, ANY_LINK if is_any(parent) else Link(parent, span, rigid))
+        self.links.put(child, ANY_LINK if is_any_element(parent) else Link(parent, span, rigid))
         self._steps.put(child, step)
         self.has(child)
         if self._facts.shaky and not self._steady(child):
@@ -178,7 +178,7 @@ class FrameState:
 
     def cut(self, child: str) -> None:
         """Cut a frame loose."""
-        if is_any(child):
+        if is_any_element(child):
             self.forget(child)
         elif self.links[child] is not None:
             stands = self.where(child)
@@ -187,8 +187,8 @@ class FrameState:
 
     def stand(self, name: str, pose: Pose | None) -> None:
         """Take note of where a frame has been put, in WORLD; not where putting one may move others."""
-        link = None if is_any(name) else self.links[name]
-        if is_any(name) or pose is None or self._rigid or (link is not None and link.parent is None):
+        link = None if is_any_element(name) else self.links[name]
+        if is_any_element(name) or pose is None or self._rigid or (link is not None and link.parent is None):
             return
         above = HERE if link is None or link.parent is None else self.where(link.parent)
         self._steps.put(name, None if above is None else after(inverse(above), pose))
@@ -197,7 +197,7 @@ class FrameState:
         """Give a frame a value, and thereby another pose."""
         self._assignments += 1
         self._order += 1
-        if is_any(name):
+        if is_any_element(name):
             self.forget(name)
             return
         self.assigned.put(name, Assignment(self._order, span, moved=self.valued[name]))
@@ -264,7 +264,7 @@ class FrameState:
 
     def forget(self, name: str) -> None:
         """Give up what is known of a frame, and of hands that may have had to do with it."""
-        if is_any(name):
+        if is_any_element(name):
             self._facts.wipe(name)
         else:
             self.links.put(name, self.links.unknown)
@@ -290,7 +290,7 @@ class FrameState:
 
     def shift(self, name: str) -> None:
         """Take note that a frame may have been given another pose; what it hangs on stays known."""
-        if is_any(name):
+        if is_any_element(name):
             self._facts.wipe(name)
         else:
             self.has(name)
@@ -342,7 +342,7 @@ class FrameState:
         """Whether a frame is another or hangs on it; None when one cannot know."""
         if name == above or (self._children.get(above, 0) > 0 and above in self.above(name)):
             return True
-        return None if self.unknown(name) or is_any(above) else False
+        return None if self.unknown(name) or is_any_element(above) else False
 
     def _steady(self, name: str) -> bool:
         """Whether nobody else moves a frame."""

@@ -6,7 +6,7 @@ from armwright.program.flow_analysis.definite_assignment import need, need_indic
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label, labels
 from armwright.program.language.kinds import VariableKind
-from armwright.program.language.names import is_any, is_arm
+from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import written
@@ -32,7 +32,7 @@ def assign(state: FlowState, node: tree.Assign) -> None:
         plausibility.lengths(state, node.value)
         step = poses.certain(state, node.value)
         state.give(name, None, node.span)
-        if not is_any(name):
+        if not is_any_element(name):
             state.steps.put(name, step)
 
 
@@ -40,7 +40,7 @@ def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) ->
     """Give a frame another pose; say that nothing can, where it hangs rigidly on what no value moves."""
     if is_arm(frame) or frame == WORLD:
         return
-    leader = frame if is_any(frame) else state.table.leader(frame)
+    leader = frame if is_any_element(frame) else state.table.leader(frame)
     if leader is not None and leader != frame and (is_arm(leader) or leader == WORLD):
         name, here = written(node), state.table.affixed(frame, "rigidly attached here")
         text = f"`{name}` is rigidly attached to {state.name(leader)}, which an assignment cannot move"
@@ -74,7 +74,7 @@ def affix(state: FlowState, node: tree.Affix) -> None:
         return
     leaves(state, child, parent, node.span)
     step = state.table.step(child, parent) if node.at is None else poses.certain(state, node.at)
-    if is_any(child):
+    if is_any_element(child):
         state.table.forget(child)
         return
     if node.at is None:
@@ -87,7 +87,7 @@ def affix(state: FlowState, node: tree.Affix) -> None:
 
 def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
     """Warn when a frame leaves the one it hangs on without UNFIX."""
-    link = None if is_any(child) else state.table.links[child]
+    link = None if is_any_element(child) else state.table.links[child]
     if link is None or link.parent is None or link.parent == parent or _may_be(state, parent, link.parent):
         return
     name, old = state.name(child), state.name(link.parent)
@@ -104,7 +104,7 @@ def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
 
 def _may_be(state: FlowState, name: str, other: str) -> bool:
     """Whether two different names may be names of one frame: parameters of a call of which nothing is known."""
-    if is_any(name) or is_any(other):
+    if is_any_element(name) or is_any_element(other):
         return True
     alias = state.facts.may_be_another
     return (alias(name) and not is_arm(name)) or (alias(other) and not is_arm(other))
@@ -149,7 +149,7 @@ def unfix(state: FlowState, node: tree.Unfix) -> None:
     if child is None or is_arm(child) or child == WORLD:
         return
     parent = None if node.parent is None else state.frame(node.parent)
-    if parent is not None and not is_any(child):
+    if parent is not None and not is_any_element(child):
         link = table.links[child]
         above = WORLD if link is None else link.parent
         if above not in (None, parent) and not _may_be(state, parent, above or WORLD):

@@ -6,7 +6,7 @@ from typing import Any, Generic, TypeVar
 
 import attrs
 
-from armwright.program.language.names import array
+from armwright.program.language.names import array_name
 
 V = TypeVar("V")
 
@@ -16,7 +16,7 @@ EVERYTHING = "*"
 
 def base(name: str) -> str:
     """Return the array of an element, as a name for any of its elements: ``SLOT[]``; else the name itself."""
-    return f"{array(name)}[]" if "[" in name else name
+    return f"{array_name(name)}[]" if "[" in name else name
 
 
 @attrs.frozen(kw_only=True)
@@ -44,7 +44,7 @@ class Uncertainty:
         if name in self.names or base(name) in self.names:
             return True
         any_name = self.everything or (self.arms and name.startswith("ARM_"))
-        return any_name and array(name) not in self.excepted
+        return any_name and array_name(name) not in self.excepted
 
 
 @attrs.frozen
@@ -166,8 +166,8 @@ class FactTable(Generic[V]):
     def under(self, key: str, wipes: Mapping[str, int]) -> V:
         """Return what holds of a name if these names have been forgotten."""
         value, tick = self._entries.get(key, self._none)
-        array, bracket, _ = key.partition("[")
-        wiped = wipes.get(f"{array}[]" if bracket else key, 0)
+        array_name, bracket, _ = key.partition("[")
+        wiped = wipes.get(f"{array_name}[]" if bracket else key, 0)
         if tick < wiped or tick < wipes.get(EVERYTHING, 0) or tick < wipes.get(self._group, 0):
             return self.unknown
         return value

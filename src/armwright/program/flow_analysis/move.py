@@ -7,7 +7,7 @@ from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import leaves
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label, Severity, labels
-from armwright.program.language.names import is_any, is_arm
+from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import written
@@ -87,7 +87,7 @@ def _end(state: FlowState, node: tree.Move, arm: str | None, *, halted: bool) ->
     frame: str | None = moved
     if moved == arm:
         goal = state.frame(node.goal)
-        frame = UNKNOWN if halted or (goal is not None and is_any(goal)) else goal
+        frame = UNKNOWN if halted or (goal is not None and is_any_element(goal)) else goal
         if goal is None and not isinstance(node.goal, tree.Binary | tree.Matrix | tree.Function):
             # Something was reported of the goal, or it is given to a procedure that is not followed.
             frame = UNKNOWN

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import labels
-from armwright.program.language.names import is_any, is_arm
+from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.units import LENGTHS, convert
 from armwright.program.syntax import tree
 
@@ -21,7 +21,7 @@ _AWAY = 0.2
 def placed(state: FlowState, frame: str, value: tree.Expression) -> None:
     """Warn of a frame that is given a pose that cannot be meant, so near to WORLD."""
     reach = state.cell.reach if state.cell else None
-    pose = None if is_any(frame) else state.table.where(frame)
+    pose = None if is_any_element(frame) else state.table.where(frame)
     units = state.symbols.units
     if reach is None or pose is None or units.length == "M":
         return
@@ -90,10 +90,10 @@ def _length(metres: float) -> str:
 def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
     """Warn of a frame that is hung on a gripper which has closed at quite another pose."""
     table = state.table
-    if not is_arm(arm) or is_any(child) or table.grips[arm] is None:
+    if not is_arm(arm) or is_any_element(child) or table.grips[arm] is None:
         return
     frame = table.hands[arm].at
-    if frame is None or frame in (UNKNOWN, child) or is_any(frame) or is_arm(frame):
+    if frame is None or frame in (UNKNOWN, child) or is_any_element(frame) or is_arm(frame):
         return
     stands, pose = table.where(frame), table.where(child)
     if stands is None or pose is None or (away := math.dist(stands[9:], pose[9:])) <= _AWAY:

@@ -53,7 +53,7 @@ def certain(state: "FlowState", node: tree.Expression) -> Pose | None:
 
 
 def _product(state: "FlowState", node: tree.Binary) -> Pose | None:
-    first, operations = tree.chain(node)
+    first, operations = tree.operation_chain(node)
     pose = certain(state, first)
     for operation in operations:
         step = certain(state, operation.right) if operation.operation == "*" else None

@@ -14,7 +14,7 @@ from armwright.program.flow_analysis.poses import Pose
 from armwright.program.flow_analysis.side_effects import ANY_ARM, SideEffects, Writing
 from armwright.program.language.diagnostic import Details, DiagnosticList, Label, labels
 from armwright.program.language.kinds import VariableKind
-from armwright.program.language.names import array, is_any, is_arm
+from armwright.program.language.names import array_name, is_any_element, is_arm
 from armwright.program.language.source import Source, Span
 from armwright.program.semantics.cell_symbols import KnownCell
 from armwright.program.semantics.symbols import Scope, Symbols
@@ -187,11 +187,11 @@ class FlowState:
             result = constants.value(node, self._known)
             return None if result is None else (result, node.span)
         name = self.variable(node, VariableKind.SCALAR)
-        return None if name is None or is_any(name) else self.numbers[name]
+        return None if name is None or is_any_element(name) else self.numbers[name]
 
     def give(self, name: str, value: tuple[float, Span] | None, span: Span) -> None:
         """Give a number or step a value; ``value`` is that of a number that is certain."""
-        if is_any(name):
+        if is_any_element(name):
             self.facts.wipe(name)
             return
         self.table.has(name)
@@ -280,7 +280,7 @@ class FlowState:
         What had no value before may have one then, or none: there the paths part.
         """
         names = writes.values | writes.placed | writes.hung
-        lacking = [name for name in self.kept(names) if not is_any(name) and not self.table.valued[name]]
+        lacking = [name for name in self.kept(names) if not is_any_element(name) and not self.table.valued[name]]
         self.forget(writes)
         for name in lacking:
             self.table.sure.put(name, parting or False)
@@ -326,7 +326,7 @@ class FlowState:
                 yield f"{slot}{bracket}{indices}" if point else slot
 
     def _lose_value(self, name: str) -> None:
-        if is_any(name):
+        if is_any_element(name):
             self.facts.wipe(name)
         else:
             self.table.has(name)
@@ -339,7 +339,7 @@ class FlowState:
 
     def settle(self, slot: str) -> bool:
         """Whether this is the first thing said of a variable or an arm; no second shall follow."""
-        key = array(slot).partition("'")[0]
+        key = array_name(slot).partition("'")[0]
         news = key not in self._settled
         self._settled.add(key)
         return news

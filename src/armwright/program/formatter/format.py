@@ -1,16 +1,16 @@
 """Laying a program out: every program that says the same in the same words looks the same."""
 
 from armwright.errors import ExitStatus, InvalidValueError
-from armwright.program.api import no_collection
+from armwright.program.api import pause_garbage_collection
 from armwright.program.formatter.layout import rows_of
 from armwright.program.formatter.line_breaks import lines_of
 from armwright.program.formatter.pieces import pieces_of
 from armwright.program.formatter.whitespace import set_blanks
-from armwright.program.language.diagnostic import Diagnostic, in_order
+from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.syntax.lexer import scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
 
 # How long a line may be, in characters.
@@ -56,16 +56,16 @@ def formatted(source: Source, *, std: Standard = Standard.RLO_2, numbers: int | 
     for what, value in (("numbers", numbers), ("width", width)):
         if value is not None and value < 1:
             raise InvalidValueError(f"{what}: expected 1 or more, got {value}")
-    with no_collection():
+    with pause_garbage_collection():
         lines = _lines(Source(source.name, source.text.replace("\r\n", "\n").replace("\r", "\n")), std, width)
     return "\n".join((*(_numbered(lines, numbers) if numbers else lines), ""))
 
 
 def _lines(source: Source, std: Standard, width: int) -> list[str]:
-    text, _ = without_numbers(source)
+    text, _ = blank_line_numbers(source)
     scanned = scan(source, text, std)
     program, slips = parse(source, scanned.tokens, std)
-    wrong = in_order(diagnostic for diagnostic in (*scanned.diagnostics, *slips) if diagnostic.is_error)
+    wrong = sort_diagnostics(diagnostic for diagnostic in (*scanned.diagnostics, *slips) if diagnostic.is_error)
     if wrong:
         raise UnformattableError(source, wrong[0])
     pieces = pieces_of(text, scanned, program)

@@ -181,7 +181,7 @@ class _Layout:
         self._row(node.end.start, column, inner=LEVEL)
 
     def _if(self, node: tree.If, column: int) -> None:
-        links, last = node.chain
+        links, last = node.else_if_chain
         further = column + LEVEL
         for link in links:
             if link is not node:

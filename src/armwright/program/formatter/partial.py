@@ -7,7 +7,7 @@ from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import TokenKind, scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
 
 # Comments around what is laid out by itself; no program has them.
@@ -41,7 +41,7 @@ def formatted_around(source: Source, *, std: Standard = Standard.RLO_2, width: i
 
 def _around(source: Source, std: Standard, width: int) -> str | None:
     """Return the text with the right stretches of it laid out; None where there are no such stretches."""
-    text, _ = without_numbers(source)
+    text, _ = blank_line_numbers(source)
     if text != source.text:
         # Numbers of lines would no longer be in order.
         return None

@@ -10,7 +10,7 @@ from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS
 from armwright.program.semantics.builtins import AXES, FUNCTIONS
 from armwright.program.syntax import tree
-from armwright.program.syntax.lexer import Scanned, Token, TokenKind
+from armwright.program.syntax.lexer import ScannedText, Token, TokenKind
 
 _NAME, _KEYWORD, _ARM, _SYMBOL = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.SYMBOL
 # Behind these an empty statement needs no `;`.
@@ -78,7 +78,7 @@ class Piece:
         return self.comment is not None and self.comment.is_hard
 
 
-def pieces_of(text: str, scanned: Scanned, program: tree.Program) -> list[Piece]:
+def pieces_of(text: str, scanned: ScannedText, program: tree.Program) -> list[Piece]:
     """Return the pieces of a program without errors of syntax; the last is empty and stands for its end.
 
     Args:

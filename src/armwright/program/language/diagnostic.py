@@ -47,7 +47,7 @@ class Fix:
     replacement: str
 
 
-def _all_shortened(texts: Iterable[str]) -> tuple[str, ...]:
+def _shorten_all(texts: Iterable[str]) -> tuple[str, ...]:
     """Return texts of which none is longer than anybody reads."""
     return tuple(shortened(text) for text in texts)
 
@@ -79,8 +79,8 @@ class Diagnostic:
     span: Span
     label: str = attrs.field(default="", converter=shortened)
     secondary: tuple[Label, ...] = ()
-    notes: tuple[str, ...] = attrs.field(default=(), converter=_all_shortened)
-    helps: tuple[str, ...] = attrs.field(default=(), converter=_all_shortened)
+    notes: tuple[str, ...] = attrs.field(default=(), converter=_shorten_all)
+    helps: tuple[str, ...] = attrs.field(default=(), converter=_shorten_all)
     fixes: tuple[Fix, ...] = ()
 
     @severity.default
@@ -166,12 +166,12 @@ class DiagnosticList(list[Diagnostic]):
         )
 
 
-def in_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Return them sorted by their place in the text."""
     return tuple(sorted(diagnostics, key=lambda diagnostic: (diagnostic.span.start, diagnostic.span.end)))
 
 
-def count_line(diagnostics: Sequence[Diagnostic], source: Source) -> str:
+def summary_line(diagnostics: Sequence[Diagnostic], source: Source) -> str:
     """Return the last line of a report, such as ``m6.rlo: 3 errors, 1 warning``."""
     errors = sum(diagnostic.is_error for diagnostic in diagnostics)
     return f"{source.name}: {counts_text(errors, len(diagnostics) - errors)}"
@@ -189,14 +189,14 @@ def to_json(diagnostic: Diagnostic, source: Source) -> dict[str, Any]:
         "code": diagnostic.code,
         "severity": diagnostic.severity.value,
         "message": diagnostic.message,
-        **_place(diagnostic.span, source),
+        **_position_data(diagnostic.span, source),
         "label": diagnostic.label,
-        "secondary": [{**_place(label.span, source), "label": label.text} for label in diagnostic.secondary],
+        "secondary": [{**_position_data(label.span, source), "label": label.text} for label in diagnostic.secondary],
         "notes": list(diagnostic.notes),
         "helps": list(diagnostic.helps),
-        "fixes": [{**_place(fix.span, source), "replacement": fix.replacement} for fix in diagnostic.fixes],
+        "fixes": [{**_position_data(fix.span, source), "replacement": fix.replacement} for fix in diagnostic.fixes],
     }
 
 
-def _place(span: Span, source: Source) -> dict[str, int]:
+def _position_data(span: Span, source: Source) -> dict[str, int]:
     return {"line": source.line(span.start), "column": source.column(span.start), "start": span.start, "end": span.end}

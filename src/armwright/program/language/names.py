@@ -6,11 +6,11 @@ def is_arm(name: str) -> bool:
     return name.startswith("ARM_") and name[4:].isdecimal()
 
 
-def is_any(name: str) -> bool:
+def is_any_element(name: str) -> bool:
     """Whether a name stands for some element of an array, nobody knows which."""
     return name.endswith("[]")
 
 
-def array(name: str) -> str:
+def array_name(name: str) -> str:
     """Return the array of an element; the name itself where it is no element."""
     return name.partition("[")[0]

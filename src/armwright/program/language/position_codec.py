@@ -24,55 +24,55 @@ class PositionCodec:
     encoding: str = UTF_16
 
     @cached_property
-    def starts(self) -> list[int]:
+    def line_starts(self) -> list[int]:
         """Where each line starts."""
         return [0, *(match.end() for match in _LINE_END.finditer(self.text))]
 
     @cached_property
-    def _plain(self) -> bool:
+    def _has_single_columns(self) -> bool:
         """Whether every character takes one column."""
         return self.encoding == UTF_32 or self.text.isascii()
 
     def line_of(self, offset: int) -> int:
         """Return the line of an offset."""
-        return bisect_right(self.starts, offset) - 1
+        return bisect_right(self.line_starts, offset) - 1
 
     def line_end(self, line: int) -> int:
         """Return the offset behind the last character of a line, in front of what ends it."""
-        if line + 1 >= len(self.starts):
+        if line + 1 >= len(self.line_starts):
             return len(self.text)
-        start, end = self.starts[line], self.starts[line + 1] - 1
+        start, end = self.line_starts[line], self.line_starts[line + 1] - 1
         return end - 1 if end > start and self.text[end] == "\n" and self.text[end - 1] == "\r" else end
 
-    def place(self, offset: int) -> tuple[int, int]:
+    def line_and_column(self, offset: int) -> tuple[int, int]:
         """Return line and column of an offset."""
         offset = min(max(0, offset), len(self.text))
         line = self.line_of(offset)
-        return line, self.width(self.starts[line], offset)
+        return line, self.width(self.line_starts[line], offset)
 
     def width(self, start: int, end: int) -> int:
         """Return how many columns a stretch of one line takes."""
-        if self._plain:
+        if self._has_single_columns:
             return end - start
         stretch = self.text[start:end]
-        return end - start if stretch.isascii() else columns(stretch, self.encoding)
+        return end - start if stretch.isascii() else column_count(stretch, self.encoding)
 
     def offset(self, line: int, column: int) -> int:
         """Return the offset of a place; what lies behind the end of a line is its end."""
-        if line >= len(self.starts):
+        if line >= len(self.line_starts):
             return len(self.text)
-        start, end = self.starts[max(0, line)], self.line_end(max(0, line))
-        if self._plain:
+        start, end = self.line_starts[max(0, line)], self.line_end(max(0, line))
+        if self._has_single_columns:
             return min(start + max(0, column), end)
         at = start
         while at < end and column > 0:
-            column -= columns(self.text[at], self.encoding)
+            column -= column_count(self.text[at], self.encoding)
             # A place inside a character is in front of it.
             at += column >= 0
         return at
 
 
-def columns(text: str, encoding: str) -> int:
+def column_count(text: str, encoding: str) -> int:
     """Return how many columns a text takes."""
     if encoding == UTF_16:
         return len(text) + sum(character > "\uffff" for character in text)

@@ -20,7 +20,7 @@ WITH_CLAUSES = ("APPROACH", "DEPARTURE", "SPEED")
 SENSORS = ("VISIONS", "SYSTEM")
 
 # What starts a statement in RLO-2, and what RLO-83 lacks. All of these may be names in RLO-83.
-LATER_STATEMENTS = {
+RLO_2_STATEMENTS = {
     "FOR": "RLO-83 has no loops",
     "WHILE": "RLO-83 has no loops",
     "REPEAT": "RLO-83 has no loops",
@@ -35,16 +35,16 @@ LATER_STATEMENTS = {
     "HALT": "RLO-83 ends a program at END.",
     "PRINT": "RLO-83 has no output",
 }
-LATER_HEADERS = {
+RLO_2_HEADERS = {
     "IMPORT": "RLO-83 takes its frames from the cell file alone",
     "UNITS": "RLO-83 has lengths in metres only",
     "PROCEDURE": "RLO-83 has no procedures",
 }
-LATER_TYPES = {"ARRAY": "RLO-83 has no arrays", "EVENT": "RLO-83 has no events"}
-LATER_WITH = ("BLEND", "DURATION")
+RLO_2_TYPES = {"ARRAY": "RLO-83 has no arrays", "EVENT": "RLO-83 has no events"}
+RLO_2_WITH_CLAUSES = ("BLEND", "DURATION")
 
 # What other languages call a statement, and what they have and RLO has not.
-ELSEWHERE = {
+FOREIGN_STATEMENTS = {
     **dict.fromkeys(("STOP", "EXIT", "QUIT", "ABORT"), "HALT"),
     **dict.fromkeys(("DELAY", "SLEEP"), "PAUSE"),
     **dict.fromkeys(("WRITE", "WRITELN", "SAY"), "PRINT"),
@@ -52,7 +52,7 @@ ELSEWHERE = {
     "ATTACH": "AFFIX",
     "DETACH": "UNFIX",
 }
-ABSENT = {
+UNSUPPORTED_STATEMENTS = {
     **dict.fromkeys(("GOTO", "GO", "JUMP"), "RLO has no jumps; write WHILE, REPEAT or FOR"),
     **dict.fromkeys(("BREAK", "CONTINUE"), "a loop ends by its own condition only; write WHILE or REPEAT"),
     **dict.fromkeys(("CASE", "SWITCH"), "write `IF ... THEN ... ELSE IF ... THEN ...`"),
@@ -71,11 +71,11 @@ PRECEDENCE = {"OR": 1, "AND": 2, **dict.fromkeys(COMPARISONS, 4), "+": 5, "-": 5
 PRECEDENCE_OF_NOT = 3
 
 # What opens and closes a stretch of statements in RLO-2.
-OPENING = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
-CLOSING = frozenset(("END", "COEND", "UNTIL"))
+BLOCK_OPENERS = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
+BLOCK_CLOSERS = frozenset(("END", "COEND", "UNTIL"))
 
-_FRAMEWORK = ("VAR", "BEGIN", "END", "TO", "FROM", "AT", "WITH")
-_LATER_FRAMEWORK = (
+_RLO_83_KEYWORDS = ("VAR", "BEGIN", "END", "TO", "FROM", "AT", "WITH")
+_RLO_2_KEYWORDS = (
     *("OF", "THEN", "ELSE", "DO", "UNTIL", "STEP", "COEND", "PRIORITY", "RECOVER"),
     *("ON", "OFF", "AND", "OR", "NOT", "RIGIDLY", "NONRIGIDLY"),
 )
@@ -99,7 +99,7 @@ class Vocabulary(NamedTuple):
     name: str
     headers: tuple[str, ...]
     statements: tuple[str, ...]
-    closing: tuple[str, ...]
+    block_ends: tuple[str, ...]
     types: tuple[str, ...]
     plain_clauses: tuple[str, ...]
     with_clauses: tuple[str, ...]
@@ -112,8 +112,8 @@ class Vocabulary(NamedTuple):
         return (*self.plain_clauses, "WITH", *self.with_clauses)
 
 
-_OLD = frozenset((*_FRAMEWORK, *STATEMENTS, *TYPES, *PLAIN_CLAUSES, *WITH_CLAUSES))
-_NEW = frozenset((*_LATER_FRAMEWORK, *LATER_STATEMENTS, *LATER_HEADERS, *LATER_TYPES, *LATER_WITH))
+_RLO_83_RESERVED = frozenset((*_RLO_83_KEYWORDS, *STATEMENTS, *TYPES, *PLAIN_CLAUSES, *WITH_CLAUSES))
+_RLO_2_RESERVED = frozenset((*_RLO_2_KEYWORDS, *RLO_2_STATEMENTS, *RLO_2_HEADERS, *RLO_2_TYPES, *RLO_2_WITH_CLAUSES))
 
 # The longest name of RLO-83 is that of the report: "1-9 characters".
 VOCABULARIES = {
@@ -121,27 +121,27 @@ VOCABULARIES = {
         name="RLO-83",
         headers=("VAR",),
         statements=STATEMENTS,
-        closing=("END",),
+        block_ends=("END",),
         types=TYPES,
         plain_clauses=PLAIN_CLAUSES,
         with_clauses=WITH_CLAUSES,
-        reserved=_OLD,
+        reserved=_RLO_83_RESERVED,
         longest_name=9,
     ),
     Standard.RLO_2: Vocabulary(
         name="RLO-2",
-        headers=("VAR", *LATER_HEADERS),
-        statements=(*STATEMENTS, *LATER_STATEMENTS, "BEGIN"),
-        closing=("END", "UNTIL", "COEND", "PRIORITY", "RECOVER", "ELSE"),
+        headers=("VAR", *RLO_2_HEADERS),
+        statements=(*STATEMENTS, *RLO_2_STATEMENTS, "BEGIN"),
+        block_ends=("END", "UNTIL", "COEND", "PRIORITY", "RECOVER", "ELSE"),
         types=(*TYPES, "EVENT"),
         plain_clauses=(*PLAIN_CLAUSES, "ON"),
-        with_clauses=(*WITH_CLAUSES, *LATER_WITH),
-        reserved=_OLD | _NEW,
+        with_clauses=(*WITH_CLAUSES, *RLO_2_WITH_CLAUSES),
+        reserved=_RLO_83_RESERVED | _RLO_2_RESERVED,
         longest_name=31,
     ),
 }
 
 
-def is_later(word: str) -> bool:
+def is_reserved_in_rlo_2_only(word: str) -> bool:
     """Whether a word, in upper case, is reserved in RLO-2 alone."""
-    return word in _NEW
+    return word in _RLO_2_RESERVED

@@ -20,7 +20,7 @@ from armwright.program.language_server.symbol_index import Occurrence, ScopeExte
 from armwright.program.semantics.cell_symbols import Imported
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 
 
 @attrs.frozen(kw_only=True)
@@ -191,7 +191,7 @@ def lexical_context(text: str, offset: int, std: Standard) -> LexicalContext | N
         start -= 1
     word = Span(_word_start(text, start, offset), offset)
     source = Source("", text)
-    scanned = scan(source, without_numbers(source)[0], std)
+    scanned = scan(source, blank_line_numbers(source)[0], std)
     if any(comment.start < offset < comment.end + text.startswith("//", comment.start) for comment in scanned.comments):
         return None
     front = tuple(token for token in scanned.tokens if token.end <= word.start and token.kind is not TokenKind.END)

@@ -10,7 +10,7 @@ from lsprotocol import types as lsp
 from armwright.program.diagnostics.fixes import select_disjoint
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
-from armwright.program.language.text_edits import Edit
+from armwright.program.language.text_edits import TextEdit
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.positions import position, span_of, text_edits
 
@@ -75,7 +75,7 @@ def quick_fixes(
     return actions
 
 
-def _workspace_edit(analysis: Analysis, uri: str, edits: Iterable[Edit]) -> lsp.WorkspaceEdit:
+def _workspace_edit(analysis: Analysis, uri: str, edits: Iterable[TextEdit]) -> lsp.WorkspaceEdit:
     return lsp.WorkspaceEdit(changes={uri: text_edits(analysis.codec, edits)})
 
 
@@ -94,15 +94,15 @@ def _with_suggested_word(diagnostic: Diagnostic, source: Source) -> Diagnostic:
     return attrs.evolve(diagnostic, fixes=(Fix(Span(start, diagnostic.span.end), word),))
 
 
-def all_fixes(diagnostics: Iterable[Diagnostic]) -> tuple[Edit, ...]:
+def all_fixes(diagnostics: Iterable[Diagnostic]) -> tuple[TextEdit, ...]:
     """Return all certain cures that can be made at once, in the order of the text; of two that touch the first."""
     curable = select_disjoint([diagnostic for diagnostic in diagnostics if diagnostic.fixes])
     edits = chain.from_iterable(map(_edits, curable))
     return tuple(sorted(edits, key=lambda edit: edit.span.start))
 
 
-def _edits(diagnostic: Diagnostic) -> tuple[Edit, ...]:
-    return tuple(Edit(fix.span, fix.replacement) for fix in diagnostic.fixes)
+def _edits(diagnostic: Diagnostic) -> tuple[TextEdit, ...]:
+    return tuple(TextEdit(fix.span, fix.replacement) for fix in diagnostic.fixes)
 
 
 def _overlap(span: Span, other: Span) -> bool:

@@ -11,7 +11,7 @@ from armwright.program.language.names import is_arm
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source
 from armwright.program.language.units import DECLARABLE
-from armwright.program.language.words import CLOSING, SENSORS, VOCABULARIES, Standard
+from armwright.program.language.words import BLOCK_CLOSERS, SENSORS, VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Analysis, LexicalContext, lexical_context
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_doc
@@ -21,9 +21,9 @@ from armwright.program.language_server.symbol_index import NameKind
 from armwright.program.semantics.builtins import AXES, FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
-from armwright.program.syntax.expected_tokens import Expected
+from armwright.program.syntax.expected_tokens import ExpectedTokens
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.parser import expected
+from armwright.program.syntax.parser import expected_tokens
 
 # Whole statements; ``${1:name}`` are the parts to fill in, in order.
 _MOVE_WITH = "MOVE ${1:ARM_1} TO ${2:goal} WITH APPROACH = ${3:above} ;"
@@ -147,13 +147,15 @@ def _completion_items(codec: PositionCodec, analysis: Analysis, offset: int, *, 
         return []
     end = Token(TokenKind.END, "", "", around.word.start, around.word.start)
     source = Source(compiled.source.name, text)
-    expectation = expected(source, (*around.preceding, end), compiled.standard, declared=compiled.symbols.types)
-    procedure = expectation.procedure if expectation.procedure in compiled.symbols.procedures else None
+    expectation = expected_tokens(source, (*around.preceding, end), compiled.standard, declared=compiled.symbols.types)
+    procedure = (
+        expectation.enclosing_procedure if expectation.enclosing_procedure in compiled.symbols.procedures else None
+    )
     scope = compiled.symbols.scope(procedure)
     maker = _ItemFactory(analysis, span_range(codec, around.word), scope, snippets=snippets)
     operand = _NO_OPERAND if expectation.operand is None else _operand_rule(expectation, around.preceding, scope)
     words = (*operand.words, *_allowed_words(expectation, around, compiled.standard))
-    if not expectation.starts:
+    if not expectation.starts_statement:
         operands = [*maker.arms(operand), *maker.names(operand.kinds), *maker.devices(operand)]
         return [*operands, *maker.functions(operand), *maker.words(words)]
     statements = [*maker.words(words, starts=True)]
@@ -162,7 +164,7 @@ def _completion_items(codec: PositionCodec, analysis: Analysis, offset: int, *, 
     return [*statements, *maker.procedures(), *maker.names(_ANY_VALUE.kinds, starts=True)]
 
 
-def _operand_rule(operand: Expected, tokens: Sequence[Token], scope: Scope) -> _OperandRule:
+def _operand_rule(operand: ExpectedTokens, tokens: Sequence[Token], scope: Scope) -> _OperandRule:
     """Return what may stand for the value or name that is looked for."""
     assert operand.operand is not None  # noqa: S101 - the caller has looked
     wants, where = operand.operand
@@ -173,7 +175,7 @@ def _operand_rule(operand: Expected, tokens: Sequence[Token], scope: Scope) -> _
     elif where in ("after SPEED =", "after BLEND =", "after DURATION ="):
         operand_ = _NUMBER
     elif operand_ is None:
-        kind = scope.type(operand.target)
+        kind = scope.type(operand.assignment_target)
         # Behind a comma stands a number of a matrix.
         operand_ = _NUMBER if tokens[-1].key == "," else _ANY_VALUE if kind is None else _RULES_BY_KIND[kind.kind]
     if tokens and tokens[-1].key == "*":
@@ -194,22 +196,26 @@ def _argument_rule(name: Token, number: int, symbols: Symbols) -> _OperandRule:
     return _ANY_VALUE if kind is None else _RULES_BY_KIND[kind.kind]
 
 
-def _allowed_words(operand: Expected, around: LexicalContext, std: Standard) -> Iterator[str]:
+def _allowed_words(operand: ExpectedTokens, around: LexicalContext, std: Standard) -> Iterator[str]:
     """Give the words that may stand at a place; of clauses those that go with the others of their MOVE."""
     vocabulary = VOCABULARIES[std]
     clauses = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *VOCABULARIES[Standard.RLO_2].with_clauses))
-    written = operand.given | {
+    written = operand.present_clauses | {
         token.key for token in takewhile(lambda token: not _ends_clause(token), around.following)
     }
     # What ends a stretch of statements is not offered behind each of them, unless it is being written.
-    unasked = frozenset() if operand.starts or around.word.start < around.word.end else frozenset(CLOSING | {"RECOVER"})
+    unasked = (
+        frozenset()
+        if operand.starts_statement or around.word.start < around.word.end
+        else frozenset(BLOCK_CLOSERS | {"RECOVER"})
+    )
     without_via = "VIA" not in written
     for word in dict.fromkeys(operand.words):
         last = word.rpartition(" ")[2]
         # The action of ON is over in front of the place, or behind it.
         excluded = last in written or _EXCLUDES.get(last, frozenset()) & written or (last == "BLEND" and without_via)
         excluded = excluded and last in clauses
-        if last in vocabulary.reserved - unasked and not excluded and (word != "RETRY" or operand.recovering):
+        if last in vocabulary.reserved - unasked and not excluded and (word != "RETRY" or operand.is_in_recovery):
             yield word
 
 
@@ -217,7 +223,7 @@ def _ends_clause(token: Token) -> bool:
     return token.key == ";" or (token.kind is TokenKind.KEYWORD and token.key in _CLAUSE_ENDS)
 
 
-_CLAUSE_ENDS = frozenset((*VOCABULARIES[Standard.RLO_2].closing, *VOCABULARIES[Standard.RLO_2].statements))
+_CLAUSE_ENDS = frozenset((*VOCABULARIES[Standard.RLO_2].block_ends, *VOCABULARIES[Standard.RLO_2].statements))
 
 
 class _ItemFactory:

@@ -61,7 +61,7 @@ class Document:
     @property
     def is_short(self) -> bool:
         """Whether it is analysed at every change."""
-        return len(self.codec.starts) <= MAX_SHORT_LINES
+        return len(self.codec.line_starts) <= MAX_SHORT_LINES
 
     def change(self, changes: Sequence[lsp.TextDocumentContentChangeEvent], version: int | None) -> None:
         """Make changes, one after the other; a change that names no range brings the whole text anew."""

@@ -10,16 +10,16 @@ from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punc
 
 from armwright.program.language.source import Source
 from armwright.program.language.units import UNITS
-from armwright.program.language.words import LATER_TYPES, SENSORS, VOCABULARIES, Standard
+from armwright.program.language.words import RLO_2_TYPES, SENSORS, VOCABULARIES, Standard
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 
 _VOCABULARY = VOCABULARIES[Standard.RLO_2]
 
 # Every reserved word is in one of these four.
 DECLARATIONS = frozenset(_VOCABULARY.headers)
-TYPES = frozenset((*_VOCABULARY.types, *LATER_TYPES))
+TYPES = frozenset((*_VOCABULARY.types, *RLO_2_TYPES))
 OPERATORS = frozenset(("AND", "OR", "NOT"))
 KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
 
@@ -100,7 +100,7 @@ class RloLexer(RegexLexer):
         self, text: str, stack: Iterable[str] = ("root",)
     ) -> Iterator[tuple[int, _TokenType, str]]:
         """Yield place, kind and text of every token; line numbers divide whatever they stand in."""
-        blanked, _ = without_numbers(Source("", text))
+        blanked, _ = blank_line_numbers(Source("", text))
         numbers = deque(match.span() for match in re.finditer(r"[0-9]+", text) if blanked[match.start()] == " ")
         for start, kind, value in super().get_tokens_unprocessed(blanked, stack):
             start_, end = start, start + len(value)

@@ -6,7 +6,7 @@ from lsprotocol import types as lsp
 
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
-from armwright.program.language.text_edits import Edit
+from armwright.program.language.text_edits import TextEdit
 
 
 def span_range(codec: PositionCodec, span: Span) -> lsp.Range:
@@ -16,7 +16,7 @@ def span_range(codec: PositionCodec, span: Span) -> lsp.Range:
 
 def position(codec: PositionCodec, offset: int) -> lsp.Position:
     """Return the line and the column of an offset."""
-    return lsp.Position(*codec.place(offset))
+    return lsp.Position(*codec.line_and_column(offset))
 
 
 def offset_of(codec: PositionCodec, where: lsp.Position) -> int:
@@ -30,6 +30,6 @@ def span_of(codec: PositionCodec, range_: lsp.Range) -> Span:
     return Span(start, max(start, offset_of(codec, range_.end)))
 
 
-def text_edits(codec: PositionCodec, edits: Iterable[Edit]) -> list[lsp.TextEdit]:
+def text_edits(codec: PositionCodec, edits: Iterable[TextEdit]) -> list[lsp.TextEdit]:
     """Return changes of a text."""
     return [lsp.TextEdit(span_range(codec, edit.span), edit.text) for edit in edits]

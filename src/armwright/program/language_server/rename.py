@@ -3,8 +3,8 @@
 import re
 
 from armwright.errors import InvalidValueError
-from armwright.program.language.text_edits import Edit
-from armwright.program.language.words import VOCABULARIES, is_later
+from armwright.program.language.text_edits import TextEdit
+from armwright.program.language.words import VOCABULARIES, is_reserved_in_rlo_2_only
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.symbol_index import NameKind, Occurrence
 from armwright.program.semantics.builtins import FUNCTIONS
@@ -58,7 +58,7 @@ def _cell_source(analysis: Analysis, key: str) -> str | None:
     return f"is found by the camera of {cell.name}" if cell is not None and key in cell.visions else None
 
 
-def rename(analysis: Analysis, offset: int, new: str) -> tuple[Edit, ...]:
+def rename(analysis: Analysis, offset: int, new: str) -> tuple[TextEdit, ...]:
     """Return the changes that rename what stands at a position.
 
     Args:
@@ -74,7 +74,7 @@ def rename(analysis: Analysis, offset: int, new: str) -> tuple[Edit, ...]:
     key = new.upper()
     if key != occurrence.key:
         _require_unused(analysis, occurrence, new)
-    return tuple(Edit(other.span, new) for other in analysis.same_occurrences(occurrence))
+    return tuple(TextEdit(other.span, new) for other in analysis.same_occurrences(occurrence))
 
 
 def _require_valid_name(analysis: Analysis, new: str) -> None:
@@ -88,7 +88,7 @@ def _require_valid_name(analysis: Analysis, new: str) -> None:
     if _ARM.fullmatch(new):
         raise InvalidValueError(f"'{new}' is the name of an arm")
     if new.upper() in words.reserved:
-        later = " of RLO-2" if is_later(new.upper()) else ""
+        later = " of RLO-2" if is_reserved_in_rlo_2_only(new.upper()) else ""
         raise InvalidValueError(f"'{new}' is a reserved word{later}")
 
 

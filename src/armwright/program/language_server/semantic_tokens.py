@@ -7,7 +7,7 @@ from armwright.program.language.kinds import VariableKind
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.units import UNITS
-from armwright.program.language.words import LATER_TYPES, TYPES
+from armwright.program.language.words import RLO_2_TYPES, TYPES
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.symbol_index import NameKind, Occurrence
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -18,7 +18,7 @@ MODIFIERS = ("declaration", "modification", "readonly", "defaultLibrary", "frame
 _KEYWORD, _TYPE, _NUMBER, _STRING, _COMMENT, _OPERATOR = (
     KINDS.index(kind) for kind in ("keyword", "type", "number", "string", "comment", "operator")
 )
-_TYPES = frozenset((*TYPES, *LATER_TYPES, *UNITS))
+_TYPES = frozenset((*TYPES, *RLO_2_TYPES, *UNITS))
 _BIT = {name: 1 << at for at, name in enumerate(MODIFIERS)}
 _NAME_STYLES = {
     NameKind.PROCEDURE: ("function", 0),
@@ -39,7 +39,7 @@ SemanticToken = tuple[int, int, int, int]
 def line_tokens(analysis: Analysis) -> list[list[SemanticToken]]:
     """Return the coloured stretches of each line of a program."""
     codec, compiled = analysis.codec, analysis.compiled
-    lines: list[list[SemanticToken]] = [[] for _ in codec.starts]
+    lines: list[list[SemanticToken]] = [[] for _ in codec.line_starts]
     _add_tokens(lines, codec, analysis)
     for comment in compiled.comments:
         _add_comment(lines, codec, comment)
@@ -58,7 +58,7 @@ def _add_tokens(lines: list[list[SemanticToken]], codec: PositionCodec, analysis
         if name is not None and name.start == token.start:
             what, name = _name_style(name, analysis), next(names)
         if what is not None:
-            line, column = codec.place(token.start)
+            line, column = codec.line_and_column(token.start)
             lines[line].append((column, codec.width(token.start, token.end), *what))
 
 
@@ -107,7 +107,7 @@ def _add_comment(lines: list[list[SemanticToken]], codec: PositionCodec, comment
     for line in range(codec.line_of(comment.start), codec.line_of(comment.end) + 1):
         end = min(comment.end, codec.line_end(line))
         if end > start:
-            lines[line].append((codec.place(start)[1], codec.width(start, end), _COMMENT, 0))
+            lines[line].append((codec.line_and_column(start)[1], codec.width(start, end), _COMMENT, 0))
         start = max(start, end)
         while start < comment.end and codec.line_of(start) == line:
             start += 1

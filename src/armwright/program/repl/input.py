@@ -11,13 +11,13 @@ from itertools import takewhile
 import attrs
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Diagnostic, in_order
+from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
-from armwright.program.language.words import CLOSING, OPENING, VOCABULARIES, Standard, Vocabulary
+from armwright.program.language.words import BLOCK_CLOSERS, BLOCK_OPENERS, VOCABULARIES, Standard, Vocabulary
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
 
 # No expression begins like a line of a numbered program.
@@ -70,7 +70,7 @@ def parse_input(
     """
     text, diagnostics = source.text[start:], []
     if is_file or std is Standard.RLO_83 or _NUMBERED_LINE.match(text):
-        text, odd = without_numbers(Source(source.name, text))
+        text, odd = blank_line_numbers(Source(source.name, text))
         diagnostics += [shift_diagnostic(diagnostic, start) for diagnostic in odd]
     scanned = scan(source, " " * start + text, std)
     diagnostics += scanned.diagnostics
@@ -118,7 +118,7 @@ def _is_complete(tokens: Sequence[Token], diagnostics: Sequence[Diagnostic]) -> 
     """Whether nothing is open, and the first thing that is wrong is not that the text ends."""
     if any(diagnostic.code == "E102" for diagnostic in diagnostics) or (tokens and _block_depth(tokens) > 0):
         return False
-    first = next((diagnostic for diagnostic in in_order(diagnostics) if diagnostic.is_syntax), None)
+    first = next((diagnostic for diagnostic in sort_diagnostics(diagnostics) if diagnostic.is_syntax), None)
     # A character that RLO does not have stays wrong whatever follows, a comment of another language too.
     if first is None or first.code == "E101" or not tokens or first.span.start < tokens[-1].end:
         return True
@@ -129,7 +129,7 @@ def _is_complete(tokens: Sequence[Token], diagnostics: Sequence[Diagnostic]) -> 
 def _block_depth(tokens: Sequence[Token]) -> int:
     """Return how many stretches of statements are open behind some tokens."""
     words = [token.key for token in tokens if token.kind is TokenKind.KEYWORD]
-    return sum((word in OPENING) - (word in CLOSING) for word in words)
+    return sum((word in BLOCK_OPENERS) - (word in BLOCK_CLOSERS) for word in words)
 
 
 def _strip_program_frame(tokens: Sequence[Token]) -> list[Token]:
@@ -140,7 +140,7 @@ def _strip_program_frame(tokens: Sequence[Token]) -> list[Token]:
         depth = 0
         for index in reversed(range(len(remaining))):
             if remaining[index].kind is TokenKind.KEYWORD:
-                depth += (remaining[index].key in CLOSING) - (remaining[index].key in OPENING)
+                depth += (remaining[index].key in BLOCK_CLOSERS) - (remaining[index].key in BLOCK_OPENERS)
             if depth == 0:
                 if remaining[index].key == "BEGIN" and (index == 0 or remaining[index - 1].key == ";"):
                     del remaining[-1], remaining[index]

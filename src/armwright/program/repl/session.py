@@ -18,7 +18,7 @@ from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis import analysis
 from armwright.program.flow_analysis.analysis import Flow
-from armwright.program.language.diagnostic import Diagnostic, in_order
+from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.repl.declarations import MergedHeaders, RedefinitionError, merge_headers
@@ -302,7 +302,7 @@ class Session:
             for diagnostic in diagnostics
             if diagnostic.is_error or (diagnostic.span.start >= start and diagnostic.code not in _SUPPRESSED_CODES)
         )
-        reported = in_order(new)
+        reported = sort_diagnostics(new)
         if flow is None or any(diagnostic.is_error for diagnostic in reported):
             return None, reported
         state = attrs.evolve(before, headers=heading.headers, statements=heading.statements)

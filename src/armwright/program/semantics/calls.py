@@ -5,7 +5,7 @@ import attrs
 from armwright.program.language.diagnostic import Fix, Label, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
-from armwright.program.language.words import ABSENT, ELSEWHERE
+from armwright.program.language.words import FOREIGN_STATEMENTS, UNSUPPORTED_STATEMENTS
 from armwright.program.semantics import type_check
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
@@ -164,9 +164,9 @@ def _unknown(names: Names, node: tree.Call) -> None:
         message, label = f"`{name.key}` is a function and no statement", "its value is not used"
         help_ = f"assign its value: `... = {name.text}(...)`"
     else:
-        near = ELSEWHERE.get(name.key) or names.near(name.text, lambda: [*_spelled(names), *_STATEMENTS])
+        near = FOREIGN_STATEMENTS.get(name.key) or names.near(name.text, lambda: [*_spelled(names), *_STATEMENTS])
         message, label = f"unknown procedure `{name.text}`", "unknown procedure"
-        otherwise = ABSENT.get(name.key, "declare it with PROCEDURE before BEGIN")
+        otherwise = UNSUPPORTED_STATEMENTS.get(name.key, "declare it with PROCEDURE before BEGIN")
         help_ = f"did you mean `{near}`?" if near else otherwise
     names.report("E227", message, name.span, label, secondary=secondary, advice=help_, fixes=fixes)
 

@@ -16,7 +16,7 @@ def block(context: Context, node: tree.Block) -> None:
 
 def if_(context: Context, node: tree.If) -> None:
     """Check conditions and statements of IF and the ELSE IFs behind it."""
-    chain, otherwise = node.chain
+    chain, otherwise = node.else_if_chain
     for choice in chain:
         condition(context.names, choice.condition, "IF")
         context.check(choice.then)

@@ -87,7 +87,7 @@ def _written(node: tree.Expression) -> tuple[str, int]:
             strength, gap = (PRECEDENCE_OF_NOT, " ") if operation == "NOT" else (_MINUS, "")
             return f"{operation}{gap}{_inside(operand, strength)}", strength
         case tree.Binary():
-            first, chain = tree.chain(node)
+            first, chain = tree.operation_chain(node)
             text, own = _written(first)
             for link in chain:
                 strength = PRECEDENCE[link.operation]

@@ -201,7 +201,7 @@ def _unary(names: Names, node: tree.Unary) -> ExpressionType | None:
 
 
 def _binary(names: Names, node: tree.Binary) -> ExpressionType | None:
-    first, chain = tree.chain(node)
+    first, chain = tree.operation_chain(node)
     actual = sort(names, first)
     for link in chain:
         if link.operation in ("AND", "OR"):

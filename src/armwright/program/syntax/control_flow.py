@@ -4,38 +4,46 @@ from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
-from armwright.program.syntax.expressions import expression, listed, mobile, number, reserved_as_name, values, variable
-from armwright.program.syntax.frames import equals
+from armwright.program.syntax.expressions import (
+    expression,
+    expression_list,
+    is_reserved_as_name,
+    mobile,
+    number,
+    parenthesised_list,
+    variable,
+)
+from armwright.program.syntax.frames import expect_equals
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.statement_list import (
-    ASSIGNING,
-    close,
-    misspelt,
-    nested,
-    next_statement,
-    salvaged,
+    ASSIGNMENT_SIGNS,
+    expect_closer,
+    nested_statement,
+    parse_or_skip,
+    replace_misspelt_statement,
+    skip_to_statement,
     statements,
 )
-from armwright.program.syntax.token_stream import LostError, Tokens, TooDeepError, shown
+from armwright.program.syntax.token_stream import NestingError, PanicModeError, TokenStream, describe_token
 
 _CONDITION = "a condition"
 _EVENT = "the name of an EVENT"
 _OPERANDS = (TokenKind.NAME, TokenKind.NUMBER, TokenKind.ARM)
-_DOWNWARDS = "DOWNTO"
-_ELSE_IF = ("ELSEIF", "ELSIF", "ELIF")
+_DOWNTO = "DOWNTO"
+_ELSE_IF_SPELLINGS = ("ELSEIF", "ELSIF", "ELIF")
 
 
 # block = "BEGIN" statements "END" ;
-def block(tokens: Tokens) -> tree.Block:
+def block(tokens: TokenStream) -> tree.Block:
     """Read a block; where its END is missing, say so. BEGIN has been looked for, and may be missing too."""
-    start = tokens.now
+    start = tokens.current
     tokens.accept("BEGIN")
     body = statements(tokens, "END")
-    end = close(tokens, "END", start)
-    return tree.Block(tokens.since(start), body, end or tokens.gap())
+    end = expect_closer(tokens, "END", start)
+    return tree.Block(tokens.span_since(start), body, end or tokens.gap_span())
 
 
-def part(tokens: Tokens, wants: str, where: str, *ends: str) -> tree.Expression:
+def head_expression(tokens: TokenStream, wants: str, where: str, *ends: str) -> tree.Expression:
     """Read an expression in the head of a statement; pass over one that makes no sense.
 
     Args:
@@ -47,31 +55,40 @@ def part(tokens: Tokens, wants: str, where: str, *ends: str) -> tree.Expression:
     Raises:
         LostError: the statement ends there.
     """
-    start, depth = tokens.now, tokens.depth
+    start, depth = tokens.current, tokens.depth
     try:
         body = expression(tokens, wants, where)
         if wants == _CONDITION:
-            tokens.offer("AND", "OR")
-        while wants == _CONDITION and _misspelt_joint(tokens):
+            tokens.note_expected_words("AND", "OR")
+        while wants == _CONDITION and _replace_misspelt_connective(tokens):
             sign = tokens.take()
             right = expression(tokens, wants, "")
-            body = tree.Binary(tokens.since(start), sign.key, body, right)
-    except TooDeepError:
+            body = tree.Binary(tokens.span_since(start), sign.key, body, right)
+    except NestingError:
         raise
-    except LostError:
+    except PanicModeError:
         tokens.depth = depth
-        return _passed_over(tokens, start, ends)
-    if tokens.now.kind in _OPERANDS and _comes_soon(tokens, ends) and not closest(tokens.now.text, (*ends, _DOWNWARDS)):
-        tokens.say_once("E117", f"{shown(tokens.now)} does not belong here", tokens.now.span, f"expected `{ends[0]}`")
-        _passed_over(tokens, start, ends)
+        return _skip_head(tokens, start, ends)
+    if (
+        tokens.current.kind in _OPERANDS
+        and _follows_soon(tokens, ends)
+        and not closest(tokens.current.text, (*ends, _DOWNTO))
+    ):
+        tokens.report_once(
+            "E117",
+            f"{describe_token(tokens.current)} does not belong here",
+            tokens.current.span,
+            f"expected `{ends[0]}`",
+        )
+        _skip_head(tokens, start, ends)
     return body
 
 
-def _comes_soon(tokens: Tokens, ends: tuple[str, ...]) -> bool:
+def _follows_soon(tokens: TokenStream, ends: tuple[str, ...]) -> bool:
     """Whether one of these words stands near, before anything that starts or ends a statement."""
-    stops = (";", *tokens.words.closing, *tokens.words.statements)
+    stops = (";", *tokens.vocabulary.block_ends, *tokens.vocabulary.statements)
     for steps in range(1, 8):
-        key = tokens.ahead(steps).key
+        key = tokens.peek(steps).key
         if key in ends:
             return True
         if key in stops:
@@ -79,72 +96,72 @@ def _comes_soon(tokens: Tokens, ends: tuple[str, ...]) -> bool:
     return False
 
 
-def _misspelt_joint(tokens: Tokens) -> bool:
+def _replace_misspelt_connective(tokens: TokenStream) -> bool:
     """Whether AND or OR stands here misspelt; it is replaced."""
-    if tokens.now.kind is not TokenKind.NAME or tokens.ahead().key == "=":
+    if tokens.current.kind is not TokenKind.NAME or tokens.peek().key == "=":
         return False
-    near = closest(tokens.now.text, ("AND", "OR"))
+    near = closest(tokens.current.text, ("AND", "OR"))
     if near:
-        misspelt(tokens, near)
+        replace_misspelt_statement(tokens, near)
     return near is not None
 
 
-def _passed_over(tokens: Tokens, start: Token, ends: tuple[str, ...]) -> tree.Poison:
+def _skip_head(tokens: TokenStream, start: Token, ends: tuple[str, ...]) -> tree.Poison:
     """Pass over the rest of the head of a statement; the next word of it may be missing without a further message."""
     names = set()
-    stops = (";", *tokens.words.closing, *tokens.words.statements)
-    while not tokens.sees(*ends):
-        if tokens.done or tokens.sees(";", *tokens.words.closing):
-            raise LostError
-        if tokens.sees(*stops):
+    stops = (";", *tokens.vocabulary.block_ends, *tokens.vocabulary.statements)
+    while not tokens.matches(*ends):
+        if tokens.is_at_end or tokens.matches(";", *tokens.vocabulary.block_ends):
+            raise PanicModeError
+        if tokens.matches(*stops):
             break
-        if tokens.now.kind in (TokenKind.NAME, TokenKind.ARM):
-            names.add(tokens.now.key)
+        if tokens.current.kind in (TokenKind.NAME, TokenKind.ARM):
+            names.add(tokens.current.key)
         tokens.take()
-    tokens.hush()
-    return tree.Poison(tokens.since(start), frozenset(names))
+    tokens.suppress_reports()
+    return tree.Poison(tokens.span_since(start), frozenset(names))
 
 
 # "IF" expr "THEN" statement [ "ELSE" statement ]
-def if_(tokens: Tokens) -> tree.If:
+def if_(tokens: TokenStream) -> tree.If:
     """Read one IF, and all that follow it with ELSE IF: they make a chain, which is long and not deep."""
-    chain = [_choice(tokens)]
+    chain = [_if_then(tokens)]
     otherwise: tree.Statement | None = None
-    while _else(tokens):
-        start = tokens.now
-        if not tokens.sees("IF") or tokens.ahead().key in ASSIGNING:
-            otherwise = nested(tokens, "ELSE")
+    while _accept_else(tokens):
+        start = tokens.current
+        if not tokens.matches("IF") or tokens.peek().key in ASSIGNMENT_SIGNS:
+            otherwise = nested_statement(tokens, "ELSE")
             break
-        link = salvaged(tokens, _choice)
+        link = parse_or_skip(tokens, _if_then)
         if link is None:
-            otherwise = tree.Poison(tokens.since(start))
+            otherwise = tree.Poison(tokens.span_since(start))
             break
         chain.append(link)
     for start, head, condition, then in reversed(chain):
-        otherwise = tree.If(tokens.since(start), head, condition, then, otherwise)
+        otherwise = tree.If(tokens.span_since(start), head, condition, then, otherwise)
     assert isinstance(otherwise, tree.If)  # noqa: S101 - the chain has one link or more
     return otherwise
 
 
-def _choice(tokens: Tokens) -> tuple[Token, Span, tree.Expression, tree.Statement]:
+def _if_then(tokens: TokenStream) -> tuple[Token, Span, tree.Expression, tree.Statement]:
     """Read an IF up to its ELSE: where it starts, its head, its condition, and what is done where that holds."""
     start = tokens.take()
-    condition = part(tokens, _CONDITION, "after IF", "THEN")
-    head = tokens.since(start)
+    condition = head_expression(tokens, _CONDITION, "after IF", "THEN")
+    head = tokens.span_since(start)
     tokens.expect("THEN", "after the condition", statement=True)
-    tokens.waiting.append(("ELSE",))
-    then = nested(tokens, "THEN")
-    tokens.waiting.pop()
+    tokens.open_closers.append(("ELSE",))
+    then = nested_statement(tokens, "THEN")
+    tokens.open_closers.pop()
     return start, head, condition, then
 
 
-def _else(tokens: Tokens) -> bool:
+def _accept_else(tokens: TokenStream) -> bool:
     """Read ELSE, also behind a needless ``;``."""
     if tokens.accept("ELSE"):
         return True
-    token, after = tokens.now, tokens.ahead()
+    token, after = tokens.current, tokens.peek()
     if token.key == ";" and after.key == "ELSE":
-        tokens.say_once(
+        tokens.report_once(
             "E124", "no `;` is allowed before ELSE", token.span, "leave it out", fixes=(Fix(token.span, ""),)
         )
         tokens.take()
@@ -152,261 +169,263 @@ def _else(tokens: Tokens) -> bool:
         return True
     if token.kind is not TokenKind.NAME or after.key in ("=", ":=", "(", "["):
         return False
-    if token.key in _ELSE_IF:
+    if token.key in _ELSE_IF_SPELLINGS:
         text = f"unknown statement `{token.text}`"
         tokens.report(
             "E105", text, token.span, "not a statement", advice="write `ELSE IF`", fixes=(Fix(token.span, "ELSE IF"),)
         )
-        tokens.replace("IF")
+        tokens.replace_current("IF")
         return True
-    if closest(token.text, ("ELSE", *tokens.words.statements)) == "ELSE":
-        misspelt(tokens, "ELSE")
+    if closest(token.text, ("ELSE", *tokens.vocabulary.statements)) == "ELSE":
+        replace_misspelt_statement(tokens, "ELSE")
         tokens.take()
         return True
     return False
 
 
 # "WHILE" expr "DO" statement
-def while_(tokens: Tokens) -> tree.While:
+def while_(tokens: TokenStream) -> tree.While:
     """Read one WHILE."""
     start = tokens.take()
-    condition = part(tokens, _CONDITION, "after WHILE", "DO")
-    head = tokens.since(start)
+    condition = head_expression(tokens, _CONDITION, "after WHILE", "DO")
+    head = tokens.span_since(start)
     tokens.expect("DO", "after the condition", statement=True)
-    body = nested(tokens, "DO")
-    return tree.While(tokens.since(start), head, condition, body)
+    body = nested_statement(tokens, "DO")
+    return tree.While(tokens.span_since(start), head, condition, body)
 
 
 # "REPEAT" statements "UNTIL" expr
-def repeat(tokens: Tokens) -> tree.Repeat:
+def repeat(tokens: TokenStream) -> tree.Repeat:
     """Read one REPEAT."""
     start = tokens.take()
     body = statements(tokens, "UNTIL")
-    tail = tokens.now
-    if close(tokens, "UNTIL", start):
-        condition = part(tokens, _CONDITION, "after UNTIL")
-        return tree.Repeat(tokens.since(start), body, tokens.since(tail), condition)
-    gap = tokens.gap()
-    return tree.Repeat(tokens.since(start), body, gap, tree.Poison(gap))
+    tail = tokens.current
+    if expect_closer(tokens, "UNTIL", start):
+        condition = head_expression(tokens, _CONDITION, "after UNTIL")
+        return tree.Repeat(tokens.span_since(start), body, tokens.span_since(tail), condition)
+    gap = tokens.gap_span()
+    return tree.Repeat(tokens.span_since(start), body, gap, tree.Poison(gap))
 
 
 # "FOR" name "=" expr "TO" expr [ "STEP" expr ] "DO" statement
-def for_(tokens: Tokens) -> tree.For:
+def for_(tokens: TokenStream) -> tree.For:
     """Read one FOR."""
     start = tokens.take()
-    counter = _counter(tokens)
-    equals(tokens, "the variable of FOR", tokens.before.text)
-    first = part(tokens, "a number", "after `=`", "TO", "STEP", "DO")
-    if tokens.sees_word(_DOWNWARDS) or tokens.sees(",", ":"):
-        advice = "write `TO ... STEP -1`" if tokens.sees_word(_DOWNWARDS) else "write `TO`"
-        tokens.say_once("E112", "FOR counts with TO and STEP", tokens.now.span, "expected `TO`", advice=advice)
-        tokens.replace("TO")
+    counter = _loop_variable(tokens)
+    expect_equals(tokens, "the variable of FOR", tokens.previous.text)
+    first = head_expression(tokens, "a number", "after `=`", "TO", "STEP", "DO")
+    if tokens.matches_name(_DOWNTO) or tokens.matches(",", ":"):
+        advice = "write `TO ... STEP -1`" if tokens.matches_name(_DOWNTO) else "write `TO`"
+        tokens.report_once("E112", "FOR counts with TO and STEP", tokens.current.span, "expected `TO`", advice=advice)
+        tokens.replace_current("TO")
     tokens.expect("TO", "after the first number")
-    last = part(tokens, "a number", "after TO", "STEP", "DO")
-    step = part(tokens, "a number", "after STEP", "DO") if tokens.accept("STEP") else None
-    head = tokens.since(start)
+    last = head_expression(tokens, "a number", "after TO", "STEP", "DO")
+    step = head_expression(tokens, "a number", "after STEP", "DO") if tokens.accept("STEP") else None
+    head = tokens.span_since(start)
     tokens.expect("DO", "after the last number", statement=True)
-    body = nested(tokens, "DO")
-    return tree.For(tokens.since(start), head, counter, first, last, step, body)
+    body = nested_statement(tokens, "DO")
+    return tree.For(tokens.span_since(start), head, counter, first, last, step, body)
 
 
-def _counter(tokens: Tokens) -> tree.Name | tree.Poison:
+def _loop_variable(tokens: TokenStream) -> tree.Name | tree.Poison:
     """Read the variable of FOR."""
-    token = tokens.now
-    tokens.want("the name of a SCALAR", "after FOR")
-    if token.kind is TokenKind.NAME and tokens.ahead().key != "[":
+    token = tokens.current
+    tokens.note_expected_operand("the name of a SCALAR", "after FOR")
+    if token.kind is TokenKind.NAME and tokens.peek().key != "[":
         return tokens.take_name()
     if token.kind in (TokenKind.NAME, TokenKind.ARM):
         body = mobile(tokens, "a name", "after FOR")
         text = "FOR counts with a variable of its own" if token.kind is TokenKind.NAME else "FOR counts with a SCALAR"
         tokens.report("E111", text, body.span, "expected the name of a SCALAR")
         return tree.Poison(body.span, frozenset((token.key,)))
-    if reserved_as_name(tokens):
-        tokens.refuse_reserved()
+    if is_reserved_as_name(tokens):
+        tokens.report_reserved_name()
         tokens.take()
         return tree.Poison(token.span, frozenset((token.key,)))
-    return tokens.lost("expected the name of a SCALAR after FOR", f"found {shown(token)}")
+    return tokens.fail("expected the name of a SCALAR after FOR", f"found {describe_token(token)}")
 
 
 # "COBEGIN" branch { ";" branch } [";"] "COEND"
-def cobegin(tokens: Tokens) -> tree.Cobegin:
+def cobegin(tokens: TokenStream) -> tree.Cobegin:
     """Read one COBEGIN."""
     start = tokens.take()
     body: list[tree.Branch] = []
-    depth, level = tokens.depth, len(tokens.waiting)
-    tokens.waiting.append(("COEND", "PRIORITY"))
-    tokens.offer("BEGIN", "PRIORITY", "COEND", starts=True)
-    while not (tokens.done or tokens.sees("COEND", "UNTIL", "RECOVER")):
-        index = tokens.at
-        if tokens.sees("END") and not _needless_end(tokens):
+    depth, level = tokens.depth, len(tokens.open_closers)
+    tokens.open_closers.append(("COEND", "PRIORITY"))
+    tokens.note_expected_words("BEGIN", "PRIORITY", "COEND", starts_statement=True)
+    while not (tokens.is_at_end or tokens.matches("COEND", "UNTIL", "RECOVER")):
+        index = tokens.index
+        if tokens.matches("END") and not _skip_surplus_end(tokens):
             break
         try:
             body.append(_branch(tokens))
-            _between(tokens)
-            if tokens.before.key == ";":
-                tokens.offer("BEGIN", "PRIORITY", "COEND", starts=True)
-        except TooDeepError:
+            _branch_separator(tokens)
+            if tokens.previous.key == ";":
+                tokens.note_expected_words("BEGIN", "PRIORITY", "COEND", starts_statement=True)
+        except NestingError:
             raise
-        except LostError:
-            del tokens.waiting[level + 1 :]
+        except PanicModeError:
+            del tokens.open_closers[level + 1 :]
             tokens.depth = depth
-            next_statement(tokens)
+            skip_to_statement(tokens)
             tokens.accept(";")
-            tokens.hush()
-        if tokens.at == index:
+            tokens.suppress_reports()
+        if tokens.index == index:
             tokens.take()
-    tokens.waiting.pop()
-    if not body and tokens.sees("COEND"):
-        tokens.say_once("E126", "COBEGIN has no branches", tokens.now.span, "expected `BEGIN ... END`")
-    end = close(tokens, "COEND", start)
-    return tree.Cobegin(tokens.since(start), tuple(body), end or tokens.gap())
+    tokens.open_closers.pop()
+    if not body and tokens.matches("COEND"):
+        tokens.report_once("E126", "COBEGIN has no branches", tokens.current.span, "expected `BEGIN ... END`")
+    end = expect_closer(tokens, "COEND", start)
+    return tree.Cobegin(tokens.span_since(start), tuple(body), end or tokens.gap_span())
 
 
 # branch = [ "PRIORITY" number ":" ] block ;
-def _branch(tokens: Tokens) -> tree.Branch:
-    start = tokens.now
+def _branch(tokens: TokenStream) -> tree.Branch:
+    start = tokens.current
     priority = None
     if tokens.accept("PRIORITY"):
-        if tokens.now.kind is not TokenKind.NUMBER:
-            tokens.say_once(
-                "E111", "expected a number after PRIORITY", tokens.now.span, "a number without a sign, such as `2`"
+        if tokens.current.kind is not TokenKind.NUMBER:
+            tokens.report_once(
+                "E111", "expected a number after PRIORITY", tokens.current.span, "a number without a sign, such as `2`"
             )
         priority = _priority(tokens)
-        head = tokens.since(start)
+        head = tokens.span_since(start)
         tokens.expect(":", "after the priority", statement=True)
     else:
         head = start.span
-    tokens.offer("BEGIN", starts=True)
-    body = block(tokens) if tokens.sees("BEGIN") else _bare(tokens)
-    return tree.Branch(tokens.since(start), head, priority, body)
+    tokens.note_expected_words("BEGIN", starts_statement=True)
+    body = block(tokens) if tokens.matches("BEGIN") else _branch_without_block(tokens)
+    return tree.Branch(tokens.span_since(start), head, priority, body)
 
 
-def _priority(tokens: Tokens) -> tree.Number | None:
+def _priority(tokens: TokenStream) -> tree.Number | None:
     """Read what stands for a priority."""
-    if tokens.now.kind is TokenKind.NUMBER or tokens.ahead().kind is TokenKind.NUMBER:
-        return number(tokens) if tokens.now.kind is TokenKind.NUMBER or tokens.sees("-", "+") else None
-    if tokens.now.kind is TokenKind.NAME:
+    if tokens.current.kind is TokenKind.NUMBER or tokens.peek().kind is TokenKind.NUMBER:
+        return number(tokens) if tokens.current.kind is TokenKind.NUMBER or tokens.matches("-", "+") else None
+    if tokens.current.kind is TokenKind.NAME:
         tokens.take()
     return None
 
 
-def _bare(tokens: Tokens) -> tree.Block:
+def _branch_without_block(tokens: TokenStream) -> tree.Block:
     """Read a statement that stands for a branch of COBEGIN."""
-    token = tokens.now
+    token = tokens.current
     if token.key == ";":
-        tokens.lost("a `;` is allowed only between two branches", "expected `BEGIN`", code="E126")
+        tokens.fail("a `;` is allowed only between two branches", "expected `BEGIN`", code="E126")
     advice = "write `BEGIN ... END` around the statements of each branch"
-    tokens.say_once("E126", "a branch of COBEGIN is a block", token.span, "expected `BEGIN` before this", advice=advice)
+    tokens.report_once(
+        "E126", "a branch of COBEGIN is a block", token.span, "expected `BEGIN` before this", advice=advice
+    )
     body = statements(tokens, "END")
-    if tokens.sees("END") and tokens.ahead().key != ".":
+    if tokens.matches("END") and tokens.peek().key != ".":
         tokens.take()
     else:
-        tokens.hush()
-    return tree.Block(tokens.since(token), body, tokens.gap())
+        tokens.suppress_reports()
+    return tree.Block(tokens.span_since(token), body, tokens.gap_span())
 
 
-def _needless_end(tokens: Tokens) -> bool:
+def _skip_surplus_end(tokens: TokenStream) -> bool:
     """Pass over an END between branches that closes nothing; whether it was one."""
-    token, after = tokens.now, tokens.ahead()
+    token, after = tokens.current, tokens.peek()
     if after.key == ";":
-        after = tokens.ahead(2)
+        after = tokens.peek(2)
     if after.key not in ("BEGIN", "COEND", "PRIORITY"):
         return False
-    tokens.say_once("E127", "`END` without BEGIN", token.span, "no BEGIN is open in this COBEGIN")
+    tokens.report_once("E127", "`END` without BEGIN", token.span, "no BEGIN is open in this COBEGIN")
     tokens.take()
     tokens.accept(";")
-    tokens.hush()
+    tokens.suppress_reports()
     return True
 
 
-def _between(tokens: Tokens) -> None:
+def _branch_separator(tokens: TokenStream) -> None:
     """Read the ``;`` between two branches."""
-    if tokens.accept(";") or tokens.done or tokens.sees("COEND", "END", "UNTIL", "RECOVER"):
+    if tokens.accept(";") or tokens.is_at_end or tokens.matches("COEND", "END", "UNTIL", "RECOVER"):
         return
-    if tokens.sees("PRIORITY") and tokens.silent:
+    if tokens.matches("PRIORITY") and tokens.is_reported:
         return
-    gap = tokens.gap()
-    if tokens.sees("BEGIN", "PRIORITY"):
+    gap = tokens.gap_span()
+    if tokens.matches("BEGIN", "PRIORITY"):
         text, fix = "missing `;` between two branches", Fix(gap, ";")
-        tokens.say_once("E104", text, gap, "expected `;` here", fixes=(fix,))
+        tokens.report_once("E104", text, gap, "expected `;` here", fixes=(fix,))
         return
-    tokens.lost(f"{shown(tokens.now)} does not belong here", "expected `;`", code="E117")
+    tokens.fail(f"{describe_token(tokens.current)} does not belong here", "expected `;`", code="E117")
 
 
 # "LOCK" "(" lvalue { "," lvalue } ")" "DO" statement
-def lock(tokens: Tokens) -> tree.Lock:
+def lock(tokens: TokenStream) -> tree.Lock:
     """Read one LOCK."""
     start = tokens.take()
-    targets = listed(tokens, variable, "the name of a variable", "after LOCK")
-    head = tokens.since(start)
+    targets = parenthesised_list(tokens, variable, "the name of a variable", "after LOCK")
+    head = tokens.span_since(start)
     tokens.expect("DO", "after the names", statement=True)
-    body = nested(tokens, "DO")
-    return tree.Lock(tokens.since(start), head, targets, body)
+    body = nested_statement(tokens, "DO")
+    return tree.Lock(tokens.span_since(start), head, targets, body)
 
 
 # "TRY" statements "RECOVER" statements "END"
-def try_(tokens: Tokens) -> tree.Try:
+def try_(tokens: TokenStream) -> tree.Try:
     """Read one TRY."""
     start = tokens.take()
     body = statements(tokens, "RECOVER")
     recovery: tuple[tree.Statement, ...] = ()
-    recover, end = close(tokens, "RECOVER", start), None
+    recover, end = expect_closer(tokens, "RECOVER", start), None
     if recover:
-        tokens.recovering += 1
+        tokens.recover_depth += 1
         try:
             recovery = statements(tokens, "END")
         finally:
-            tokens.recovering -= 1
-        end = close(tokens, "END", start)
-    elif tokens.sees("END") and tokens.ahead().key != ".":
+            tokens.recover_depth -= 1
+        end = expect_closer(tokens, "END", start)
+    elif tokens.matches("END") and tokens.peek().key != ".":
         tokens.take()
-    gap = tokens.gap()
-    return tree.Try(tokens.since(start), body, recover or gap, recovery, end or gap)
+    gap = tokens.gap_span()
+    return tree.Try(tokens.span_since(start), body, recover or gap, recovery, end or gap)
 
 
 # "RETRY"
-def retry(tokens: Tokens) -> tree.Retry:
+def retry(tokens: TokenStream) -> tree.Retry:
     """Read one RETRY."""
     return tree.Retry(tokens.take().span)
 
 
 # "SIGNAL" lvalue
-def signal(tokens: Tokens) -> tree.Signal:
+def signal(tokens: TokenStream) -> tree.Signal:
     """Read one SIGNAL."""
     start = tokens.take()
     event = variable(tokens, _EVENT, "after SIGNAL")
-    return tree.Signal(tokens.since(start), event)
+    return tree.Signal(tokens.span_since(start), event)
 
 
 # "WAIT" lvalue
-def wait(tokens: Tokens) -> tree.Wait:
+def wait(tokens: TokenStream) -> tree.Wait:
     """Read one WAIT."""
     start = tokens.take()
-    if tokens.now.kind is TokenKind.NUMBER:
-        text = tokens.now.text
+    if tokens.current.kind is TokenKind.NUMBER:
+        text = tokens.current.text
         advice = f"to let {text} seconds pass, write `PAUSE {text}`"
-        tokens.lost(f"expected {_EVENT} after WAIT", f"found `{text}`", advice=advice)
+        tokens.fail(f"expected {_EVENT} after WAIT", f"found `{text}`", advice=advice)
     event = variable(tokens, _EVENT, "after WAIT")
-    return tree.Wait(tokens.since(start), event)
+    return tree.Wait(tokens.span_since(start), event)
 
 
 # "PAUSE" expr
-def pause(tokens: Tokens) -> tree.Pause:
+def pause(tokens: TokenStream) -> tree.Pause:
     """Read one PAUSE."""
     start = tokens.take()
     duration = expression(tokens, "a number of seconds", "after PAUSE")
-    return tree.Pause(tokens.since(start), duration)
+    return tree.Pause(tokens.span_since(start), duration)
 
 
 # "HALT"
-def halt(tokens: Tokens) -> tree.Halt:
+def halt(tokens: TokenStream) -> tree.Halt:
     """Read one HALT."""
     return tree.Halt(tokens.take().span)
 
 
 # name "(" [ expr { "," expr } ] ")"
-def call(tokens: Tokens) -> tree.Call:
+def call(tokens: TokenStream) -> tree.Call:
     """Read the call of a procedure."""
     name = tokens.take_name()
-    arguments = values(tokens, "a value", f"after {name.text}", empty=True)
-    return tree.Call(tokens.since(name.span), name, arguments)
+    arguments = expression_list(tokens, "a value", f"after {name.text}", empty=True)
+    return tree.Call(tokens.span_since(name.span), name, arguments)

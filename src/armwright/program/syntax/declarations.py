@@ -5,191 +5,191 @@ import math
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, did_you_mean
 from armwright.program.syntax import tree
-from armwright.program.syntax.expressions import listed, number
+from armwright.program.syntax.expressions import number, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.token_stream import LostError, Tokens, shown
+from armwright.program.syntax.token_stream import PanicModeError, TokenStream, describe_token
 
 
-def passed_over(tokens: Tokens, names: list[tree.Name]) -> tree.Declaration:
+def skip_declaration(tokens: TokenStream, names: list[tree.Name]) -> tree.Declaration:
     """Pass over the rest of a declaration; return what was perhaps declared, of no known type."""
-    start = tokens.now
-    stops = ("BEGIN", *tokens.words.headers, *tokens.words.statements)
-    while not tokens.done and not tokens.sees(";", "END", *stops):
-        if tokens.now.kind is TokenKind.NAME:
+    start = tokens.current
+    stops = ("BEGIN", *tokens.vocabulary.headers, *tokens.vocabulary.statements)
+    while not tokens.is_at_end and not tokens.matches(";", "END", *stops):
+        if tokens.current.kind is TokenKind.NAME:
             names.append(tokens.take_name())
         else:
             tokens.take()
     tokens.accept(";")
-    span = tokens.since(start)
+    span = tokens.span_since(start)
     return tree.Declaration(span, tuple(names), tree.TypeName(span, "", None))
 
 
 # var_part = "VAR" decl { decl } ;
-def var_part(tokens: Tokens) -> list[tree.Declaration]:
+def var_part(tokens: TokenStream) -> list[tree.Declaration]:
     """Read VAR and what it declares."""
     word = tokens.take()
-    if tokens.sees(","):
-        tokens.report("E111", "expected a name after VAR", tokens.now.span, "found `,`")
+    if tokens.matches(","):
+        tokens.report("E111", "expected a name after VAR", tokens.current.span, "found `,`")
         tokens.take()
-    if tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM) and not _reserved(tokens):
+    if tokens.current.kind not in (TokenKind.NAME, TokenKind.ARM) and not _is_reserved_as_name(tokens):
         tokens.report("E111", "VAR declares nothing", word.span, "expected a name after VAR")
         return []
     return declarations(tokens)
 
 
-def _reserved(tokens: Tokens) -> bool:
+def _is_reserved_as_name(tokens: TokenStream) -> bool:
     """Whether a reserved word stands where a declared name should."""
-    token = tokens.now
+    token = tokens.current
     outside = ("VAR", "BEGIN", "END")
-    return token.kind is TokenKind.KEYWORD and token.key not in outside and tokens.ahead().key in (",", ":")
+    return token.kind is TokenKind.KEYWORD and token.key not in outside and tokens.peek().key in (",", ":")
 
 
-def declarations(tokens: Tokens) -> list[tree.Declaration]:
+def declarations(tokens: TokenStream) -> list[tree.Declaration]:
     """Read declarations, as many as there are."""
     read = []
     depth = tokens.depth
-    while _goes_on(tokens):
-        index = tokens.at
+    while _starts_declaration(tokens):
+        index = tokens.index
         names: list[tree.Name] = []
         try:
             read.append(_declaration(tokens, names))
-        except LostError:
+        except PanicModeError:
             tokens.depth = depth
-            read.append(passed_over(tokens, names))
-        if tokens.at == index:
+            read.append(skip_declaration(tokens, names))
+        if tokens.index == index:
             tokens.take()
     return read
 
 
-def _goes_on(tokens: Tokens) -> bool:
+def _starts_declaration(tokens: TokenStream) -> bool:
     """Whether one more declaration follows, and not BEGIN, a statement or another header."""
-    token, after = tokens.now, tokens.ahead()
+    token, after = tokens.current, tokens.peek()
     if token.kind is TokenKind.KEYWORD:
-        return _reserved(tokens)
+        return _is_reserved_as_name(tokens)
     if token.kind not in (TokenKind.NAME, TokenKind.ARM) or after.key in ("=", ":=", "(", "["):
         return False
     if after.key in (",", ":"):
         return True
-    return not closest(token.text, ["BEGIN", *tokens.words.headers, *tokens.words.statements])
+    return not closest(token.text, ["BEGIN", *tokens.vocabulary.headers, *tokens.vocabulary.statements])
 
 
 # decl = name { "," name } ":" type ";" ;
-def _declaration(tokens: Tokens, names: list[tree.Name]) -> tree.Declaration:
+def _declaration(tokens: TokenStream, names: list[tree.Name]) -> tree.Declaration:
     """Read one declaration; put its names also where they are safe if the rest makes no sense."""
-    start = tokens.now
-    names_of(tokens, names)
+    start = tokens.current
+    name_list(tokens, names)
     kind = type_name(tokens)
-    span = tokens.since(start)
-    _close(tokens)
+    span = tokens.span_since(start)
+    _end_declaration(tokens)
     return tree.Declaration(span, tuple(names), kind)
 
 
 # name { "," name } ":"
-def names_of(tokens: Tokens, names: list[tree.Name]) -> None:
+def name_list(tokens: TokenStream, names: list[tree.Name]) -> None:
     """Read what is declared, up to the type.
 
     Raises:
         LostError: there is no type.
     """
-    _declared(tokens, names)
+    _declared_name(tokens, names)
     while True:
         if tokens.accept(","):
-            if tokens.sees(":"):
-                tokens.report("E111", "expected a name after `,`", tokens.now.span, "found `:`")
+            if tokens.matches(":"):
+                tokens.report("E111", "expected a name after `,`", tokens.current.span, "found `:`")
                 break
-            _declared(tokens, names)
-        elif tokens.now.kind is TokenKind.NAME and tokens.ahead().key in (",", ":"):
-            gap = tokens.gap()
+            _declared_name(tokens, names)
+        elif tokens.current.kind is TokenKind.NAME and tokens.peek().key in (",", ":"):
+            gap = tokens.gap_span()
             tokens.report("E112", "missing `,` between two names", gap, "expected `,` here", fixes=(Fix(gap, ","),))
-            _declared(tokens, names)
+            _declared_name(tokens, names)
         else:
             break
     if not tokens.accept(":"):
-        gap = tokens.gap()
+        gap = tokens.gap_span()
         tokens.report("E112", "missing `:` before the type", gap, "expected `:` and a type here")
-        if not tokens.sees(*tokens.words.types, "ARRAY"):
-            raise LostError
+        if not tokens.matches(*tokens.vocabulary.types, "ARRAY"):
+            raise PanicModeError
 
 
-def _declared(tokens: Tokens, names: list[tree.Name]) -> None:
+def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
     """Read one name; a word that cannot be one is passed over."""
-    token = tokens.now
+    token = tokens.current
     if token.kind is TokenKind.NAME:
         name = tokens.take_name()
-        tokens.check_length(name)
+        tokens.check_name_length(name)
         tokens.declared.add(name.key)
         names.append(name)
     elif token.kind is TokenKind.ARM:
         if not token.damaged:
             tokens.report("E107", f"`{token.text}` is an arm and needs no declaration", token.span, "leave it out")
         tokens.take()
-    elif _reserved(tokens):
+    elif _is_reserved_as_name(tokens):
         # It was meant as a name: a procedure has one parameter less without it, and calls would be wrong too.
-        tokens.refuse_reserved()
+        tokens.report_reserved_name()
         names.append(tokens.take_name())
     else:
-        tokens.lost("expected a name", f"found {shown(token)}")
+        tokens.fail("expected a name", f"found {describe_token(token)}")
 
 
 # type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;
-def type_name(tokens: Tokens) -> tree.TypeName:
+def type_name(tokens: TokenStream) -> tree.TypeName:
     """Read a type.
 
     Raises:
         LostError: there is none.
     """
-    start = tokens.now
-    tokens.offer(*tokens.words.types)
-    sizes = _sizes(tokens) if tokens.accept("ARRAY") else ()
-    token = tokens.now
-    types, offered = tokens.words.types, tokens.offered.types
+    start = tokens.current
+    tokens.note_expected_words(*tokens.vocabulary.types)
+    sizes = _array_sizes(tokens) if tokens.accept("ARRAY") else ()
+    token = tokens.current
+    types, offered = tokens.vocabulary.types, tokens.standard_vocabulary.types
     expected = f"expected {', '.join(offered[:-1])} or {offered[-1]}"
     if tokens.accept(*types):
-        span = tokens.since(start)
+        span = tokens.span_since(start)
         return tree.TypeName(span, tokens.source.slice(span), token.key, sizes)
     if token.kind is not TokenKind.NAME:
-        tokens.lost("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
+        tokens.fail("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
     near = closest(token.text, types)
     tokens.report("E205", f"unknown type `{token.text}`", token.span, expected, advice=did_you_mean(near))
     tokens.take()
-    return tree.TypeName(tokens.since(start), token.text, near, sizes)
+    return tree.TypeName(tokens.span_since(start), token.text, near, sizes)
 
 
-def _sizes(tokens: Tokens) -> tuple[tree.Number, ...]:
+def _array_sizes(tokens: TokenStream) -> tuple[tree.Number, ...]:
     """Read what stands between ARRAY and the type of its elements."""
-    if tokens.sees("OF"):
-        gap = tokens.gap()
-        tokens.say_once("E111", "an array needs its sizes", gap, "expected `[` and a number here")
+    if tokens.matches("OF"):
+        gap = tokens.gap_span()
+        tokens.report_once("E111", "an array needs its sizes", gap, "expected `[` and a number here")
         sizes: tuple[tree.Number, ...] = (tree.Number(gap, "", math.nan),)
     else:
-        sizes = listed(tokens, _size, "a number", "after ARRAY", "[")
-        if tokens.ahead(-2).key == ",":
-            sizes = (*sizes, tree.Number(tokens.gap(), "", math.nan))
+        sizes = parenthesised_list(tokens, _array_size, "a number", "after ARRAY", "[")
+        if tokens.peek(-2).key == ",":
+            sizes = (*sizes, tree.Number(tokens.gap_span(), "", math.nan))
     tokens.expect("OF", "before the type of the elements", statement=True)
-    return sizes or (tree.Number(tokens.gap(), "", math.nan),)
+    return sizes or (tree.Number(tokens.gap_span(), "", math.nan),)
 
 
-def _size(tokens: Tokens, wants: str, where: str) -> tree.Number:
-    if tokens.now.kind is TokenKind.NUMBER:
+def _array_size(tokens: TokenStream, wants: str, where: str) -> tree.Number:
+    if tokens.current.kind is TokenKind.NUMBER:
         return number(tokens)
-    start = tokens.now
+    start = tokens.current
     if start.kind is not TokenKind.NAME and start.key != "-":
-        tokens.lost(f"expected {wants} {where or f'after `{tokens.before.text}`'}", f"found {shown(start)}")
-    tokens.say_once("E111", "the size of an array is a plain number", start.span, "such as `6`")
+        tokens.fail(f"expected {wants} {where or f'after `{tokens.previous.text}`'}", f"found {describe_token(start)}")
+    tokens.report_once("E111", "the size of an array is a plain number", start.span, "such as `6`")
     tokens.take()
     if start.key == "-":
         tokens.take()
-    span = tokens.since(start)
+    span = tokens.span_since(start)
     return tree.Number(span, tokens.source.slice(span), math.nan)
 
 
-def _close(tokens: Tokens) -> None:
+def _end_declaration(tokens: TokenStream) -> None:
     if tokens.accept(";"):
         return
-    gap = tokens.gap()
+    gap = tokens.gap_span()
     text = "missing `;` after the declaration"
-    advice = f"insert `;` after `{tokens.before.text}`"
+    advice = f"insert `;` after `{tokens.previous.text}`"
     tokens.report("E104", text, gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
-    words = tokens.words
-    if not tokens.sees("BEGIN", *words.headers, *words.statements) and tokens.ahead().key not in (",", ":", "="):
-        raise LostError
+    words = tokens.vocabulary
+    if not tokens.matches("BEGIN", *words.headers, *words.statements) and tokens.peek().key not in (",", ":", "="):
+        raise PanicModeError

@@ -6,72 +6,74 @@ from armwright.errors import closest
 from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.language.words import SENSORS
 from armwright.program.syntax import tree
-from armwright.program.syntax.expressions import expression, listed, mobile
+from armwright.program.syntax.expressions import expression, mobile, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.token_stream import Tokens
+from armwright.program.syntax.token_stream import TokenStream
 
 _FRAME = "the name of a FRAME"
 _ARM = "an arm such as ARM_1"
 
 
 # open = "OPEN" arm [ "TO" expr ] ;
-def open_hand(tokens: Tokens) -> tree.Open:
+def open_(tokens: TokenStream) -> tree.Open:
     """Read one OPEN."""
     start = tokens.take()
     arm = mobile(tokens, _ARM, "after OPEN")
     word = tokens.accept("TO")
     width = expression(tokens, "a width", "after TO") if word else None
-    return tree.Open(tokens.since(start), arm, width)
+    return tree.Open(tokens.span_since(start), arm, width)
 
 
 # grasp = "GRASP" [ arm ] ;
-def grasp(tokens: Tokens) -> tree.Grasp:
+def grasp(tokens: TokenStream) -> tree.Grasp:
     """Read one GRASP."""
     start = tokens.take()
-    kind = tokens.now.kind
-    tokens.want(_ARM, "after GRASP")
+    kind = tokens.current.kind
+    tokens.note_expected_operand(_ARM, "after GRASP")
     arm = None
-    near = kind is TokenKind.ARM or (kind is TokenKind.NAME and tokens.same_line())
-    if near and not _starts_another(tokens):
+    near = kind is TokenKind.ARM or (kind is TokenKind.NAME and tokens.is_on_same_line())
+    if near and not _starts_other_statement(tokens):
         arm = mobile(tokens, _ARM, "after GRASP")
-    return tree.Grasp(tokens.since(start), arm)
+    return tree.Grasp(tokens.span_since(start), arm)
 
 
-def _starts_another(tokens: Tokens) -> bool:
-    after = tokens.ahead().key
-    return after in ("=", ":=", "(", "[") or closest(tokens.now.text, ("ELSE", *tokens.waiting[-1])) is not None
+def _starts_other_statement(tokens: TokenStream) -> bool:
+    after = tokens.peek().key
+    return (
+        after in ("=", ":=", "(", "[") or closest(tokens.current.text, ("ELSE", *tokens.open_closers[-1])) is not None
+    )
 
 
 # operate = "OPERATE" name [ "ON" | "OFF" ] ;
-def operate(tokens: Tokens) -> tree.Operate:
+def operate(tokens: TokenStream) -> tree.Operate:
     """Read one OPERATE."""
     start = tokens.take()
     device = mobile(tokens, "the name of a device", "after OPERATE")
     if isinstance(device, tree.Name):
-        tokens.check_length(device)
+        tokens.check_name_length(device)
     word = tokens.accept("ON", "OFF")
-    return tree.Operate(tokens.since(start), device, word is None or word.key == "ON")
+    return tree.Operate(tokens.span_since(start), device, word is None or word.key == "ON")
 
 
 # read = "READ" "VISIONS" "(" lvalue { "," lvalue } ")" | "READ" "SYSTEM" "(" arm ")" ;
-def read(tokens: Tokens) -> tree.ReadVisions | tree.ReadSystem:
+def read(tokens: TokenStream) -> tree.ReadVisions | tree.ReadSystem:
     """Read one READ."""
     start = tokens.take()
-    word = tokens.now
-    tokens.want("a sensor", "after READ")
-    sensor = word.key if tokens.sees_word(*SENSORS) else None
+    word = tokens.current
+    tokens.note_expected_operand("a sensor", "after READ")
+    sensor = word.key if tokens.matches_name(*SENSORS) else None
     if sensor is None and word.kind is TokenKind.NAME:
         sensor = closest(word.text, SENSORS)
         if sensor:
             text = f"unknown statement `READ {word.text}`"
             tokens.report("E105", text, word.span, "expected VISIONS or SYSTEM", advice=did_you_mean(sensor))
     if sensor is None:
-        tokens.lost("READ does not say what to read", "expected VISIONS or SYSTEM")
+        tokens.fail("READ does not say what to read", "expected VISIONS or SYSTEM")
     tokens.take()
     if sensor == "VISIONS":
-        targets = listed(tokens, mobile, _FRAME, "after VISIONS")
-        return tree.ReadVisions(tokens.since(start), targets)
-    arms = listed(tokens, mobile, _ARM, "after SYSTEM")
+        targets = parenthesised_list(tokens, mobile, _FRAME, "after VISIONS")
+        return tree.ReadVisions(tokens.span_since(start), targets)
+    arms = parenthesised_list(tokens, mobile, _ARM, "after SYSTEM")
     if len(arms) > 1:
         tokens.report("E117", "READ SYSTEM reads one arm", arms[1].span, "does not belong here")
-    return tree.ReadSystem(tokens.since(start), arms[0] if arms else tree.Poison(tokens.gap()))
+    return tree.ReadSystem(tokens.span_since(start), arms[0] if arms else tree.Poison(tokens.gap_span()))

@@ -4,7 +4,7 @@ import attrs
 
 
 @attrs.define
-class Expected:
+class ExpectedTokens:
     """What may stand behind the last token of a text; the parser takes note of it where it looks for it.
 
     Attributes:
@@ -19,8 +19,8 @@ class Expected:
 
     words: list[str] = attrs.field(factory=list)
     operand: tuple[str, str] | None = None
-    starts: bool = False
-    recovering: bool = False
-    given: frozenset[str] = frozenset()
-    target: str = ""
-    procedure: str = ""
+    starts_statement: bool = False
+    is_in_recovery: bool = False
+    present_clauses: frozenset[str] = frozenset()
+    assignment_target: str = ""
+    enclosing_procedure: str = ""

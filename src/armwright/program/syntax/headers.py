@@ -7,57 +7,63 @@ from armwright.program.language.diagnostic import Fix, Label, did_you_mean
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import block
-from armwright.program.syntax.declarations import declarations, names_of, passed_over, type_name, var_part
+from armwright.program.syntax.declarations import declarations, name_list, skip_declaration, type_name, var_part
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.token_stream import LostError, Tokens, shown
+from armwright.program.syntax.token_stream import PanicModeError, TokenStream, describe_token
 
 # What other languages call a procedure.
-_PROCEDURES = ("FUNCTION", "PROC", "SUB", "SUBROUTINE", "DEF")
-_BY_REFERENCE = "a procedure returns results in its FRAME, EVENT and ARRAY parameters, or in variables of the program"
+_FOREIGN_PROCEDURE_KEYWORDS = ("FUNCTION", "PROC", "SUB", "SUBROUTINE", "DEF")
+_NOTE_ON_RESULTS = (
+    "a procedure returns results in its FRAME, EVENT and ARRAY parameters, or in variables of the program"
+)
 
 
-def head(tokens: Tokens) -> list[tree.Header]:
+def parse_headers(tokens: TokenStream) -> list[tree.Header]:
     """Read everything up to and including BEGIN; at the end of the text BEGIN may be missing."""
     headers_: list[tree.Header] = []
     while True:
-        _semicolons(tokens)
-        tokens.offer(*tokens.words.headers, "BEGIN", starts=True)
-        token, after = tokens.now, tokens.ahead()
-        if token.kind is TokenKind.KEYWORD and token.key in tokens.words.headers:
-            headers_ += header(tokens)
+        _skip_semicolons(tokens)
+        tokens.note_expected_words(*tokens.vocabulary.headers, "BEGIN", starts_statement=True)
+        token, after = tokens.current, tokens.peek()
+        if token.kind is TokenKind.KEYWORD and token.key in tokens.vocabulary.headers:
+            headers_ += parse_header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
             gap = Span(token.start, token.start)
             tokens.report(
                 "E112", "missing `VAR` before the declarations", gap, "expected `VAR` here", fixes=(Fix(gap, "VAR "),)
             )
             headers_ += declarations(tokens)
-        elif word := _misspelt_header(tokens):
-            _misspelt(tokens, word)
-            headers_ += header(tokens)
-        elif tokens.at < tokens.begin() and not tokens.sees(*tokens.words.statements) and after.key != "=":
-            headers_.append(_nonsense(tokens))
+        elif word := _intended_header(tokens):
+            _replace_misspelt_keyword(tokens, word)
+            headers_ += parse_header(tokens)
+        elif (
+            tokens.index < tokens.next_begin()
+            and not tokens.matches(*tokens.vocabulary.statements)
+            and after.key != "="
+        ):
+            headers_.append(_skip_nonsense(tokens))
         else:
             break
-    _begin(tokens)
+    _accept_begin(tokens)
     return headers_
 
 
-def header(tokens: Tokens) -> Sequence[tree.Header]:
+def parse_header(tokens: TokenStream) -> Sequence[tree.Header]:
     """Read one part of what stands in front of BEGIN; what makes no sense is passed over."""
-    index, level, depth = tokens.at, len(tokens.waiting), tokens.depth
+    index, level, depth = tokens.index, len(tokens.open_closers), tokens.depth
     try:
-        tokens.deep = -1
-        return _HEADERS[tokens.now.key](tokens)
-    except LostError:
-        del tokens.waiting[level:]
+        tokens.overflow_index = -1
+        return _HEADERS[tokens.current.key](tokens)
+    except PanicModeError:
+        del tokens.open_closers[level:]
         tokens.depth = depth
-        passed_over(tokens, [])
-    if tokens.at == index:
+        skip_declaration(tokens, [])
+    if tokens.index == index:
         tokens.take()
     return []
 
 
-def _semicolons(tokens: Tokens) -> None:
+def _skip_semicolons(tokens: TokenStream) -> None:
     """Pass over each ``;`` in front of BEGIN, where there is none to spare."""
     while token := tokens.accept(";"):
         fix = Fix(token.span, "")
@@ -66,239 +72,245 @@ def _semicolons(tokens: Tokens) -> None:
             pass
 
 
-def _misspelt_header(tokens: Tokens) -> str | None:
+def _intended_header(tokens: TokenStream) -> str | None:
     """Return the word that was meant to start a part in front of BEGIN."""
-    token, after = tokens.now, tokens.ahead()
+    token, after = tokens.current, tokens.peek()
     if token.kind is not TokenKind.NAME or after.kind not in (TokenKind.NAME, TokenKind.STRING):
         return None
-    near = "PROCEDURE" if token.key in _PROCEDURES else closest(token.text, (*tokens.words.headers, "BEGIN"))
+    near = (
+        "PROCEDURE"
+        if token.key in _FOREIGN_PROCEDURE_KEYWORDS
+        else closest(token.text, (*tokens.vocabulary.headers, "BEGIN"))
+    )
     return near if near != "BEGIN" and (after.kind is TokenKind.NAME or near == "IMPORT") else None
 
 
-def _misspelt(tokens: Tokens, near: str) -> None:
-    token = tokens.now
+def _replace_misspelt_keyword(tokens: TokenStream, near: str) -> None:
+    token = tokens.current
     tokens.report(
         "E105", f"unknown keyword `{token.text}`", token.span, "not a keyword of RLO", advice=did_you_mean(near)
     )
-    tokens.replace(near)
+    tokens.replace_current(near)
 
 
-def _nonsense(tokens: Tokens) -> tree.Declaration:
+def _skip_nonsense(tokens: TokenStream) -> tree.Declaration:
     """Pass over what is neither a declaration nor BEGIN; the names in it may have been meant to be declared."""
     start = tokens.take()
     if not start.damaged:
-        tokens.report("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
+        tokens.report("E111", "expected `VAR` or `BEGIN`", start.span, f"found {describe_token(start)}")
     names = [tree.Name(start.span, start.text, start.key)] if start.kind is TokenKind.NAME else []
-    return passed_over(tokens, names)
+    return skip_declaration(tokens, names)
 
 
-def _begin(tokens: Tokens) -> None:
-    if tokens.accept("BEGIN") or tokens.done:
+def _accept_begin(tokens: TokenStream) -> None:
+    if tokens.accept("BEGIN") or tokens.is_at_end:
         return
-    if tokens.now.kind is TokenKind.NAME and tokens.ahead().key != "=" and closest(tokens.now.text, ["BEGIN"]):
-        _misspelt(tokens, "BEGIN")
+    if tokens.current.kind is TokenKind.NAME and tokens.peek().key != "=" and closest(tokens.current.text, ["BEGIN"]):
+        _replace_misspelt_keyword(tokens, "BEGIN")
         tokens.take()
         return
-    gap = Span(tokens.now.start, tokens.now.start)
+    gap = Span(tokens.current.start, tokens.current.start)
     fix = Fix(gap, "BEGIN ")
-    tokens.say_once("E115", "missing `BEGIN` before the first statement", gap, "expected `BEGIN` here", fixes=(fix,))
+    tokens.report_once("E115", "missing `BEGIN` before the first statement", gap, "expected `BEGIN` here", fixes=(fix,))
 
 
 # import = "IMPORT" string ";" ;
-def _import(tokens: Tokens) -> list[tree.Header]:
+def _import(tokens: TokenStream) -> list[tree.Header]:
     start = tokens.take()
-    token = tokens.now
+    token = tokens.current
     if token.kind is not TokenKind.STRING:
         advice = 'write `IMPORT "cell.json" ;`'
-        tokens.lost("expected the name of a file after IMPORT", f"found {shown(token)}", advice=advice)
+        tokens.fail("expected the name of a file after IMPORT", f"found {describe_token(token)}", advice=advice)
     tokens.take()
     path = tree.String(token.span, token.text[1:-1])
-    span = tokens.since(start)
-    _semicolon(tokens, "after the import")
+    span = tokens.span_since(start)
+    _end_header(tokens, "after the import")
     return [tree.Import(span, path)]
 
 
 # units = "UNITS" unitname { "," unitname } ";" ;
-def _units(tokens: Tokens) -> list[tree.Header]:
+def _units(tokens: TokenStream) -> list[tree.Header]:
     start = tokens.take()
-    tokens.want("a unit")
+    tokens.note_expected_operand("a unit")
     units = [_unit(tokens)]
-    while tokens.now.key == "," or (tokens.now.kind is TokenKind.NAME and tokens.ahead().key in (",", ";")):
+    while tokens.current.key == "," or (tokens.current.kind is TokenKind.NAME and tokens.peek().key in (",", ";")):
         if not tokens.accept(","):
-            tokens.insert(",", "between two units")
-        tokens.want("a unit")
+            tokens.insert_missing(",", "between two units")
+        tokens.note_expected_operand("a unit")
         units.append(_unit(tokens))
-    span = tokens.since(start)
-    _semicolon(tokens, "after the units")
+    span = tokens.span_since(start)
+    _end_header(tokens, "after the units")
     return [tree.Units(span, tuple(units))]
 
 
-def _unit(tokens: Tokens) -> tree.Name:
-    token = tokens.now
+def _unit(tokens: TokenStream) -> tree.Name:
+    token = tokens.current
     if token.kind is not TokenKind.NAME:
         advice = "write `UNITS MM, DEG ;`"
-        tokens.lost(f"expected a unit after `{tokens.before.text}`", f"found {shown(token)}", advice=advice)
+        tokens.fail(f"expected a unit after `{tokens.previous.text}`", f"found {describe_token(token)}", advice=advice)
     return tokens.take_name()
 
 
 # procedure = "PROCEDURE" name [ "(" param { "," param } ")" ] ";" [ var_part ] block ";" ;
-def _procedure(tokens: Tokens) -> list[tree.Header]:
+def _procedure(tokens: TokenStream) -> list[tree.Header]:
     start = tokens.take()
-    name = _own_name(tokens)
+    name = _procedure_name(tokens)
     tokens.procedures.add(name.key)
-    parameters = _parameters(tokens) if tokens.sees("(") else []
-    above = tokens.since(start)
-    _no_result(tokens)
-    _semicolon(tokens, "after the head of the procedure")
-    tokens.offer("VAR", "BEGIN", starts=True)
-    own = var_part(tokens) if tokens.sees("VAR") else []
-    while tokens.sees("VAR"):
-        again = tokens.now
+    parameters = _parameters(tokens) if tokens.matches("(") else []
+    above = tokens.span_since(start)
+    _skip_result_type(tokens)
+    _end_header(tokens, "after the head of the procedure")
+    tokens.note_expected_words("VAR", "BEGIN", starts_statement=True)
+    own = var_part(tokens) if tokens.matches("VAR") else []
+    while tokens.matches("VAR"):
+        again = tokens.current
         fix = Fix(again.span, "")
         tokens.report("E118", "a procedure has one VAR part", again.span, "remove this word", fixes=(fix,))
         own += var_part(tokens)
-    tokens.offer("BEGIN", starts=True)
-    body = _body(tokens, above, name)
-    procedure = tree.Procedure(tokens.since(start), above, name, tuple(parameters), tuple(own), body)
-    if tokens.sees("END") and tokens.ahead().key != ".":
-        tokens.say_once("E127", "`END` without BEGIN", tokens.now.span, "the procedure has ended before")
+    tokens.note_expected_words("BEGIN", starts_statement=True)
+    body = _procedure_body(tokens, above, name)
+    procedure = tree.Procedure(tokens.span_since(start), above, name, tuple(parameters), tuple(own), body)
+    if tokens.matches("END") and tokens.peek().key != ".":
+        tokens.report_once("E127", "`END` without BEGIN", tokens.current.span, "the procedure has ended before")
         tokens.take()
-    if tokens.sees("."):
-        fix = Fix(tokens.now.span, ";")
-        tokens.say_once("E104", "a procedure ends with `;`", tokens.now.span, "write `;`", fixes=(fix,))
+    if tokens.matches("."):
+        fix = Fix(tokens.current.span, ";")
+        tokens.report_once("E104", "a procedure ends with `;`", tokens.current.span, "write `;`", fixes=(fix,))
         tokens.take()
     else:
-        _semicolon(tokens, "after the procedure")
+        _end_header(tokens, "after the procedure")
     return [procedure]
 
 
-def _own_name(tokens: Tokens) -> tree.Name:
-    token = tokens.now
-    if token.kind is TokenKind.KEYWORD and tokens.ahead().key in ("(", ";"):
-        tokens.refuse_reserved()
+def _procedure_name(tokens: TokenStream) -> tree.Name:
+    token = tokens.current
+    if token.kind is TokenKind.KEYWORD and tokens.peek().key in ("(", ";"):
+        tokens.report_reserved_name()
     elif token.key in ("(", ";"):
-        gap = tokens.gap()
-        tokens.say_once("E111", "expected the name of the procedure", gap, f"found {shown(token)}")
+        gap = tokens.gap_span()
+        tokens.report_once("E111", "expected the name of the procedure", gap, f"found {describe_token(token)}")
         return tree.Name(gap, "", "")
     elif token.kind is not TokenKind.NAME:
-        tokens.lost("expected the name of the procedure", f"found {shown(token)}")
+        tokens.fail("expected the name of the procedure", f"found {describe_token(token)}")
     name = tokens.take_name()
-    tokens.check_length(name)
+    tokens.check_name_length(name)
     return name
 
 
 # param = name { "," name } ":" type ;
-def _parameters(tokens: Tokens) -> list[tree.Declaration]:
+def _parameters(tokens: TokenStream) -> list[tree.Declaration]:
     opening, depth = tokens.take(), tokens.depth
     parameters: list[tree.Declaration] = []
-    if tokens.sees(")"):
-        fix = Fix(opening.span.to(tokens.now.span), "")
+    if tokens.matches(")"):
+        fix = Fix(opening.span.to(tokens.current.span), "")
         text = "a procedure without parameters is declared without `( )`"
-        tokens.say_once("E111", text, tokens.now.span, "there is nothing in between", fixes=(fix,))
+        tokens.report_once("E111", text, tokens.current.span, "there is nothing in between", fixes=(fix,))
         tokens.take()
         return parameters
     while True:
-        start = tokens.now
-        if tokens.sees("VAR"):
+        start = tokens.current
+        if tokens.matches("VAR"):
             text = "a parameter has no VAR in front"
-            tokens.say_once("E117", text, start.span, "leave it out", note=_BY_REFERENCE)
+            tokens.report_once("E117", text, start.span, "leave it out", note=_NOTE_ON_RESULTS)
             tokens.take()
         names: list[tree.Name] = []
         try:
-            names_of(tokens, names)
+            name_list(tokens, names)
             kind = type_name(tokens)
-        except LostError:
+        except PanicModeError:
             tokens.depth = depth
-            while not tokens.done and not tokens.sees(")", ";", "BEGIN", *tokens.words.headers):
+            while not tokens.is_at_end and not tokens.matches(")", ";", "BEGIN", *tokens.vocabulary.headers):
                 tokens.take()
-            kind = tree.TypeName(tokens.since(start), "", None)
-        parameters.append(tree.Declaration(tokens.since(start), tuple(names), kind))
-        if not _another(tokens):
+            kind = tree.TypeName(tokens.span_since(start), "", None)
+        parameters.append(tree.Declaration(tokens.span_since(start), tuple(names), kind))
+        if not _parameter_separator(tokens):
             break
     if not tokens.accept(")"):
-        tokens.insert(")", "after the parameters")
+        tokens.insert_missing(")", "after the parameters")
     return parameters
 
 
-def _no_result(tokens: Tokens) -> None:
+def _skip_result_type(tokens: TokenStream) -> None:
     """Pass over the type of what a procedure was meant to give back."""
-    if not tokens.sees(":"):
+    if not tokens.matches(":"):
         return
     start = tokens.take()
-    while not tokens.done and not tokens.sees(";", "VAR", "BEGIN"):
+    while not tokens.is_at_end and not tokens.matches(";", "VAR", "BEGIN"):
         tokens.take()
-    tokens.say_once("E117", "a procedure returns no value", tokens.since(start), "leave this out", note=_BY_REFERENCE)
+    tokens.report_once(
+        "E117", "a procedure returns no value", tokens.span_since(start), "leave this out", note=_NOTE_ON_RESULTS
+    )
 
 
-def _another(tokens: Tokens) -> bool:
+def _parameter_separator(tokens: TokenStream) -> bool:
     """Whether one more parameter follows."""
     if tokens.accept(","):
         return True
-    token = tokens.now
-    if token.key == ";" and tokens.ahead().kind is TokenKind.NAME and tokens.ahead(2).key in (",", ":"):
+    token = tokens.current
+    if token.key == ";" and tokens.peek().kind is TokenKind.NAME and tokens.peek(2).key in (",", ":"):
         fix = Fix(token.span, ",")
-        tokens.say_once("E112", "expected `,` between two parameters", token.span, "write `,`", fixes=(fix,))
+        tokens.report_once("E112", "expected `,` between two parameters", token.span, "write `,`", fixes=(fix,))
         tokens.take()
         return True
-    if token.kind is TokenKind.NAME and tokens.ahead().key in (",", ":"):
-        tokens.insert(",", "between two parameters")
+    if token.kind is TokenKind.NAME and tokens.peek().key in (",", ":"):
+        tokens.insert_missing(",", "between two parameters")
         return True
     return False
 
 
-def _body(tokens: Tokens, above: Span, name: tree.Name) -> tree.Block:
+def _procedure_body(tokens: TokenStream, above: Span, name: tree.Name) -> tree.Block:
     """Read the statements of a procedure, also where BEGIN or END is missing."""
-    token = tokens.now
+    token = tokens.current
     if token.kind is TokenKind.NAME and token.key not in tokens.declared and closest(token.text, ("BEGIN",)):
-        _misspelt(tokens, "BEGIN")
-    elif not tokens.sees("BEGIN"):
-        gap = tokens.gap()
+        _replace_misspelt_keyword(tokens, "BEGIN")
+    elif not tokens.matches("BEGIN"):
+        gap = tokens.gap_span()
         fix = Fix(Span(token.start, token.start), "BEGIN ")
-        fixes = (fix,) if token.kind is TokenKind.NAME or tokens.sees(*tokens.words.statements) else ()
-        tokens.say_once("E115", "the procedure has no BEGIN", gap, "expected `BEGIN` here", fixes=fixes)
+        fixes = (fix,) if token.kind is TokenKind.NAME or tokens.matches(*tokens.vocabulary.statements) else ()
+        tokens.report_once("E115", "the procedure has no BEGIN", gap, "expected `BEGIN` here", fixes=fixes)
         if not fixes:
             return tree.Block(gap, (), gap)
-    tokens.in_procedure = name.key or "?"
+    tokens.enclosing_procedure = name.key or "?"
     body = block(tokens)
-    tokens.in_procedure = ""
-    return _without_main(tokens, above, body)
+    tokens.enclosing_procedure = ""
+    return _restore_main_program(tokens, above, body)
 
 
-def _without_main(tokens: Tokens, above: Span, body: tree.Block) -> tree.Block:
+def _restore_main_program(tokens: TokenStream, above: Span, body: tree.Block) -> tree.Block:
     """Give back the statements of the program itself, which a procedure without END has swallowed."""
     last = body.statements[-1] if body.statements else None
     open_ended = isinstance(last, tree.Block) and last.end.start == last.end.end
-    if not open_ended or last is None or body.end.start != body.end.end or not tokens.sees("END"):
+    if not open_ended or last is None or body.end.start != body.end.end or not tokens.matches("END"):
         return body
-    tokens.back_to(last.span.start)
+    tokens.rewind_to_offset(last.span.start)
     tokens.diagnostics[:] = [diagnostic for diagnostic in tokens.diagnostics if diagnostic.span.start < last.span.start]
-    gap = tokens.gap()
+    gap = tokens.gap_span()
     label = Label(above, "this procedure")
-    tokens.say_once("E115", "the procedure has no END", gap, "expected `END ;` here", secondary=(label,))
-    tokens.hush()
-    return tree.Block(tokens.since(body.span), body.statements[:-1], gap)
+    tokens.report_once("E115", "the procedure has no END", gap, "expected `END ;` here", secondary=(label,))
+    tokens.suppress_reports()
+    return tree.Block(tokens.span_since(body.span), body.statements[:-1], gap)
 
 
-def _semicolon(tokens: Tokens, where: str) -> None:
+def _end_header(tokens: TokenStream, where: str) -> None:
     if tokens.accept(";"):
         return
-    gap = tokens.gap()
-    advice = f"insert `;` after `{tokens.before.text}`"
-    tokens.say_once("E104", f"missing `;` {where}", gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
+    gap = tokens.gap_span()
+    advice = f"insert `;` after `{tokens.previous.text}`"
+    tokens.report_once("E104", f"missing `;` {where}", gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
 
 
-def late(tokens: Tokens) -> tree.Statement:
+def late_header(tokens: TokenStream) -> tree.Statement:
     """Read a part that belongs in front of BEGIN, and keep what it declares."""
-    word = tokens.now
+    word = tokens.current
     what = "declarations belong" if word.key == "VAR" else "it belongs"
     tokens.report("E118", f"{word.text} after BEGIN", word.span, f"{what} before BEGIN")
-    tokens.late += header(tokens)
+    tokens.late_headers += parse_header(tokens)
     # It has its own ``;``.
-    tokens.hush()
+    tokens.suppress_reports()
     return tree.Poison(word.span)
 
 
-_HEADERS: Mapping[str, Callable[[Tokens], Sequence[tree.Header]]] = {
+_HEADERS: Mapping[str, Callable[[TokenStream], Sequence[tree.Header]]] = {
     "VAR": var_part,
     "IMPORT": _import,
     "UNITS": _units,

@@ -55,7 +55,7 @@ class Token:
 
 
 @attrs.frozen(kw_only=True)
-class Scanned:
+class ScannedText:
     """What became of the characters of a text.
 
     Attributes:
@@ -88,17 +88,17 @@ _PATTERN = re.compile(
     """,
     re.VERBOSE | re.DOTALL,
 )
-_WORD, _SYMBOL, _NUMBER, _COMMENT, _STRING, _ODD_NUMBER, _OPEN, _STRAY = range(1, 9)
+_WORD, _SYMBOL, _NUMBER, _COMMENT, _STRING, _MALFORMED_NUMBER, _COMMENT_OPENER, _STRAY_CHARACTER = range(1, 9)
 
 _ARM = re.compile(r"ARM[-_]([0-9]+)(?!\w)", re.IGNORECASE)
-_NO_ARM = re.compile(r"ARM(?:[ \t]*[-_][ \t]*|[ \t]+)[0-9]+(?!\w)|ARM(?!\w)", re.IGNORECASE)
+_MISSPELT_ARM = re.compile(r"ARM(?:[ \t]*[-_][ \t]*|[ \t]+)[0-9]+(?!\w)|ARM(?!\w)", re.IGNORECASE)
 _WITH_UNIT = re.compile(rf"({_DIGITS}){_UNIT}", re.VERBOSE)
 # Where a text that is not closed may have been meant to end.
-_AFTER_TEXT = re.compile(r"[ \t]*\)?[ \t]*;?[ \t]*\Z")
+_AFTER_STRING = re.compile(r"[ \t]*\)?[ \t]*;?[ \t]*\Z")
 
 # Characters of other keyboards that stand for one of the language; each takes one pose, like the one it stands for.
 # Those of `"` and `}` are none: they may stand in a text or a comment without ending it.
-LOOK_ALIKES = {0xFF01 + i: chr(0x21 + i) for i in range(94) if chr(0x21 + i) not in '"}'} | {
+CONFUSABLES = {0xFF01 + i: chr(0x21 + i) for i in range(94) if chr(0x21 + i) not in '"}'} | {
     ord(other): meant
     for meant, others in {
         " ": "\u00a0\u3000\u2002\u2003\u2009\u202f",
@@ -119,18 +119,18 @@ _HINTS = {
     "}": "no comment is open here",
 }
 # A text between the quotation marks of other languages, and of programs that set them by themselves.
-_TEXT_ELSEWHERE = re.compile(
+_FOREIGN_STRING = re.compile(
     '[\u201c\u201d\u201e\uff02\u00ab][^"\u201c\u201d\u201e\uff02\u00bb\r\n]*["\u201c\u201d\uff02\u00bb]'
     "|(?<!\\w)['`\u2018][^\"'`\u2019\r\n]*['`\u2019]"
 )
 # What means nothing, neither here nor in other languages.
-_NONSENSE = re.compile(
-    rf"""[^\w\s;,()=:\[\]+*<>./{{"'`#!&|\u2018\u201c\u201d\u201e\u00ab\uff02{"".join(map(chr, LOOK_ALIKES))}-]+"""
+_MEANINGLESS = re.compile(
+    rf"""[^\w\s;,()=:\[\]+*<>./{{"'`#!&|\u2018\u201c\u201d\u201e\u00ab\uff02{"".join(map(chr, CONFUSABLES))}-]+"""
 )
-_COMMENT_ELSEWHERE = re.compile(r"[#!](?=[ \t#!])[^\r\n]*")
+_FOREIGN_COMMENT = re.compile(r"[#!](?=[ \t#!])[^\r\n]*")
 
 
-def scan(source: Source, text: str, standard: Standard = Standard.RLO_2) -> Scanned:
+def scan(source: Source, text: str, standard: Standard = Standard.RLO_2) -> ScannedText:
     """Cut a text into tokens.
 
     Args:
@@ -138,19 +138,19 @@ def scan(source: Source, text: str, standard: Standard = Standard.RLO_2) -> Scan
         text: the same, as long, with line numbers blanked out.
         standard: which words are reserved.
     """
-    return _Scanner(source, text, standard).run()
+    return _Scanner(source, text, standard).scan()
 
 
 class _Scanner:
     """One pass over a text."""
 
     def __init__(self, source: Source, text: str, standard: Standard) -> None:
-        self._written = source.text
-        self._text = text if text.isascii() else text.translate(LOOK_ALIKES)
+        self._source_text = source.text
+        self._text = text if text.isascii() else text.translate(CONFUSABLES)
         # A look-alike inside a comment is nobody's business, so they are looked for token by token.
-        self._foreign = not text.isascii()
+        self._has_confusables = not text.isascii()
         self._reserved = VOCABULARIES[standard].reserved
-        self._most = limit("words")
+        self._max_tokens = limit("words")
         self._unclosed = False
         # Most words of a program stand there more than once: what they are is found out the first time.
         self._known: dict[str, tuple[TokenKind, str]] = {}
@@ -162,92 +162,94 @@ class _Scanner:
         self._strays: dict[str, list[Span]] = {}
         self._counts: Counter[str] = Counter()
         # By the number of tokens in front of such characters, where the last of them ends.
-        self._behind: dict[int, int] = {}
-        self._refused: set[str] = set()
+        self._stray_ends: dict[int, int] = {}
+        self._reported_names: set[str] = set()
 
-    def run(self) -> Scanned:
+    def scan(self) -> ScannedText:
         # Blanks at the end would be tried in vain from each of them.
         position, last = 0, len(self._text.rstrip(_BLANKS))
         while position < last:
-            position = self._stretch(position, last)
+            position = self._scan_tokens(position, last)
         end = len(self._text)
         self._tokens.append(Token(TokenKind.END, "", "", end, end, damaged=self._unclosed))
         for character, spans in self._strays.items():
             self._report_stray(character, spans, max(len(spans), self._counts[character]))
-        self._hush()
-        return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), diagnostics=tuple(self._diagnostics))
+        self._mark_damaged()
+        return ScannedText(
+            tokens=tuple(self._tokens), comments=tuple(self._comments), diagnostics=tuple(self._diagnostics)
+        )
 
-    def _stretch(self, position: int, last: int) -> int:
+    def _scan_tokens(self, position: int, last: int) -> int:
         """Read tokens one behind the other; return where the text goes on behind one that needs a closer look."""
-        known, tokens, foreign, most = self._known, self._tokens, self._foreign, self._most
+        known, tokens, has_confusables, max_tokens = self._known, self._tokens, self._has_confusables, self._max_tokens
         add = tokens.append
         for match in _PATTERN.finditer(self._text, position, last):
-            what = match.lastindex or _STRAY
+            what = match.lastindex or _STRAY_CHARACTER
             word = match[what]
             start, end = match.span(what)
-            if len(tokens) >= most:
-                return self._too_long(start, end, last)
-            if foreign:
+            if len(tokens) >= max_tokens:
+                return self._report_too_long(start, end, last)
+            if has_confusables:
                 # Of a comment only the blanks in front, of a text only its marks.
                 inside = what in (_COMMENT, _STRING)
-                self._look_alikes(match.start(), start + (what == _STRING) if inside else end)
+                self._note_confusables(match.start(), start + (what == _STRING) if inside else end)
             if (plain := known.get(word)) is not None:
                 add(Token(plain[0], word, plain[1], start, end))
                 continue
-            behind = self._closer_look(what, word, start, end)
-            if behind != end:
-                return behind
+            resume = self._scan_new_word(what, word, start, end)
+            if resume != end:
+                return resume
         return last
 
-    def _too_long(self, start: int, end: int, last: int) -> int:
+    def _report_too_long(self, start: int, end: int, last: int) -> int:
         """Say that the text has too many words; what follows is passed over."""
         # Nothing is said of the end that is not read.
         self._unclosed = True
         self._report("E119", f"the program is too long: {limit_message('words')}", Span(start, end), "read up to here")
         return last
 
-    def _closer_look(self, what: int, word: str, start: int, end: int) -> int:
+    def _scan_new_word(self, what: int, word: str, start: int, end: int) -> int:
         """Make a token of a word seen for the first time; return where the text goes on."""
         if what == _COMMENT:
             self._comments.append(Span(start, end))
             return end
-        if what == _OPEN:
-            return self._comment(word, start)
-        if what == _STRAY:
-            return self._stray(start, end)
+        if what == _COMMENT_OPENER:
+            return self._scan_comment(word, start)
+        if what == _STRAY_CHARACTER:
+            return self._scan_stray_character(start, end)
         if what == _STRING:
-            token = self._string(start, end)
+            token = self._scan_string(start, end)
         elif what == _WORD:
-            token = self._word(word, start, end)
+            token = self._scan_word(word, start, end)
         elif what == _SYMBOL:
             token = Token(TokenKind.SYMBOL, word, word, start, end)
         else:
-            token = self._number(word, start, end, odd=what == _ODD_NUMBER)
+            token = self._scan_number(word, start, end, malformed=what == _MALFORMED_NUMBER)
         self._tokens.append(token)
         if not token.damaged and token.text == word and what != _STRING:
             self._known[word] = token.kind, token.key
         return token.end
 
-    def _word(self, word: str, start: int, end: int) -> Token:
+    def _scan_word(self, word: str, start: int, end: int) -> Token:
         key = word.upper()
         if key.startswith("ARM"):
             if match := _ARM.match(self._text, start):
                 return Token(TokenKind.ARM, match[0], arm_name(match[1]), start, match.end())
-            if match := _NO_ARM.match(self._text, start):
-                return self._no_arm(match[0], start, match.end())
+            if match := _MISSPELT_ARM.match(self._text, start):
+                return self._scan_misspelt_arm(match[0], start, match.end())
         if word.isascii():
             return Token(TokenKind.KEYWORD if key in self._reserved else TokenKind.NAME, word, key, start, end)
-        if key not in self._refused:
-            self._refused.add(key)
-            odd = next(character for character in word if not character.isascii())
+        if key not in self._reported_names:
+            self._reported_names.add(key)
+            foreign = next(character for character in word if not character.isascii())
             label = "names are made of the letters A to Z, digits and `_`"
-            self._report("E101", f"a name cannot contain `{odd}`", Span(start, end), label)
+            self._report("E101", f"a name cannot contain `{foreign}`", Span(start, end), label)
         return Token(TokenKind.NAME, word, key, start, end, damaged=True)
 
-    def _number(self, word: str, start: int, end: int, *, odd: bool) -> Token:
+    def _scan_number(self, word: str, start: int, end: int, *, malformed: bool) -> Token:
         match = _WITH_UNIT.fullmatch(word)
         digits = match[1] if match else word
-        if (match or not odd) and math.isfinite(float(digits)):
+        if (match or not malformed) and math.isfinite(float(digits)):
             return Token(TokenKind.NUMBER, word, digits, start, end)
         why = "too large" if _is_number(digits) else "not a number"
         advice, fixes, span = "", tuple[Fix, ...](), Span(start, end)
@@ -257,16 +259,16 @@ class _Scanner:
         self._report("E113", f"`{word}` is not a number of RLO", span, why, advice=advice, fixes=fixes)
         return Token(TokenKind.NUMBER, word, "0", start, end, damaged=True)
 
-    def _string(self, start: int, end: int) -> Token:
-        written = self._written[start:end]
+    def _scan_string(self, start: int, end: int) -> Token:
+        written = self._source_text[start:end]
         if len(written) > 1 and self._text[end - 1] == '"':
             return Token(TokenKind.STRING, written, written, start, end)
-        match = _AFTER_TEXT.search(self._text, start + 1, end)
+        match = _AFTER_STRING.search(self._text, start + 1, end)
         end = match.start() if match else end
         self._report("E120", "this text is not closed", Span(start, end), "opened here", advice='close it with `"`')
-        return Token(TokenKind.STRING, f'{self._written[start:end]}"', '"', start, end, damaged=True)
+        return Token(TokenKind.STRING, f'{self._source_text[start:end]}"', '"', start, end, damaged=True)
 
-    def _no_arm(self, word: str, start: int, end: int) -> Token:
+    def _scan_misspelt_arm(self, word: str, start: int, end: int) -> Token:
         digits = word[3:].strip(" \t-_")
         key = arm_name(digits or "1")
         message, label = (
@@ -278,7 +280,7 @@ class _Scanner:
         self._report("E106", message, Span(start, end), label, advice=f"write `{key}`", fixes=fixes)
         return Token(TokenKind.ARM, word, key, start, end, damaged=True)
 
-    def _comment(self, opening: str, start: int) -> int:
+    def _scan_comment(self, opening: str, start: int) -> int:
         """Say what is wrong with a comment; return where the text goes on."""
         closing = "}" if opening == "{" else opening[::-1].replace("(", ")")
         end = self._text.find(closing, start + len(opening))
@@ -293,19 +295,19 @@ class _Scanner:
         self._comments.append(Span(start, end + 2))
         return end + 2
 
-    def _stray(self, start: int, end: int) -> int:
+    def _scan_stray_character(self, start: int, end: int) -> int:
         """Take note of a character that does not belong to the language; return where the text goes on."""
-        if run := _NONSENSE.match(self._written, start):
-            self._count(run[0], start)
+        if run := _MEANINGLESS.match(self._source_text, start):
+            self._count_strays(run[0], start)
             return run.end()
-        text = _TEXT_ELSEWHERE.match(self._written, start)
+        text = _FOREIGN_STRING.match(self._source_text, start)
         if text is None:
-            character = self._written[start]
-            if ord(character) in LOOK_ALIKES:
+            character = self._source_text[start]
+            if ord(character) in CONFUSABLES:
                 self._strays.setdefault(character, []).append(Span(start, end))
             else:
-                self._count(character, start)
-            comment = _COMMENT_ELSEWHERE.match(self._written, start)
+                self._count_strays(character, start)
+            comment = _FOREIGN_COMMENT.match(self._source_text, start)
             return comment.end() if comment else end
         first, last = Span(start, start + 1), Span(text.end() - 1, text.end())
         fixes = (Fix(first, '"'), *([Fix(last, '"')] if text[0][-1] != '"' else []))
@@ -315,7 +317,7 @@ class _Scanner:
 
     def _report_stray(self, character: str, spans: list[Span], count: int) -> None:
         """Say once what a character is that does not belong to the language, and in how many places it stands."""
-        meant = LOOK_ALIKES.get(ord(character))
+        meant = CONFUSABLES.get(ord(character))
         shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
         text = f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs")
         note = f"it occurs in {count} places" if count > 1 else ""
@@ -325,27 +327,27 @@ class _Scanner:
         name, fixes = "a blank" if meant == " " else f"`{meant}`", tuple(Fix(span, meant) for span in spans)
         self._report("E101", text, spans[0], f"looks like {name}", note=note, advice=f"write {name}", fixes=fixes)
 
-    def _count(self, characters: str, start: int) -> None:
+    def _count_strays(self, characters: str, start: int) -> None:
         """Count characters that mean nothing."""
         self._counts.update(characters)
         for character in set(characters) - self._strays.keys():
             first = start + characters.index(character)
             self._strays[character] = [Span(first, first + 1)]
-        self._behind[len(self._tokens)] = start + len(characters)
+        self._stray_ends[len(self._tokens)] = start + len(characters)
 
-    def _hush(self) -> None:
+    def _mark_damaged(self) -> None:
         """Take what stands behind such a character, in its line, for something that has been told of."""
-        for index, end in self._behind.items():
+        for index, end in self._stray_ends.items():
             token = self._tokens[index]
-            token.damaged |= self._written.find("\n", end, token.start) < 0
+            token.damaged |= self._source_text.find("\n", end, token.start) < 0
 
-    def _look_alikes(self, start: int, end: int) -> None:
-        if self._written[start:end] == self._text[start:end]:
+    def _note_confusables(self, start: int, end: int) -> None:
+        if self._source_text[start:end] == self._text[start:end]:
             return
         for index in range(start, end):
             # Line numbers have been blanked out and are no look-alikes.
-            if ord(self._written[index]) in LOOK_ALIKES:
-                self._strays.setdefault(self._written[index], []).append(Span(index, index + 1))
+            if ord(self._source_text[index]) in CONFUSABLES:
+                self._strays.setdefault(self._source_text[index], []).append(Span(index, index + 1))
 
 
 def _is_number(word: str) -> bool:

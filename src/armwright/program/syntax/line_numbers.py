@@ -11,7 +11,7 @@ _CONTENT = re.compile(r"[ \t]*([^ \t\r\n])")
 _CONTINUED = re.compile(r"[ \t]*[,;)]")
 
 
-def without_numbers(source: Source) -> tuple[str, list[Diagnostic]]:
+def blank_line_numbers(source: Source) -> tuple[str, list[Diagnostic]]:
     """Return the text with every line number blanked out, and what is odd about the numbers.
 
     A text is numbered when its first line that is not blank starts with digits and a blank. Blanks take the pose

@@ -8,16 +8,16 @@ from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, did_you_mean
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
-from armwright.program.syntax.control_flow import part
-from armwright.program.syntax.expressions import expression, listed, mobile
-from armwright.program.syntax.frames import equals
+from armwright.program.syntax.control_flow import head_expression
+from armwright.program.syntax.expressions import expression, mobile, parenthesised_list
+from armwright.program.syntax.frames import expect_equals
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.statement_list import nested
-from armwright.program.syntax.token_stream import Tokens, shown
+from armwright.program.syntax.statement_list import nested_statement
+from armwright.program.syntax.token_stream import TokenStream, describe_token
 
 _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Print, tree.Poison)
 _ACTION_WORDS = ("HALT", "SIGNAL", "PRINT", "BEGIN")
-_VALUES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
+_VALUED_CLAUSES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
     "APPROACH": tree.Approach,
     "DEPARTURE": tree.Departure,
     "SPEED": tree.Speed,
@@ -27,70 +27,70 @@ _VALUES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
 
 
 # move = "MOVE" mobile "TO" expr { [","] clause } ;
-def move(tokens: Tokens) -> tree.Move:
+def move(tokens: TokenStream) -> tree.Move:
     """Read one MOVE."""
     start = tokens.take()
     moved = mobile(tokens, "the name of a FRAME or an arm", "after MOVE")
     tokens.expect("TO", "after what is moved")
     goal = expression(tokens, "a pose", "after TO")
     clauses: list[tree.Clause] = []
-    while tokens.now.key != ";":
+    while tokens.current.key != ";":
         comma = tokens.accept(",")
-        if tokens.done:
-            words = (f"WITH {word}" for word in tokens.words.with_clauses)
-            tokens.offer(*tokens.words.plain_clauses, *words, given=_words(clauses))
+        if tokens.is_at_end:
+            words = (f"WITH {word}" for word in tokens.vocabulary.with_clauses)
+            tokens.note_expected_words(*tokens.vocabulary.plain_clauses, *words, present_clauses=_clause_words(clauses))
         if not _starts_clause(tokens):
             if comma:
-                tokens.lost("expected a clause after `,`", f"found {shown(tokens.now)}")
+                tokens.fail("expected a clause after `,`", f"found {describe_token(tokens.current)}")
             break
         if (clause := _clause(tokens, clauses)) is not None:
             clauses.append(clause)
-    return tree.Move(tokens.since(start), moved, goal, tuple(clauses))
+    return tree.Move(tokens.span_since(start), moved, goal, tuple(clauses))
 
 
-def _words(clauses: list[tree.Clause]) -> frozenset[str]:
+def _clause_words(clauses: list[tree.Clause]) -> frozenset[str]:
     """Return the words by which clauses begin, behind WITH."""
     return frozenset(tree.clause_word(type(clause)) for clause in clauses)
 
 
-def _starts_clause(tokens: Tokens) -> bool:
+def _starts_clause(tokens: TokenStream) -> bool:
     """Whether a clause stands here, rightly or wrongly spelt, and not the next statement."""
-    token, after = tokens.now, tokens.ahead()
-    words = tokens.words
+    token, after = tokens.current, tokens.peek()
+    words = tokens.vocabulary
     if token.kind is TokenKind.KEYWORD:
         return token.key in words.clauses
     if token.kind is not TokenKind.NAME:
         return False
     if after.key in ("=", ":=", "(", "["):
         # WITH may be missing in front of a misspelt word: `, SPED = 5`.
-        return tokens.before.key == "," and closest(token.text, words.with_clauses) is not None
-    if token.key in tokens.declared and tokens.before.key != ",":
+        return tokens.previous.key == "," and closest(token.text, words.with_clauses) is not None
+    if token.key in tokens.declared and tokens.previous.key != ",":
         return False
     if closest(token.text, words.clauses):
         return True
-    return tokens.same_line() and not closest(token.text, (*words.statements, *words.closing))
+    return tokens.is_on_same_line() and not closest(token.text, (*words.statements, *words.block_ends))
 
 
 # clause = "DIRECTLY" | "STRAIGHTLY"
 #        | "VIA" "(" expr { "," expr } ")"
 #        | "WITH" ( "APPROACH" | "DEPARTURE" | "SPEED" | "BLEND" | "DURATION" ) "=" expr
 #        | "ON" expr "DO" action ;
-def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
+def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | None:
     """Read one clause behind others; None when it has been reported and passed over."""
-    token = tokens.now
+    token = tokens.current
     if token.kind is TokenKind.NAME:
-        if not _meant(tokens, token):
-            _pass_over(tokens)
+        if not _replace_misspelt_clause(tokens, token):
+            _skip_clause(tokens)
             return None
-        token = tokens.now
+        token = tokens.current
     key = token.key
     if key == "ON":
         return _guard(tokens)
     tokens.take()
     if key == "WITH":
-        tokens.offer(*tokens.words.with_clauses, given=_words(others))
-        return _with(tokens, token)
-    if key in tokens.words.with_clauses:
+        tokens.note_expected_words(*tokens.vocabulary.with_clauses, present_clauses=_clause_words(others))
+        return _with_clause(tokens, token)
+    if key in tokens.vocabulary.with_clauses:
         gap = Span(token.start, token.start)
         if not token.damaged:
             text = f"{key} needs WITH before it"
@@ -98,91 +98,93 @@ def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
             tokens.report(
                 "E116", text, token.span, "expected WITH before this", advice=advice, fixes=(Fix(gap, "WITH "),)
             )
-        return _assigned(tokens, token, key)
-    return _plain(tokens, token, key)
+        return _valued_clause(tokens, token, key)
+    return _plain_clause(tokens, token, key)
 
 
-def _meant(tokens: Tokens, token: Token) -> bool:
+def _replace_misspelt_clause(tokens: TokenStream, token: Token) -> bool:
     """Put the clause word that a misspelt one was meant to be in its pose; whether there is one."""
-    near = closest(token.text, tokens.words.clauses)
+    near = closest(token.text, tokens.vocabulary.clauses)
     advice = (
-        f"did you mean `{near}`?" if near else f"clauses are {', '.join((*tokens.offered.plain_clauses, 'WITH ...'))}"
+        f"did you mean `{near}`?"
+        if near
+        else f"clauses are {', '.join((*tokens.standard_vocabulary.plain_clauses, 'WITH ...'))}"
     )
     tokens.report("E108", f"unknown clause `{token.text}`", token.span, "not a clause of MOVE", advice=advice)
     if near:
-        tokens.replace(near)
+        tokens.replace_current(near)
     return near is not None
 
 
-def _plain(tokens: Tokens, start: Token, key: str) -> tree.Clause | None:
+def _plain_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause | None:
     if key == "DIRECTLY":
         return tree.Directly(start.span)
     if key == "STRAIGHTLY":
         return tree.Straightly(start.span)
     if key == "VIA":
-        points = listed(tokens, expression, "a pose", "after VIA")
-        return tree.Via(tokens.since(start), points)
+        points = parenthesised_list(tokens, expression, "a pose", "after VIA")
+        return tree.Via(tokens.span_since(start), points)
     return None
 
 
-def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
+def _with_clause(tokens: TokenStream, start: Token) -> tree.Clause | None:
     """Read what follows WITH."""
-    token = tokens.now
-    plain, with_words = tokens.words.plain_clauses, tokens.words.with_clauses
-    offered = tokens.offered.with_clauses
+    token = tokens.current
+    plain, with_words = tokens.vocabulary.plain_clauses, tokens.vocabulary.with_clauses
+    offered = tokens.standard_vocabulary.with_clauses
     expected = f"expected {', '.join(offered[:-1])} or {offered[-1]}"
-    if tokens.sees(*plain):
+    if tokens.matches(*plain):
         text, advice = f"{token.key} is written without WITH", f"write `{token.key}` alone"
         fix = Fix(Span(start.start, token.start), "")
         tokens.report("E116", text, start.span, "WITH does not belong here", advice=advice, fixes=(fix,))
         tokens.take()
-        return _plain(tokens, token, token.key)
-    key: str | None = token.key if tokens.sees(*with_words) else None
+        return _plain_clause(tokens, token, token.key)
+    key: str | None = token.key if tokens.matches(*with_words) else None
     if key is None and token.kind is TokenKind.NAME:
         key = closest(token.text, with_words)
         tokens.report("E108", f"unknown clause `WITH {token.text}`", token.span, expected, advice=did_you_mean(key))
         if key is None:
-            _pass_over(tokens)
+            _skip_clause(tokens)
             return None
     if key is None:
-        tokens.lost("expected a clause after WITH", expected, code="E108")
+        tokens.fail("expected a clause after WITH", expected, code="E108")
     tokens.take()
-    return _assigned(tokens, start, key)
+    return _valued_clause(tokens, start, key)
 
 
-def _assigned(tokens: Tokens, start: Token, key: str) -> tree.Clause:
-    equals(tokens, f"`WITH {key}`", f"WITH {key}")
+def _valued_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause:
+    expect_equals(tokens, f"`WITH {key}`", f"WITH {key}")
     value = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a pose", f"after {key} =")
-    return _VALUES[key](tokens.since(start), value)
+    return _VALUED_CLAUSES[key](tokens.span_since(start), value)
 
 
 # "ON" expr "DO" action
 # action = block | assign | call | "HALT" | "SIGNAL" lvalue | print ;
-def _guard(tokens: Tokens) -> tree.On:
+def _guard(tokens: TokenStream) -> tree.On:
     """Read what a motion shall watch."""
     start = tokens.take()
-    condition = part(tokens, "a condition", "after ON", "DO")
-    head = tokens.since(start)
+    condition = head_expression(tokens, "a condition", "after ON", "DO")
+    head = tokens.span_since(start)
     tokens.expect("DO", "after the condition", statement=True)
-    word = tokens.now
-    action = nested(tokens, "DO", *_ACTION_WORDS)
+    word = tokens.current
+    action = nested_statement(tokens, "DO", *_ACTION_WORDS)
     if not isinstance(action, _ACTIONS):
         text, advice = f"{word.text} cannot be the action of ON", f"write `DO BEGIN {word.text} ... END`"
         label = "expected a block, `=`, a call, HALT, SIGNAL or PRINT"
         certain = not isinstance(action, tree.Move) or not action.clauses
-        fixes = (Fix(Span(word.start, word.start), "BEGIN "), Fix(tokens.gap(), " END")) if certain else ()
+        fixes = (Fix(Span(word.start, word.start), "BEGIN "), Fix(tokens.gap_span(), " END")) if certain else ()
         tokens.report("E121", text, word.span, label, advice=advice, fixes=fixes)
-    return tree.On(tokens.since(start), head, condition, action)
+    return tree.On(tokens.span_since(start), head, condition, action)
 
 
-def _pass_over(tokens: Tokens) -> None:
+def _skip_clause(tokens: TokenStream) -> None:
     """Pass over the rest of a clause that is none."""
     depth = 0
-    words = tokens.words
-    stops = (";", *words.closing, *words.statements, *words.plain_clauses, "WITH")
+    words = tokens.vocabulary
+    stops = (";", *words.block_ends, *words.statements, *words.plain_clauses, "WITH")
     tokens.take()
-    while not tokens.done and not tokens.sees(*stops):
-        if depth == 0 and tokens.sees(","):
+    while not tokens.is_at_end and not tokens.matches(*stops):
+        if depth == 0 and tokens.matches(","):
             break
-        depth += tokens.sees("(") - tokens.sees(")")
+        depth += tokens.matches("(") - tokens.matches(")")
         tokens.take()

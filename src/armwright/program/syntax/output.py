@@ -1,21 +1,21 @@
 """Parsing what a program writes: PRINT."""
 
 from armwright.program.syntax import tree
-from armwright.program.syntax.expressions import expression, listed
+from armwright.program.syntax.expressions import expression, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.token_stream import Tokens
+from armwright.program.syntax.token_stream import TokenStream
 
 
 # "PRINT" "(" ( expr | string ) { "," ( expr | string ) } ")"
-def printing(tokens: Tokens) -> tree.Print:
+def print_(tokens: TokenStream) -> tree.Print:
     """Read one PRINT."""
     start = tokens.take()
-    items = listed(tokens, _printed, "a value or a text", "after PRINT")
-    return tree.Print(tokens.since(start), items)
+    items = parenthesised_list(tokens, _print_item, "a value or a text", "after PRINT")
+    return tree.Print(tokens.span_since(start), items)
 
 
-def _printed(tokens: Tokens, wants: str, where: str) -> tree.Expression | tree.String:
-    token = tokens.now
+def _print_item(tokens: TokenStream, wants: str, where: str) -> tree.Expression | tree.String:
+    token = tokens.current
     if token.kind is not TokenKind.STRING:
         return expression(tokens, wants, where)
     tokens.take()

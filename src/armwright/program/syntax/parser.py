@@ -10,20 +10,20 @@ from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.syntax import control_flow, devices, frames, output, rlo83, tree
-from armwright.program.syntax.expected_tokens import Expected
-from armwright.program.syntax.headers import head, late
+from armwright.program.syntax.expected_tokens import ExpectedTokens
+from armwright.program.syntax.headers import late_header, parse_headers
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.move import move
-from armwright.program.syntax.split_names import declared_names, joined
+from armwright.program.syntax.split_names import declared_names, join_split_names
 from armwright.program.syntax.statement_list import statements
-from armwright.program.syntax.token_stream import Rule, Tokens
+from armwright.program.syntax.token_stream import Rule, TokenStream
 
 # statement = assign | affix | ... | move | block | "IF" ... | "WHILE" ... | "REPEAT" ... | ... | name "(" ... ")" ;
 _RULES: Mapping[str, Rule] = {
     "=": frames.assign,
     "AFFIX": frames.affix,
     "UNFIX": frames.unfix,
-    "OPEN": devices.open_hand,
+    "OPEN": devices.open_,
     "GRASP": devices.grasp,
     "OPERATE": devices.operate,
     "READ": devices.read,
@@ -42,9 +42,9 @@ _RULES: Mapping[str, Rule] = {
     "TRY": control_flow.try_,
     "RETRY": control_flow.retry,
     "HALT": control_flow.halt,
-    "PRINT": output.printing,
+    "PRINT": output.print_,
     # Reported: these belong in front of BEGIN.
-    **dict.fromkeys(("VAR", "IMPORT", "UNITS", "PROCEDURE"), late),
+    **dict.fromkeys(("VAR", "IMPORT", "UNITS", "PROCEDURE"), late_header),
 }
 
 
@@ -66,79 +66,79 @@ def parse(
         declared: names of variables that were declared before this text.
         procedures: names of procedures that were.
     """
-    cursor, torn = _cursor(source, tokens, standard, declared)
+    cursor, torn = _token_stream(source, tokens, standard, declared)
     cursor.procedures.update(procedures)
     tree_, slips = program(cursor), cursor.diagnostics
     if standard is Standard.RLO_83:
-        tree_, slips = rlo83.conform(tree_, slips, source, cursor.tokens)
+        tree_, slips = rlo83.check_conformance(tree_, slips, source, cursor.tokens)
     return tree_, [*torn, *slips]
 
 
-def expected(
+def expected_tokens(
     source: Source, tokens: Sequence[Token], standard: Standard = Standard.RLO_2, *, declared: Collection[str] = ()
-) -> Expected:
+) -> ExpectedTokens:
     """Return what may stand behind the last token of a text; the arguments are those of ``parse``."""
-    cursor, _ = _cursor(source, tokens, standard, declared)
-    cursor.expected = Expected()
+    cursor, _ = _token_stream(source, tokens, standard, declared)
+    cursor.expected = ExpectedTokens()
     program(cursor)
     return cursor.expected
 
 
-def _cursor(
+def _token_stream(
     source: Source, tokens: Sequence[Token], standard: Standard, declared: Collection[str]
-) -> tuple[Tokens, list[Diagnostic]]:
+) -> tuple[TokenStream, list[Diagnostic]]:
     """Stand in front of the first token; return what is wrong with names that blanks tear apart, too."""
-    tokens, torn = joined(source, tokens, declared)
+    tokens, torn = join_split_names(source, tokens, declared)
     if standard is Standard.RLO_83:
-        tokens = rlo83.reserve(tokens, {*declared, *declared_names(tokens)})
-    cursor = Tokens(source, tokens, _RULES, standard)
+        tokens = rlo83.reserve_rlo_2_words(tokens, {*declared, *declared_names(tokens)})
+    cursor = TokenStream(source, tokens, _RULES, standard)
     cursor.declared.update(declared)
     return cursor, torn
 
 
 # program = { header } block "." ;
 # block   = "BEGIN" statements "END" ;
-def program(tokens: Tokens) -> tree.Program:
+def program(tokens: TokenStream) -> tree.Program:
     """Read a whole program."""
-    start = tokens.now
-    headers = head(tokens)
+    start = tokens.current
+    headers = parse_headers(tokens)
     read: list[tree.Statement] = []
-    if not tokens.done:
+    if not tokens.is_at_end:
         read += _statements(tokens)
-        while not tokens.done and not _ends(tokens):
+        while not tokens.is_at_end and not _end_program(tokens):
             read += _statements(tokens)
-    elif not tokens.silent:
-        begun = tokens.before.key == "BEGIN"
+    elif not tokens.is_reported:
+        begun = tokens.previous.key == "BEGIN"
         if begun:
-            tokens.offer(*tokens.words.statements, "END", starts=True)
-        span = tokens.gap() if headers or begun else Span(0, 0)
+            tokens.note_expected_words(*tokens.vocabulary.statements, "END", starts_statement=True)
+        span = tokens.gap_span() if headers or begun else Span(0, 0)
         text = "the program has no statements" if headers else "there is no program here"
-        text, expected = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
-        tokens.report("E115", text, span, f"expected `{expected}`")
-    return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(read), tokens.before.span)
+        text, missing = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
+        tokens.report("E115", text, span, f"expected `{missing}`")
+    return tree.Program(tokens.span_since(start), (*headers, *tokens.late_headers), tuple(read), tokens.previous.span)
 
 
-def _statements(tokens: Tokens) -> tuple[tree.Statement, ...]:
+def _statements(tokens: TokenStream) -> tuple[tree.Statement, ...]:
     """Read statements up to END, which stays."""
     read = statements(tokens, "END")
-    if tokens.done:
-        tokens.say_once("E115", "the program has no END", tokens.gap(), "expected `END.` here")
+    if tokens.is_at_end:
+        tokens.report_once("E115", "the program has no END", tokens.gap_span(), "expected `END.` here")
     return read
 
 
-def _ends(tokens: Tokens) -> bool:
+def _end_program(tokens: TokenStream) -> bool:
     """Read END and the point behind it; whether the program is over."""
     end = tokens.take()
-    gap = tokens.gap()
+    gap = tokens.gap_span()
     if tokens.accept("."):
-        if not tokens.done:
-            last = tokens.now
+        if not tokens.is_at_end:
+            last = tokens.current
             tokens.report("E114", "text after the end of the program", last.span, "the program ended with `END.`")
-            while not tokens.done:
+            while not tokens.is_at_end:
                 tokens.take()
             return True
-    elif tokens.done or (tokens.sees(";") and tokens.ahead().kind is TokenKind.END):
-        if not tokens.now.damaged:
+    elif tokens.is_at_end or (tokens.matches(";") and tokens.peek().kind is TokenKind.END):
+        if not tokens.current.damaged:
             semicolon = tokens.accept(";")
             text, note = "the program does not end with `.`", "the last END of an RLO program is written `END.`"
             fix = Fix(gap.to(semicolon.span) if semicolon else gap, ".")
@@ -146,6 +146,6 @@ def _ends(tokens: Tokens) -> bool:
     else:
         text, advice = "END closes the program, but more follows", "leave it out, or write BEGIN before what it ends"
         tokens.report("E114", text, end.span, "the program would end here", advice=advice)
-        tokens.spare += 1
+        tokens.surplus_ends += 1
         return False
     return True

@@ -11,10 +11,10 @@ from armwright.program.syntax import tree
 from armwright.spatial.rotations import nearest_rotation
 
 # A rotation typed with six digits passes; one typed with two or three is repaired; worse is a slip.
-EXACT = 1e-6
-REPAIRABLE = 1e-2
+EXACT_TOLERANCE = 1e-6
+REPAIR_TOLERANCE = 1e-2
 # `orthonormality_error` adds this for a mirror image.
-_MIRROR = 2.0
+_MIRROR_PENALTY = 2.0
 
 # Of numbers written row by row, with the bottom row or without, and of columns with it: where n, o, a, p stand.
 _ROW_WISE = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
@@ -33,13 +33,13 @@ def check(matrix: tree.Matrix, units: UnitSystem) -> Diagnostic | None:
     if any(math.isnan(value) for value in values):
         return None
     if len(matrix.items) != 12:
-        diagnostic = _wrong_count(matrix, values)
+        diagnostic = _wrong_number_count(matrix, values)
     else:
         certain = all(isinstance(item, tree.Number) for item in matrix.items[:9])
         error = rotation_error(tuple(values[:9])) if certain else 0.0
-        if error <= EXACT:
+        if error <= EXACT_TOLERANCE:
             return None
-        diagnostic = _not_exact(matrix, values, error)
+        diagnostic = _inexact_rotation(matrix, values, error)
     if not diagnostic.is_error:
         return diagnostic
     order = "the numbers are the columns n, o, a, p in this order"
@@ -47,8 +47,8 @@ def check(matrix: tree.Matrix, units: UnitSystem) -> Diagnostic | None:
     return attrs.evolve(diagnostic, notes=(note, *diagnostic.notes))
 
 
-def _not_exact(matrix: tree.Matrix, values: Sequence[float], error: float) -> Diagnostic:
-    if error <= REPAIRABLE:
+def _inexact_rotation(matrix: tree.Matrix, values: Sequence[float], error: float) -> Diagnostic:
+    if error <= REPAIR_TOLERANCE:
         return Diagnostic(
             code="W206",
             message="the axes of this matrix are not quite of length 1 and at right angles",
@@ -57,47 +57,47 @@ def _not_exact(matrix: tree.Matrix, values: Sequence[float], error: float) -> Di
             helps=("write more digits",),
         )
     if len(values) == 12 and is_rotation([values[index] for index in _ROW_WISE[:9]]):
-        return _rearranged(matrix, _ROW_WISE, "this matrix is written row by row")
-    if _MIRROR <= error <= _MIRROR + REPAIRABLE:
-        return _fault(
+        return _suggest_order(matrix, _ROW_WISE, "this matrix is written row by row")
+    if _MIRROR_PENALTY <= error <= _MIRROR_PENALTY + REPAIR_TOLERANCE:
+        return _error(
             matrix, "this matrix is a mirror image, not a rotation", "n, o, a are left-handed", "a must be n times o"
         )
-    return _fault(matrix, "the first nine numbers are not a rotation", _fault_of_axes(values))
+    return _error(matrix, "the first nine numbers are not a rotation", _describe_axis_error(values))
 
 
-def constant(matrix: tree.Matrix) -> tuple[float, ...]:
+def pose_numbers(matrix: tree.Matrix) -> tuple[float, ...]:
     """Return the twelve numbers of a checked matrix of numbers, the rotation repaired where that was promised."""
     values = tuple(item.value for item in matrix.items if isinstance(item, tree.Number))
-    if rotation_error(values[:9]) <= EXACT:
+    if rotation_error(values[:9]) <= EXACT_TOLERANCE:
         return values
     R = nearest_rotation([values[0:9:3], values[1:9:3], values[2:9:3]])
     return (*R.T.ravel().tolist(), *values[9:])
 
 
-def rotation_error(nine: tuple[float, ...]) -> float:
+def rotation_error(axes: tuple[float, ...]) -> float:
     """Return how far n, o, a are from the columns of a rotation, as ``orthonormality_error`` does of arrays.
 
     A program has thousands of matrices, one at a time: numbers take a tenth of the time of arrays.
     """
-    if max(map(abs, nine)) > 2.0:
+    if max(map(abs, axes)) > 2.0:
         return math.inf
-    n, o, a = nine[0:3], nine[3:6], nine[6:9]
+    n, o, a = axes[0:3], axes[3:6], axes[6:9]
     lengths = max(abs(_dot(axis, axis) - 1) for axis in (n, o, a))
     angles = max(abs(_dot(n, o)), abs(_dot(o, a)), abs(_dot(n, a)))
     normal = (n[1] * o[2] - n[2] * o[1], n[2] * o[0] - n[0] * o[2], n[0] * o[1] - n[1] * o[0])
-    return max(lengths, angles) + (_MIRROR if _dot(normal, a) < 0 else 0.0)
+    return max(lengths, angles) + (_MIRROR_PENALTY if _dot(normal, a) < 0 else 0.0)
 
 
 def _dot(x: Sequence[float], y: Sequence[float]) -> float:
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 
 
-def is_rotation(nine: Sequence[float]) -> bool:
+def is_rotation(axes: Sequence[float]) -> bool:
     """Whether n, o, a are near enough to a rotation to have been meant as one."""
-    return rotation_error(tuple(nine)) <= REPAIRABLE
+    return rotation_error(tuple(axes)) <= REPAIR_TOLERANCE
 
 
-def _wrong_count(matrix: tree.Matrix, values: list[float]) -> Diagnostic:
+def _wrong_number_count(matrix: tree.Matrix, values: list[float]) -> Diagnostic:
     count = len(matrix.items)
     if len(values) == count == 16:
         wholes = {
@@ -106,12 +106,12 @@ def _wrong_count(matrix: tree.Matrix, values: list[float]) -> Diagnostic:
         }
         for row, (order, message) in wholes.items():
             if row == (0, 0, 0, 1) and is_rotation([values[index] for index in order[:9]]):
-                return _rearranged(matrix, order, message)
+                return _suggest_order(matrix, order, message)
     many = f"{count} number{'s' if count > 1 else ''}"
-    return _fault(matrix, f"a matrix has 12 numbers, not {count}", f"{many} here")
+    return _error(matrix, f"a matrix has 12 numbers, not {count}", f"{many} here")
 
 
-def _rearranged(matrix: tree.Matrix, order: Sequence[int], message: str) -> Diagnostic:
+def _suggest_order(matrix: tree.Matrix, order: Sequence[int], message: str) -> Diagnostic:
     numbers = [item for item in matrix.items if isinstance(item, tree.Number)]
     texts = [numbers[index].text for index in order]
     literal = "(" + ", ".join(",".join(texts[i : i + 3]) for i in range(0, 12, 3)) + ")"
@@ -127,18 +127,18 @@ def _rearranged(matrix: tree.Matrix, order: Sequence[int], message: str) -> Diag
     )
 
 
-def _fault(matrix: tree.Matrix, message: str, label: str, help_: str = "") -> Diagnostic:
+def _error(matrix: tree.Matrix, message: str, label: str, help_: str = "") -> Diagnostic:
     return Diagnostic(code="E206", message=message, span=matrix.span, label=label, helps=(help_,) if help_ else ())
 
 
-def _fault_of_axes(values: Sequence[float]) -> str:
+def _describe_axis_error(values: Sequence[float]) -> str:
     """Name the first axis that is not of length 1, or the first two that are not at right angles."""
     axes = {"n": values[0:3], "o": values[3:6], "a": values[6:9]}
     for name, axis in axes.items():
         length = math.hypot(*axis)
-        if abs(length - 1) > REPAIRABLE / 2:
+        if abs(length - 1) > REPAIR_TOLERANCE / 2:
             return f"{name} has length {length:.4g}, not 1"
     for first, second in (("n", "o"), ("o", "a"), ("n", "a")):
-        if abs(_dot(axes[first], axes[second])) > REPAIRABLE:
+        if abs(_dot(axes[first], axes[second])) > REPAIR_TOLERANCE:
             return f"{first} and {second} are not at right angles"
     return "n, o, a are not at right angles"

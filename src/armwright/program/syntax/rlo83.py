@@ -13,7 +13,7 @@ import attrs
 
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Fix
 from armwright.program.language.source import Source, Span
-from armwright.program.language.words import LATER_HEADERS, LATER_STATEMENTS, LATER_TYPES, is_later
+from armwright.program.language.words import RLO_2_HEADERS, RLO_2_STATEMENTS, RLO_2_TYPES, is_reserved_in_rlo_2_only
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
 
@@ -30,7 +30,7 @@ _BEHIND_NAMES = frozenset(("=", ":="))
 _NEVER_NAMES = frozenset(("NOT", "ON", "PRIORITY"))
 
 
-def reserve(tokens: Sequence[Token], declared: Collection[str]) -> Sequence[Token]:
+def reserve_rlo_2_words(tokens: Sequence[Token], declared: Collection[str]) -> Sequence[Token]:
     """Take words of RLO-2 for reserved, but where they are the names that RLO-83 lets them be.
 
     Args:
@@ -39,7 +39,7 @@ def reserve(tokens: Sequence[Token], declared: Collection[str]) -> Sequence[Toke
     """
     tokens_ = list(tokens)
     for index, token in enumerate(tokens):
-        if token.kind is not TokenKind.NAME or token.key in declared or not is_later(token.key):
+        if token.kind is not TokenKind.NAME or token.key in declared or not is_reserved_in_rlo_2_only(token.key):
             continue
         named = index > 0 and tokens[index - 1].key in _BEFORE_NAMES and token.key not in _NEVER_NAMES
         if not named and tokens[index + 1].key not in _BEHIND_NAMES:
@@ -47,7 +47,7 @@ def reserve(tokens: Sequence[Token], declared: Collection[str]) -> Sequence[Toke
     return tokens_
 
 
-def conform(
+def check_conformance(
     program: tree.Program, slips: Sequence[Diagnostic], source: Source, tokens: Sequence[Token]
 ) -> tuple[tree.Program, DiagnosticList]:
     """Name what a program has that belongs to RLO-2.
@@ -61,7 +61,7 @@ def conform(
     Returns:
         The program with a poison in the pose of each part that belongs to RLO-2, and what is wrong with both.
     """
-    visitor = _Visitor(source, tokens, program)
+    visitor = _ConformanceVisitor(source, tokens, program)
     headers = tuple(node_ for header in program.headers if (node_ := visitor.header(header)) is not None)
     statements = tuple(visitor.statement(statement) for statement in program.statements)
     tokens_ = DiagnosticList()
@@ -70,7 +70,7 @@ def conform(
     return attrs.evolve(program, headers=headers, statements=statements), tokens_
 
 
-class _Visitor:
+class _ConformanceVisitor:
     """Goes through a program, and remembers which stretches of it are no RLO-83 at all."""
 
     def __init__(self, source: Source, tokens: Sequence[Token], program: tree.Program) -> None:
@@ -79,7 +79,7 @@ class _Visitor:
         self._source, self._tokens = source, tokens
         self._starts = [token.start for token in tokens]
         self._declared = {name.key for declaration in program.declarations for name in declaration.names}
-        self._passed_over: list[Span] = []
+        self._skipped_spans: list[Span] = []
         self._visits: dict[type, Callable[[Any], tree.Statement]] = {
             tree.Poison: lambda node: node,
             tree.Assign: self._assign,
@@ -96,33 +96,33 @@ class _Visitor:
 
     def is_inside(self, span: Span) -> bool:
         """Whether something stands in a stretch that has been passed over, behind its first word."""
-        index = bisect_left(self._passed_over, span.start, key=lambda node_: node_.start) - 1
-        return index >= 0 and span.start <= self._passed_over[index].end
+        index = bisect_left(self._skipped_spans, span.start, key=lambda node_: node_.start) - 1
+        return index >= 0 and span.start <= self._skipped_spans[index].end
 
     def _report(self, what: str, span: Span, instead: str) -> None:
         self.report("E214", f"{what} belongs to RLO-2", span, instead)
 
     # ---- tokens, where the tree forgets
 
-    def _at(self, span: Span) -> int:
+    def _token_index(self, span: Span) -> int:
         """Return the number of the token with which a part of the tree begins, behind those that nobody has written."""
         return bisect_right(self._starts, span.start) - 1
 
-    def _word(self, span: Span) -> Token:
+    def _first_token(self, span: Span) -> Token:
         """Return the first token of a part of the tree."""
-        return self._tokens[self._at(span)]
+        return self._tokens[self._token_index(span)]
 
-    def _last_word(self, span: Span) -> Token:
+    def _last_token(self, span: Span) -> Token:
         """Return the last token of a part of the tree."""
         return self._tokens[bisect_right(self._starts, span.end - 1) - 1]
 
-    def _names(self, span: Span) -> frozenset[str]:
-        tokens = self._tokens[self._at(span) : bisect_left(self._starts, span.end)]
+    def _names_in(self, span: Span) -> frozenset[str]:
+        tokens = self._tokens[self._token_index(span) : bisect_left(self._starts, span.end)]
         return frozenset(token.key for token in tokens if token.kind in (TokenKind.NAME, TokenKind.ARM))
 
     def _with_parentheses(self, span: Span) -> Span:
         """Return where an expression stands with the parentheses around it, which are not those of a list."""
-        first, end = self._at(span), bisect_left(self._starts, span.end)
+        first, end = self._token_index(span), bisect_left(self._starts, span.end)
         while (
             self._tokens[first - 1].key == "("
             and self._tokens[end].key == ")"
@@ -138,17 +138,17 @@ class _Visitor:
         """Return a part in front of BEGIN as far as it is of RLO-83; None for one that is not."""
         if isinstance(node, tree.Declaration):
             return attrs.evolve(node, type=self._type(node.type))
-        word = self._word(node.span)
-        self._report(word.key, word.span, LATER_HEADERS[word.key])
-        self._passed_over.append(node.span)
+        word = self._first_token(node.span)
+        self._report(word.key, word.span, RLO_2_HEADERS[word.key])
+        self._skipped_spans.append(node.span)
         return None
 
     def _type(self, node: tree.TypeName) -> tree.TypeName:
-        word = self._word(node.span)
-        if word.key not in LATER_TYPES:
+        word = self._first_token(node.span)
+        if word.key not in RLO_2_TYPES:
             return node
-        self._report(word.key, word.span, LATER_TYPES[word.key])
-        self._passed_over.append(node.span)
+        self._report(word.key, word.span, RLO_2_TYPES[word.key])
+        self._skipped_spans.append(node.span)
         return attrs.evolve(node, key=None, sizes=())
 
     # ---- statements
@@ -157,22 +157,24 @@ class _Visitor:
         """Return a statement as far as it is of RLO-83."""
         if (visit := self._visits.get(type(node))) is not None:
             return visit(node)
-        word = self._word(node.span)
+        word = self._first_token(node.span)
         if isinstance(node, tree.Block):
-            return self._none(node, "a block inside a program", word.span, "RLO-83 has one BEGIN and one END")
-        return self._none(node, word.key, word.span, LATER_STATEMENTS[word.key])
+            return self._reject_statement(
+                node, "a block inside a program", word.span, "RLO-83 has one BEGIN and one END"
+            )
+        return self._reject_statement(node, word.key, word.span, RLO_2_STATEMENTS[word.key])
 
-    def _none(self, node: tree.Statement, what: str, span: Span, instead: str) -> tree.Poison:
+    def _reject_statement(self, node: tree.Statement, what: str, span: Span, instead: str) -> tree.Poison:
         """Pass over a statement that RLO-83 does not have."""
         self._report(what, span, instead)
-        self._passed_over.append(node.span)
-        return tree.Poison(self._word(node.span).span, self._names(node.span))
+        self._skipped_spans.append(node.span)
+        return tree.Poison(self._first_token(node.span).span, self._names_in(node.span))
 
     def _call(self, node: tree.Call) -> tree.Statement:
         name = node.name
         if name.key not in self._declared:
-            return self._none(node, f"the call of `{name.text}`", name.span, "RLO-83 has no procedures")
-        bracket = self._tokens[self._at(name.span) + 1]
+            return self._reject_statement(node, f"the call of `{name.text}`", name.span, "RLO-83 has no procedures")
+        bracket = self._tokens[self._token_index(name.span) + 1]
         text, advice = f"`{name.text}` needs `=` before its value", f"write `{name.text} = (...`"
         fix = Fix(Span(bracket.start, bracket.start), "= ")
         self.report("E109", text, bracket.span, "expected `=` before this", advice=advice, fixes=(fix,))
@@ -185,33 +187,37 @@ class _Visitor:
         return node
 
     def _operate(self, node: tree.Operate) -> tree.Operate:
-        self._tail(node.span, "OPERATE ...", "RLO-83 only starts a device; it stops at the end", "ON", "OFF")
+        self._report_trailing_word(
+            node.span, "OPERATE ...", "RLO-83 only starts a device; it stops at the end", "ON", "OFF"
+        )
         return attrs.evolve(node, device=self._operand(node.device, "the name of a device"), on=True)
 
     def _read_system(self, node: tree.ReadSystem) -> tree.ReadSystem:
         return attrs.evolve(node, arm=self._operand(node.arm, _ARM))
 
-    def _tail(self, span: Span, what: str, instead: str, *words: str) -> None:
+    def _report_trailing_word(self, span: Span, what: str, instead: str, *words: str) -> None:
         """Name a word that RLO-2 allows at the end of a statement."""
-        last = self._last_word(span)
+        last = self._last_token(span)
         if last.kind is TokenKind.KEYWORD and last.key in words:
             self._report(f"{what} {last.key}", last.span, instead)
 
     def _assign(self, node: tree.Assign) -> tree.Statement:
         if isinstance(node.target, tree.Index):
-            bracket = self._tokens[self._at(node.target.span) + 1]
-            return self._none(node, "indexing", bracket.span, "RLO-83 has no arrays")
+            bracket = self._tokens[self._token_index(node.target.span) + 1]
+            return self._reject_statement(node, "indexing", bracket.span, "RLO-83 has no arrays")
         value = node.value
         numbers = value.items if isinstance(value, tree.Matrix) else (value,)
-        if all(isinstance(number, tree.Number | tree.Poison) for number in numbers) and not self._grouped(value):
+        if all(isinstance(number, tree.Number | tree.Poison) for number in numbers) and not self._is_parenthesised(
+            value
+        ):
             bare = tuple(map(self._without_unit, numbers))
             known = attrs.evolve(value, items=bare) if isinstance(value, tree.Matrix) else bare[0]
             return attrs.evolve(node, value=known)
         return attrs.evolve(node, value=self._poison(value, "a number or twelve numbers in `( )`"))
 
-    def _grouped(self, value: tree.Expression) -> bool:
+    def _is_parenthesised(self, value: tree.Expression) -> bool:
         """Whether parentheses stand around a value, or around a single number of a matrix."""
-        tokens = self._tokens[self._at(value.span) - 1 : bisect_left(self._starts, value.span.end) + 1]
+        tokens = self._tokens[self._token_index(value.span) - 1 : bisect_left(self._starts, value.span.end) + 1]
         opening = sum(token.key == "(" for token in tokens)
         return opening > isinstance(value, tree.Matrix)
 
@@ -219,14 +225,14 @@ class _Visitor:
         """Return a number; one with a unit is no longer known."""
         if not isinstance(node, tree.Number) or node.unit is None:
             return node
-        number = self._last_word(node.span)
+        number = self._last_token(node.span)
         unit = number.text[len(number.key) :]
         self._report(f"the unit `{unit}`", number.span, "RLO-83 counts in metres and takes bare numbers")
         return attrs.evolve(node, value=math.nan, unit=None)
 
     def _affix(self, node: tree.Affix) -> tree.Affix:
         instead = "in RLO-83 a frame follows its parent, never the reverse"
-        self._tail(node.span, "AFFIX ...", instead, "RIGIDLY", "NONRIGIDLY")
+        self._report_trailing_word(node.span, "AFFIX ...", instead, "RIGIDLY", "NONRIGIDLY")
         child, parent = self._operand(node.child, _FRAME), self._operand(node.parent, _MOVED)
         step = None if node.at is None else self._operand(node.at, "the name of a TRANS")
         return attrs.evolve(node, child=child, parent=parent, at=step, rigid=False)
@@ -251,7 +257,7 @@ class _Visitor:
             return attrs.evolve(node, targets=tuple(self._operand(target, _FRAME) for target in node.targets))
         span_ = Span(others[0].span.start, others[-1].span.end)
         self._report("reading several frames at once", span_, "RLO-83 reads one frame at a time")
-        return attrs.evolve(node, targets=(tree.Poison(span_, self._names(first.span.to(span_))),))
+        return attrs.evolve(node, targets=(tree.Poison(span_, self._names_in(first.span.to(span_))),))
 
     # ---- MOVE
 
@@ -264,9 +270,9 @@ class _Visitor:
         """Return a clause as far as it is of RLO-83; None for one that is not."""
         match node:
             case tree.On():
-                self._report("ON ... DO", self._word(node.span).span, "RLO-83 has no guarded motions")
+                self._report("ON ... DO", self._first_token(node.span).span, "RLO-83 has no guarded motions")
             case tree.Blend() | tree.Duration():
-                index = self._at(node.span)
+                index = self._token_index(node.span)
                 word = self._tokens[index + (self._tokens[index].key == "WITH")]
                 self._report(f"WITH {word.key}", word.span, "RLO-83 has APPROACH, DEPARTURE and SPEED")
             case tree.Via(points=points):
@@ -279,14 +285,14 @@ class _Visitor:
                 return attrs.evolve(node, value=self._operand(value, "a number or the name of a SCALAR"))
             case _:
                 return node
-        self._passed_over.append(node.span)
+        self._skipped_spans.append(node.span)
         return None
 
     def _goal(self, node: tree.Expression) -> tree.Expression:
         """Return the name of a frame to come to."""
         if isinstance(node, tree.ArmName):
             self._report(f"`{node.text}` as a pose", node.span, f"RLO-83 takes {_FRAME} here")
-            return self._silent(node.span)
+            return self._skip_expression(node.span)
         return self._operand(node, _FRAME)
 
     # ---- expressions
@@ -301,19 +307,19 @@ class _Visitor:
         if isinstance(node, tree.Poison):
             return node
         span = self._with_parentheses(node.span)
-        self._report(self._called(span), span, f"RLO-83 takes {wants} here")
-        return self._silent(span)
+        self._report(self._quote(span), span, f"RLO-83 takes {wants} here")
+        return self._skip_expression(span)
 
-    def _silent(self, span: Span) -> tree.Poison:
-        self._passed_over.append(span)
-        return tree.Poison(span, self._names(span))
+    def _skip_expression(self, span: Span) -> tree.Poison:
+        self._skipped_spans.append(span)
+        return tree.Poison(span, self._names_in(span))
 
-    def _called(self, span: Span) -> str:
+    def _quote(self, span: Span) -> str:
         """Return how an expression is called in a message."""
-        text, start = self._source.slice(span), self._word(span)
+        text, start = self._source.slice(span), self._first_token(span)
         if span == start.span:
             return f"`{text}` as a value"
         if len(text) <= _MAX_SHOWN_LENGTH and text.isprintable():
             return f"`{text}`"
-        is_call = start.kind is TokenKind.NAME and self._tokens[self._at(span) + 1].key == "("
+        is_call = start.kind is TokenKind.NAME and self._tokens[self._token_index(span) + 1].key == "("
         return f"`{start.text}(...)`" if is_call else "this expression"

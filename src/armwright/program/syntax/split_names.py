@@ -14,7 +14,7 @@ _BEFORE_NAMES = frozenset(("TO", "FROM", "AFFIX", "UNFIX", "MOVE", "READ", "=", 
 _BLANKS = " \t"
 
 
-def joined(
+def join_split_names(
     source: Source, tokens: Sequence[Token], declared: Collection[str] = ()
 ) -> tuple[Sequence[Token], list[Diagnostic]]:
     """Put names together that a blank has torn apart, and say so.
@@ -31,7 +31,9 @@ def joined(
         The tokens with one in the pose of each pair, and what was found.
     """
     pairs = [
-        index for index in range(1, len(tokens)) if tokens[index].kind is _NUMBER and _is_pair(source, tokens, index)
+        index
+        for index in range(1, len(tokens))
+        if tokens[index].kind is _NUMBER and _is_name_and_number(source, tokens, index)
     ]
     if not pairs:
         return tokens, []
@@ -61,7 +63,7 @@ def joined(
     return [*joined_tokens, *tokens[done:]], findings
 
 
-def _is_pair(source: Source, tokens: Sequence[Token], index: int) -> bool:
+def _is_name_and_number(source: Source, tokens: Sequence[Token], index: int) -> bool:
     """Whether a number without sign, point and unit stands behind a word, with nothing but blanks in between."""
     first, number = tokens[index - 1], tokens[index]
     if first.kind is not _NAME and first.kind is not _KEYWORD:

@@ -7,9 +7,9 @@ from typing import NoReturn, TypeAlias, Unpack
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Details, DiagnosticList, Fix, did_you_mean
 from armwright.program.language.source import Source, Span
-from armwright.program.language.words import VOCABULARIES, Standard, is_later
+from armwright.program.language.words import VOCABULARIES, Standard, is_reserved_in_rlo_2_only
 from armwright.program.syntax import tree
-from armwright.program.syntax.expected_tokens import Expected
+from armwright.program.syntax.expected_tokens import ExpectedTokens
 from armwright.program.syntax.lexer import Token, TokenKind
 
 # How deep statements, parentheses and operations may lie in one another.
@@ -21,15 +21,15 @@ ANY_VALUE = ("a value", "")
 _NAME, _KEYWORD, _SYMBOL, _END = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.SYMBOL, TokenKind.END
 
 
-class LostError(Exception):
+class PanicModeError(Exception):
     """The parser has said what is wrong and cannot go on here; it looks for the next statement."""
 
 
-class TooDeepError(LostError):
+class NestingError(PanicModeError):
     """Statements lie too deep in one another; the outermost is passed over."""
 
 
-class Tokens:
+class TokenStream:
     """The tokens of a program, the pose the parser has come to, and what it has found.
 
     Attributes:
@@ -70,54 +70,54 @@ class Tokens:
         """Start at the first token; the last must be the end of the text."""
         self.source = source
         self.standard = standard
-        self.words, self.offered = VOCABULARIES[Standard.RLO_2], VOCABULARIES[standard]
+        self.vocabulary, self.standard_vocabulary = VOCABULARIES[Standard.RLO_2], VOCABULARIES[standard]
         self.rules = rules
         self.diagnostics = DiagnosticList()
         self.report = self.diagnostics.report
-        self.at = 0
+        self.index = 0
         self.tokens = list(tokens)
-        self._last = len(tokens) - 1
-        self.now = self.before = self.tokens[0]
+        self._end_index = len(tokens) - 1
+        self.current = self.previous = self.tokens[0]
         self.depth = self.statement_depth = self.height = 0
-        self.waiting: list[tuple[str, ...]] = []
-        self.deep = -1
-        self.late: list[tree.Header] = []
+        self.open_closers: list[tuple[str, ...]] = []
+        self.overflow_index = -1
+        self.late_headers: list[tree.Header] = []
         self.declared: set[str] = set()
         self.procedures: set[str] = set()
-        self.missed: set[str] = set()
-        self.in_procedure = self.target = ""
-        self.recovering = 0
-        self.asked = ANY_VALUE
-        self.expected: Expected | None = None
+        self.reported_missing: set[str] = set()
+        self.enclosing_procedure = self.assignment_target = ""
+        self.recover_depth = 0
+        self.operand_context = ANY_VALUE
+        self.expected: ExpectedTokens | None = None
         # How much was wrong in front of the last token; what is looked for after a mistake there is guessed.
-        self._wrong_before = 0
-        self.spare = 0
-        self._refused: set[str] = set()
-        self._silent = -1
-        self._next_begin = -1
-        self._to_close: list[int] | None = None
+        self._expected_error_count = 0
+        self.surplus_ends = 0
+        self._reported_reserved: set[str] = set()
+        self._reported_index = -1
+        self._next_begin_index = -1
+        self._surplus_counts: list[int] | None = None
 
     # ---- looking and taking
 
-    def ahead(self, steps: int = 1) -> Token:
+    def peek(self, steps: int = 1) -> Token:
         """Return a token further on or, with less than no steps, back; behind the end it is always the end."""
-        index = self.at + steps
-        return self.tokens[index] if index < self._last else self.tokens[-1]
+        index = self.index + steps
+        return self.tokens[index] if index < self._end_index else self.tokens[-1]
 
     @property
-    def done(self) -> bool:
+    def is_at_end(self) -> bool:
         """Whether everything has been read."""
-        return self.now.kind is _END
+        return self.current.kind is _END
 
     def take(self) -> Token:
         """Read one token; the end stays."""
-        token = self.now
-        if self.at < self._last:
-            self.at += 1
-            self.before = token
-            self.now = self.tokens[self.at]
-            if self.at == self._last - 1:
-                self._wrong_before = len(self.diagnostics)
+        token = self.current
+        if self.index < self._end_index:
+            self.index += 1
+            self.previous = token
+            self.current = self.tokens[self.index]
+            if self.index == self._end_index - 1:
+                self._expected_error_count = len(self.diagnostics)
         return token
 
     def take_name(self) -> tree.Name:
@@ -125,105 +125,114 @@ class Tokens:
         token = self.take()
         return tree.Name(token.span, token.text, token.key)
 
-    def back(self, index: int) -> None:
+    def rewind(self, index: int) -> None:
         """Return to where ``at`` tokens had been read."""
-        self.at = index
-        self.now = self.tokens[index]
-        self.before = self.tokens[max(0, index - 1)]
+        self.index = index
+        self.current = self.tokens[index]
+        self.previous = self.tokens[max(0, index - 1)]
 
-    def back_to(self, offset: int) -> None:
+    def rewind_to_offset(self, offset: int) -> None:
         """Return to the token that begins at a character."""
-        while self.now.start > offset:
-            self.back(self.at - 1)
+        while self.current.start > offset:
+            self.rewind(self.index - 1)
 
-    def sees(self, *keys: str) -> bool:
+    def matches(self, *keys: str) -> bool:
         """Whether the next token is one of these keywords or symbols."""
-        token = self.now
+        token = self.current
         return token.key in keys and (token.kind is _SYMBOL or token.kind is _KEYWORD)
 
-    def sees_word(self, *keys: str) -> bool:
+    def matches_name(self, *keys: str) -> bool:
         """Whether the next token is a name that reads so: a word with a meaning in this pose only."""
-        return self.now.kind is _NAME and self.now.key in keys
+        return self.current.kind is _NAME and self.current.key in keys
 
     def accept(self, *keys: str) -> Token | None:
         """Read the next token if it is one of these keywords or symbols."""
-        token = self.now
+        token = self.current
         if token.key in keys and (token.kind is _SYMBOL or token.kind is _KEYWORD):
             return self.take()
         if token.kind is _END:
-            self.offer(*keys)
+            self.note_expected_words(*keys)
         return None
 
-    def offer(self, *keys: str, starts: bool = False, given: frozenset[str] = frozenset()) -> None:
+    def note_expected_words(
+        self, *keys: str, starts_statement: bool = False, present_clauses: frozenset[str] = frozenset()
+    ) -> None:
         """Take note that these words may stand at the end of the text, if that is where the parser has come to.
 
         Args:
             keys: keywords; signs are passed over.
-            starts: whether they start a statement or a part of the program.
-            given: the clauses of a MOVE that there are already, by their words.
+            starts_statement: whether they start a statement or a part of the program.
+            present_clauses: the clauses of a MOVE that there are already, by their words.
         """
-        if self.expected is not None and self._at_cursor():
-            self.expected.given |= given
+        if self.expected is not None and self._is_at_cursor():
+            self.expected.present_clauses |= present_clauses
             self.expected.words += (key for key in keys if key[0].isalpha())
-            self.expected.starts |= starts
+            self.expected.starts_statement |= starts_statement
 
-    def want(self, wants: str, where: str = "") -> None:
+    def note_expected_operand(self, wants: str, where: str = "") -> None:
         """Take note that a value or name may stand at the end of the text; the arguments are those of ``mobile``."""
-        if self.expected is not None and self._at_cursor():
+        if self.expected is not None and self._is_at_cursor():
             self.expected.operand = wants, where
 
-    def guess(self) -> None:
+    def discard_expected(self) -> None:
         """Take what is looked for from here on for guessed: at the end of the text none of it is to be offered."""
-        if self.now.kind is _END:
-            self._wrong_before = -1
+        if self.current.kind is _END:
+            self._expected_error_count = -1
 
-    def _at_cursor(self) -> bool:
-        if self.now.kind is not _END or len(self.diagnostics) != self._wrong_before or self.expected is None:
+    def _is_at_cursor(self) -> bool:
+        if (
+            self.current.kind is not _END
+            or len(self.diagnostics) != self._expected_error_count
+            or self.expected is None
+        ):
             return False
-        self.expected.target, self.expected.procedure = self.target, self.in_procedure
-        self.expected.recovering = self.recovering > 0
+        self.expected.assignment_target, self.expected.enclosing_procedure = (
+            self.assignment_target,
+            self.enclosing_procedure,
+        )
+        self.expected.is_in_recovery = self.recover_depth > 0
         return True
 
-    def replace(self, key: str, kind: TokenKind = _KEYWORD) -> None:
+    def replace_current(self, key: str, kind: TokenKind = _KEYWORD) -> None:
         """Put the word that was meant, a keyword or name, in the place of the next token, which has been reported."""
-        token = self.now
-        self.now = self.tokens[self.at] = Token(kind, token.text, key, token.start, token.end, damaged=True)
+        token = self.current
+        self.current = self.tokens[self.index] = Token(kind, token.text, key, token.start, token.end, damaged=True)
 
-    def begin(self) -> int:
+    def next_begin(self) -> int:
         """Return where the next BEGIN stands; -1 if there is none."""
-        if self._next_begin < self.at:
-            ahead = range(max(self.at, self._next_begin), self._last)
+        if self._next_begin_index < self.index:
+            ahead = range(max(self.index, self._next_begin_index), self._end_index)
             here = (index for index in ahead if self.tokens[index].key == "BEGIN")
-            self._next_begin = next(here, self._last)
-        return self._next_begin if self._next_begin < self._last else -1
+            self._next_begin_index = next(here, self._end_index)
+        return self._next_begin_index if self._next_begin_index < self._end_index else -1
 
-    def more_ends(self) -> bool:
+    def has_surplus_end(self) -> bool:
         """Whether more ENDs follow than the statements around this pose and those further on wait for."""
-        if self._to_close is None:
+        if self._surplus_counts is None:
             steps = [(token.key == "END") - (token.key in ("BEGIN", "TRY")) for token in reversed(self.tokens)]
-            self._to_close = list(accumulate(steps))[::-1]
-        waiting = sum("END" in words or "RECOVER" in words for words in self.waiting)
-        return self._to_close[self.at] > waiting
+            self._surplus_counts = list(accumulate(steps))[::-1]
+        waiting = sum("END" in words or "RECOVER" in words for words in self.open_closers)
+        return self._surplus_counts[self.index] > waiting
 
     # ---- poses
 
-    def gap(self) -> Span:
+    def gap_span(self) -> Span:
         """Return the pose right behind the token read last, where a missing thing belongs."""
-        end = self.before.end if self.at else self.now.start
+        end = self.previous.end if self.index else self.current.start
         return Span(end, end)
 
-    def since(self, start: Token | Span) -> Span:
+    def span_since(self, start: Token | Span) -> Span:
         """Return the stretch from ``start`` to the token read last."""
-        first, end = start.start, self.before.end
+        first, end = start.start, self.previous.end
         return Span(first, max(first, end))
 
-    def same_line(self) -> bool:
+    def is_on_same_line(self) -> bool:
         """Whether the next token stands in the line of the one read last."""
-        return self.source.line(self.before.start) == self.source.line(self.now.start)
+        return self.source.line(self.previous.start) == self.source.line(self.current.start)
 
     # ---- depth
 
-    def enter(self) -> None:
+    def enter_level(self) -> None:
         """Go one step deeper.
 
         Raises:
@@ -231,9 +240,9 @@ class Tokens:
         """
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            self.too_deep()
+            self.fail_too_deep()
 
-    def too_deep(self) -> NoReturn:
+    def fail_too_deep(self) -> NoReturn:
         """Say that the nesting is too deep.
 
         Raises:
@@ -241,43 +250,43 @@ class Tokens:
         """
         statement = self.statement_depth > MAX_DEPTH // 2
         what = "statements" if statement else "parentheses and operations"
-        if self.deep < 0:
+        if self.overflow_index < 0:
             text = f"{what} are nested too deeply here"
             advice = "move a part of it to a procedure" if statement else "split the expression"
-            self.say_once("E119", text, self.now.span, f"more than {MAX_DEPTH} deep", advice=advice)
-        self.deep = self.at
-        raise TooDeepError if statement else LostError
+            self.report_once("E119", text, self.current.span, f"more than {MAX_DEPTH} deep", advice=advice)
+        self.overflow_index = self.index
+        raise NestingError if statement else PanicModeError
 
     # ---- saying what is wrong
 
     @property
-    def silent(self) -> bool:
+    def is_reported(self) -> bool:
         """Whether something has been reported at this position already."""
-        broken_text = self.before.damaged and self.before.kind is TokenKind.STRING
-        return self.now.damaged or self._silent == self.at or broken_text
+        broken_text = self.previous.damaged and self.previous.kind is TokenKind.STRING
+        return self.current.damaged or self._reported_index == self.index or broken_text
 
-    def hush(self) -> None:
+    def suppress_reports(self) -> None:
         """Take this pose for one about which something has been said."""
-        self._silent = self.at
+        self._reported_index = self.index
 
-    def say_once(self, code: str, message: str, span: Span, label: str, **details: Unpack[Details]) -> None:
+    def report_once(self, code: str, message: str, span: Span, label: str, **details: Unpack[Details]) -> None:
         """Report an error, unless one has been reported at this position; the arguments are those of ``report``."""
-        if not self.silent:
+        if not self.is_reported:
             self.report(code, message, span, label, **details)
-        self._silent = self.at
+        self._reported_index = self.index
 
-    def lost(self, message: str, label: str, *, code: str = "E111", advice: str = "") -> NoReturn:
+    def fail(self, message: str, label: str, *, code: str = "E111", advice: str = "") -> NoReturn:
         """Say what is missing at the next token, unless that was reported before, and give up the statement.
 
         Raises:
             LostError: always.
         """
         # At the end of the text there is nothing to mark; the gap before it is the pose.
-        span = self.gap() if self.done else self.now.span
-        self.say_once(code, message, span, label, advice=advice)
-        raise LostError
+        span = self.gap_span() if self.is_at_end else self.current.span
+        self.report_once(code, message, span, label, advice=advice)
+        raise PanicModeError
 
-    def insert(self, key: str, what: str, *, code: str = "E112", advice: str = "", alone: bool = True) -> None:
+    def insert_missing(self, key: str, what: str, *, code: str = "E112", advice: str = "", alone: bool = True) -> None:
         """Say that ``key`` is missing behind the token read last, and go on as if it had been there.
 
         Args:
@@ -287,10 +296,10 @@ class Tokens:
             advice: of the diagnostic.
             alone: whether nothing else is missing, so that putting it in is a cure.
         """
-        gap = self.gap()
+        gap = self.gap_span()
         # A word needs blanks around it; a sign goes where it is missing.
         fixes = (Fix(gap, f" {key}" if key[0].isalpha() else key),) if alone else ()
-        self.say_once(code, f"missing `{key}` {what}", gap, f"expected `{key}` here", advice=advice, fixes=fixes)
+        self.report_once(code, f"missing `{key}` {what}", gap, f"expected `{key}` here", advice=advice, fixes=fixes)
 
     def expect(self, key: str, where: str, *, statement: bool = False) -> None:
         """Read ``key``; or say that it is missing, and go on as if it had been there.
@@ -305,46 +314,48 @@ class Tokens:
         """
         if self.accept(key):
             return
-        if self._misspelt(key):
+        if self._is_misspelt(key):
             self.report(
-                "E112", f"expected `{key}` {where}", self.now.span, f"expected `{key}`", advice=f"write `{key}`"
+                "E112", f"expected `{key}` {where}", self.current.span, f"expected `{key}`", advice=f"write `{key}`"
             )
             self.take()
             return
         closing = key in (")", "]")
-        ends = not closing and not statement and (self.done or self.sees(";", "END", *self.words.statements))
+        ends = (
+            not closing and not statement and (self.is_at_end or self.matches(";", "END", *self.vocabulary.statements))
+        )
         # What a word stands in front of begins with no sign but a parenthesis.
-        alone = not key[0].isalpha() or not (ends or (self.now.kind is _SYMBOL and self.now.key != "("))
-        self.insert(key, where, advice=f"insert `{key}` after `{self.before.text}`", alone=alone)
+        alone = not key[0].isalpha() or not (ends or (self.current.kind is _SYMBOL and self.current.key != "("))
+        self.insert_missing(key, where, advice=f"insert `{key}` after `{self.previous.text}`", alone=alone)
         if ends:
-            raise LostError
+            raise PanicModeError
 
-    def _misspelt(self, key: str) -> bool:
+    def _is_misspelt(self, key: str) -> bool:
         """Whether a name stands where a keyword should: one like it, or any with another name or arm behind it."""
-        token, after = self.now, self.ahead()
+        token, after = self.current, self.peek()
         if token.kind is not _NAME or not key[0].isalpha() or after.key in ("=", ":=", "(", "["):
             return False
         if closest(token.text, (key,)):
             return True
-        return after.kind in (_NAME, TokenKind.ARM) and self.same_line()
+        return after.kind in (_NAME, TokenKind.ARM) and self.is_on_same_line()
 
-    def check_length(self, name: tree.Name) -> None:
+    def check_name_length(self, name: tree.Name) -> None:
         """Refuse a name that is too long."""
-        longest = self.offered.longest_name
+        longest = self.standard_vocabulary.longest_name
         if len(name.text) > longest:
             text = f"the name `{name.text}` is longer than {longest} characters"
-            note = f"names of {self.offered.name} have 1 to {longest} characters"
+            note = f"names of {self.standard_vocabulary.name} have 1 to {longest} characters"
             self.report("E103", text, name.span, f"{len(name.text)} characters", note=note)
 
-    def refuse_reserved(self) -> None:
+    def report_reserved_name(self) -> None:
         """Say once of the word that stands here that it cannot be a name."""
-        token = self.now
-        if token.key in self._refused:
+        token = self.current
+        if token.key in self._reported_reserved:
             return
-        self._refused.add(token.key)
+        self._reported_reserved.add(token.key)
         # Only what looks alike: T0 for TO.
         advice = did_you_mean(closest(token.text, self.declared, limit=0))
-        if not advice and is_later(token.key):
+        if not advice and is_reserved_in_rlo_2_only(token.key):
             if self.standard is Standard.RLO_83:
                 text = f"the keyword `{token.text}` belongs to RLO-2"
                 self.report("E214", text, token.span, "in RLO-83 it may be a name, but it is not declared")
@@ -354,9 +365,9 @@ class Tokens:
         self.report("E107", text, token.span, "a reserved word", advice=advice)
 
 
-Rule: TypeAlias = Callable[[Tokens], tree.Statement]
+Rule: TypeAlias = Callable[[TokenStream], tree.Statement]
 
 
-def shown(token: Token) -> str:
+def describe_token(token: Token) -> str:
     """Return how a token is called in a message."""
     return "the end of the text" if token.kind is TokenKind.END else f"`{token.text}`"

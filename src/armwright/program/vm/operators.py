@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.program.bytecode.instructions import Op
 from armwright.program.language.units import UnitSystem
-from armwright.program.syntax.pose_literals import EXACT, REPAIRABLE
+from armwright.program.syntax.pose_literals import EXACT_TOLERANCE, REPAIR_TOLERANCE
 from armwright.spatial.poses import from_noap, homogeneous, inverse
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
@@ -92,9 +92,9 @@ def pose_from_numbers(numbers: Sequence[float], units: UnitSystem) -> Array:
     """
     X = from_noap([*numbers[:9], *(length * units.metres for length in numbers[9:])])
     error = float(orthonormality_error(X[:3, :3]))
-    if error > REPAIRABLE:
+    if error > REPAIR_TOLERANCE:
         raise EvaluationError("E206", "the first nine numbers are not a rotation", f"off by {error:.2g}")
-    return X if error <= EXACT else homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
+    return X if error <= EXACT_TOLERANCE else homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
 
 
 # Operations on values alone.

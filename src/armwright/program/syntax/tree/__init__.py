@@ -52,10 +52,10 @@ from armwright.program.syntax.tree.values import (
     String,
     Unary,
     Variable,
-    chain,
+    operation_chain,
 )
 
-__all__ = ["Statement", "chain", "clause_word", "dump", "walk"]
+__all__ = ["Statement", "clause_word", "dump", "operation_chain", "walk"]
 __all__ += ["Declaration", "Header", "Import", "Procedure", "Program", "TypeName", "Units"]
 __all__ += ["Affix", "Assign", "Unfix"]
 __all__ += ["Grasp", "Open", "Operate", "ReadSystem", "ReadVisions"]

@@ -29,7 +29,7 @@ class If(Node):
     otherwise: "Statement | None"
 
     @property
-    def chain(self) -> tuple[list["If"], "Statement | None"]:
+    def else_if_chain(self) -> tuple[list["If"], "Statement | None"]:
         """This IF and all that follow it with ELSE IF, and the statement behind the last ELSE."""
         conditionals, last = [self], self.otherwise
         while isinstance(last, If):
@@ -40,7 +40,7 @@ class If(Node):
     @property
     def statements(self) -> "tuple[Statement, ...]":
         """The statements of its chain of which one is done."""
-        conditionals, last = self.chain
+        conditionals, last = self.else_if_chain
         return (*(conditional.then for conditional in conditionals), *(() if last is None else (last,)))
 
 

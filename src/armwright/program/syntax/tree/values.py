@@ -98,7 +98,7 @@ class Binary(Node):
     right: "Expression"
 
 
-def chain(node: Binary) -> tuple["Expression", list[Binary]]:
+def operation_chain(node: Binary) -> tuple["Expression", list[Binary]]:
     """Return the first operand of a chain of operations, and the operations from the first to the last.
 
     ``a + b + c`` is ``(a + b) + c``: a sum of ten thousand terms is that deep on its left side, so nobody goes down
