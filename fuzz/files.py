@@ -21,7 +21,7 @@ from armwright.accuracy.measurement_file import read_measurements as read_accura
 from armwright.arm.load import load_arm, load_urdf, read_arm
 from armwright.calibration.measurements import read_measurements
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimation.measurement_file import read_measured
+from armwright.clearance.estimation.measurement_file import read_clearance_measurements
 from armwright.clearance.reader import read_linkage
 from armwright.errors import ArmwrightError
 from armwright.motion.poses_file import read_poses
@@ -177,7 +177,7 @@ TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]
     ),
     "clearance": (
         ".csv",
-        read_measured,
+        read_clearance_measurements,
         lambda: _tables(EXAMPLES / "five_bar_rest.csv", EXAMPLES / "five_bar_paths.csv", lines=300),
     ),
 }

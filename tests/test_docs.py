@@ -12,8 +12,8 @@ import pytest
 import armwright
 from armwright.arm.load import read_arm, read_load
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimation.measurement_file import RestMeasurement, read_measured
-from armwright.clearance.ideal import closed, tip_of
+from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
+from armwright.clearance.ideal import close_pins, tip_position
 from armwright.clearance.reader import read_linkage
 from armwright.clearance.scenario import assembly_guess
 from armwright.errors import FileFormatError
@@ -121,10 +121,10 @@ def test_linkage_of_the_page(tmp_path: Path) -> None:
     press = read_linkage(tmp_path / "press.toml")
 
     guess = assembly_guess(press)
-    q = closed(press, guess, drives=guess[list(press.driven)])
+    q = close_pins(press, guess, drives=guess[list(press.driven)])
     # Crank and rod of 40 and 200 mm: 40 sin 60° + √(200² - (40 cos 60°)²) below, and the face 50 mm below that.
     height = -(0.04 * np.sin(np.pi / 3) + np.sqrt(0.2**2 - 0.02**2)) - 0.05
-    np.testing.assert_allclose(tip_of(press, q), (0.0, height), atol=1e-12)
+    np.testing.assert_allclose(tip_position(press, q), (0.0, height), atol=1e-12)
     assert press.clearances == {"wrist": pytest.approx(5e-5)}
     assert press.drives[0].kind == "motion"
 
@@ -147,14 +147,14 @@ def test_measurements_of_the_page(name: str, tmp_path: Path) -> None:
     head = f"{name},{rows[0]}"
     if name == "pose":
         (tmp_path / "today.csv").write_text("\n".join([head, *rows[1:]]), encoding="utf-8")
-        found = read_measured(tmp_path / "today.csv")
+        found = read_clearance_measurements(tmp_path / "today.csv")
         assert isinstance(found, RestMeasurement)
         assert found.readings == (2, 1)
         mixed = "\n".join([head.replace(",x_mm,y_mm", ",x_m,y_m"), *rows[1:]])
-        assert f"    armwright: {said(tmp_path / 'today.csv', mixed, read_measured)}\n" in PLAY
+        assert f"    armwright: {said(tmp_path / 'today.csv', mixed, read_clearance_measurements)}\n" in PLAY
     else:
         few = "\n".join([head, *rows[1:]])
-        assert "expected 20 samples or more, got 2" in said(tmp_path / "today.csv", few, read_measured)
+        assert "expected 20 samples or more, got 2" in said(tmp_path / "today.csv", few, read_clearance_measurements)
 
 
 def known_keys(message: str) -> list[str]:

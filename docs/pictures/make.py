@@ -23,7 +23,7 @@ from armwright.kinematics import forward, inverse, link_poses
 from armwright.kinematics.inverse_kinematics.solution import Branch
 from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.report.calibration_files import distances_figure
-from armwright.report.svg import alike, steady
+from armwright.report.svg import alike, normalize_svg
 from armwright.simulation import simulate
 from armwright.simulation.integrators import Adaptive
 from armwright.simulation.result import Event, JointState, Simulation
@@ -51,7 +51,7 @@ def write(figure: Figure, name: str) -> None:
     """Write a figure beside this script, unless the one that is there is the same but for rounding."""
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None})
-    picture, new = HERE / name, steady(text.getvalue())
+    picture, new = HERE / name, normalize_svg(text.getvalue())
     if not (picture.exists() and alike(new, picture.read_text(encoding="utf-8"))):
         picture.write_text(new, encoding="utf-8")
 
@@ -73,7 +73,7 @@ def seen(p: Array) -> Array:
     return p @ np.array([[-s, c, 0], [-su * c, -su * s, cu], [cu * c, cu * s, su]]).T
 
 
-def bars(arm: Arm, q: Array) -> list[tuple[Array, Array, float, int]]:
+def bar_chart(arm: Arm, q: Array) -> list[tuple[Array, Array, float, int]]:
     """Return the arm as straight bars: ends [m], width [points], and a part: column, arm, hand, axis of joint 5."""
     X = link_poses(arm, q)
     shoulder, elbow, wrist = X[1, :3, 3], X[2, :3, 3], X[4, :3, 3]
@@ -110,7 +110,7 @@ def draw_configuration(axes: Axes, arm: Arm, branch: Branch) -> None:
     fills = ("#d3d9df", light, "#52606d", dark)
     strength = 1.0 if branch.allowed else 0.45
     floor(axes)
-    parts = bars(arm, branch.q)
+    parts = bar_chart(arm, branch.q)
     for start, end, width, _ in parts:
         shadow = seen(np.array([start, end]) * (1, 1, 0) + (0, 0, FLOOR))
         axes.plot(shadow[:, 0], shadow[:, 1], color=GRID, linewidth=0.7 * width, solid_capstyle="round", zorder=1)

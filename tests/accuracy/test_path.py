@@ -295,7 +295,11 @@ MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
         "the same columns, got 2 and 3",
     ),
     "no times": (lambda: path_velocity(LINE, [RUN] * 10, 1), InvalidValueError, "needs the time of every sample"),
-    "no speed": (lambda: path_velocity(LINE, [TIMED] * 10, 0), InvalidValueError, "velocity: the commanded speed: expected more than 0 m/s, got 0"),
+    "no speed": (
+        lambda: path_velocity(LINE, [TIMED] * 10, 0),
+        InvalidValueError,
+        "velocity: the commanded speed: expected more than 0 m/s, got 0",
+    ),
     "part": (lambda: path_velocity(LINE, [TIMED] * 10, 1, part=(1, 0)), InvalidValueError, "a part within 0 to 1"),
     "no corner": (
         lambda: corner_deviations(LINE, [RUN] * 3),
@@ -308,7 +312,11 @@ MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
         "run 1 has no sample on the leg after the corner at 1000 mm",
     ),
     "inside": (lambda: settling([TIMED] * 3, 5.0), InvalidValueError, "run 1 begins within 5000 mm of its end"),
-    "no band": (lambda: settling([STANDSTILL] * 3, 0), InvalidValueError, "settling: band: expected more than 0 m, got 0"),
+    "no band": (
+        lambda: settling([STANDSTILL] * 3, 0),
+        InvalidValueError,
+        "settling: band: expected more than 0 m, got 0",
+    ),
     "no rest": (
         lambda: settling([Trace(positions=((0, 0), (5, 0), (0, 0), (1, 0)), times=(0, 1, 9.5, 10))] * 3, 0.1),
         InvalidValueError,

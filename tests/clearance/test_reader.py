@@ -133,7 +133,7 @@ def test_no_file(tmp_path: Path) -> None:
         ("friction = 0.0", "restitution = 1.5", r"restitution.*1\.5"),
         ('tip = "slider:P"', 'tipp = "slider:P"', "tip"),
         ("gravity = [0.0, -9.81]", "gravity = 9.81", "gravity"),
-        ('on = "crank:A"', 'on = "slider:P"', "body rod hangs on slider, which must be named before it"),
+        ('on = "crank:A"', 'on = "slider:P"', "body rod is carried by slider, which must be named before it"),
     ],
 )
 def test_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:

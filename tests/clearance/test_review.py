@@ -15,7 +15,7 @@ from armwright.clearance.estimation.measurement_file import (
     RestMeasurement,
     read_clearance_measurements,
 )
-from armwright.clearance.estimation.static_estimate import estimate_at_rest, rest_matrix
+from armwright.clearance.estimation.static_estimate import closed_at_poses, estimate_at_rest, rest_matrix
 from armwright.clearance.feature_sweep import FeatureSweep, is_sweep_of
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import tip_sensitivity
@@ -93,7 +93,7 @@ class TestNothingToLean:
         floating = attrs.evolve(five_bar, gravity=(0.0, 0.0), loads=())
 
         with pytest.raises(InvalidValueError, match="pin J2 of five-bar carries no force at rest"):
-            rest_matrix(floating, POSES)
+            rest_matrix(floating, closed_at_poses(floating, POSES))
         with pytest.raises(InvalidValueError, match="carries no force"):
             estimate_at_rest(floating, POSES, np.zeros((3, 2)))
 
@@ -108,7 +108,7 @@ class TestNothingToLean:
     def test_freedoms(self, name: str, freedoms: str) -> None:
         """A linkage of one freedom cannot follow a position in the plane, and hears how many freedoms it has."""
         with pytest.raises(InvalidValueError, match=f"with its pins closed it has {freedoms}"):
-            rest_matrix(load_linkage(name), POSES)
+            rest_matrix(load_linkage(name), closed_at_poses(load_linkage(name), POSES))
 
     @pytest.mark.parametrize("noise", [0.0, -1e-6, np.inf, np.nan])
     def test_noise(self, five_bar: Linkage, noise: float) -> None:

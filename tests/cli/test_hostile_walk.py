@@ -25,7 +25,7 @@ EXAMPLES = HERE.parent / "examples"
 Q = "10,-60,80,40,50,60"
 # What most commands need.
 LOADED = ("armwright.cli.app", "armwright.arm.load", "armwright.program.api", "armwright.cell.reader",
-          "armwright.program.vm.interpreter", "armwright.report.files", "armwright.motion.moves",
+          "armwright.program.vm.interpreter", "armwright.report.run_files", "armwright.motion.moves",
           "armwright.clearance.reader", "armwright.compiled.arm", "rich.markdown")  # fmt: skip
 # By the words that call it: arguments with which a command does something small.
 CALLS: dict[str, list[str]] = {

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from armwright.arm.load import load_arm, load_urdf, read_arm
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimation.measurement_file import RestMeasurement, read_measured
+from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
 from armwright.clearance.reader import read_linkage
 from armwright.cli.app import app
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
@@ -25,7 +25,7 @@ from armwright.files.rows import read_rows
 from armwright.motion.poses_file import read_poses
 from armwright.program import compile as compile_program
 from armwright.program.diagnostics.render import render
-from armwright.program.language_server.cell_lookup import Cells
+from armwright.program.language_server.cell_lookup import CellCache
 
 ROOT = Path(__file__).resolve().parents[2]
 IDENTITY = "[1,0,0, 0,1,0, 0,0,1, 0,0,0]"
@@ -145,11 +145,13 @@ def test_poses_of_a_linkage(tmp_path: Path) -> None:
     rows = "".join(f"P{i // 2},{i // 2},0,{i // 2},0.1\n" for i in range(6))
     table.write_text(f"pose,commanded_x_mm,commanded_y_mm,x_mm,y_mm\n{rows}")
 
-    found = read_measured(table)
+    found = read_clearance_measurements(table)
     assert isinstance(found, RestMeasurement)
     assert len(found.poses) == 3
     with raised(entries=2):
-        assert "rest.csv:6: pose: too many: the limit is 2 entries" in refused(lambda: read_measured(table))
+        assert "rest.csv:6: pose: too many: the limit is 2 entries" in refused(
+            lambda: read_clearance_measurements(table)
+        )
 
 
 def test_typed_programs() -> None:
@@ -186,8 +188,8 @@ def test_what_a_program_imports(strange: tuple[str, str], tmp_path: Path) -> Non
     compiled = compile_program(program)
 
     assert f"expected a file, got {kind}" in render(compiled.diagnostics, compiled.source)
-    assert f"expected a file, got {kind}" in refused(lambda: Cells().imported(tmp_path, path))
-    assert f"expected a file, got {kind}" in refused(lambda: Cells().around(tmp_path, "", Path(path)))
+    assert f"expected a file, got {kind}" in refused(lambda: CellCache().read_import(tmp_path, path))
+    assert f"expected a file, got {kind}" in refused(lambda: CellCache().find_cell(tmp_path, "", Path(path)))
 
 
 def test_the_model_of_an_arm(strange: tuple[str, str], tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from armwright.errors import FileFormatError
 from armwright.program import Compilation, KnownCell, Source, compile as translate
 from armwright.program.language.words import Standard
-from armwright.program.semantics.cell_symbols import Imported, ReadImport
+from armwright.program.semantics.cell_symbols import ImportedFrames, ReadImport
 
 ONE_ARM = KnownCell(
     arms=frozenset({"ARM_1"}),
@@ -58,10 +58,10 @@ def imports_of(text: str) -> ReadImport | None:
     """Return a reader of the files that the comments of a program tell of; any other file is missing."""
     files = {path: hanging(re.split(r",\s*", names.strip())) for path, names in IMPORT.findall(text)}
 
-    def read(path: str) -> Imported:
+    def read(path: str) -> ImportedFrames:
         if path not in files:
             raise FileFormatError(path, None, "", "there is no such file")
-        return Imported(frames=files[path])
+        return ImportedFrames(frames=files[path])
 
     return read if files else None
 

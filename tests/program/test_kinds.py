@@ -7,10 +7,10 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.semantics import check
-from armwright.program.semantics.expression_types import ExpressionType, written
-from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.expression_types import ExpressionType, expression_text
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import Symbols
-from armwright.program.semantics.type_check import sort
+from armwright.program.semantics.type_check import infer_type
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import scan
 from armwright.program.syntax.parser import parse
@@ -46,9 +46,9 @@ def expression(text: str) -> tree.Expression:
 
 def judged(text: str) -> tuple[ExpressionType | None, list[Diagnostic]]:
     """Return what an expression is, and what is said of it."""
-    names = Names(None)
+    names = NameResolver(None)
     names.symbols.types.update(DECLARED)
-    return sort(names, expression(text)), names.diagnostics
+    return infer_type(names, expression(text)), names.diagnostics
 
 
 def checked(text: str) -> tuple[Symbols, list[Diagnostic]]:
@@ -155,7 +155,7 @@ def test_unknown_is_silent(text: str) -> None:
 )
 def test_written(text: str) -> None:
     """Advice repeats an expression as one would write it."""
-    assert written(expression(text)) == text
+    assert expression_text(expression(text)) == text
 
 
 def test_long_expressions_are_not_repeated() -> None:
@@ -182,15 +182,6 @@ def test_scopes() -> None:
     assert inside.declared("F") != main.declared("F")
     assert inside.declared("G") == main.declared("G") != None  # noqa: E711
     assert inside.declared("STATION") is None
-
-
-def test_frames_of_a_scope() -> None:
-    """A frame by name is a single FRAME or an arm; an array, an element and an expression are none."""
-    symbols, _ = checked("VAR f : FRAME ; a : ARRAY [2] OF FRAME ; t : TRANS ; BEGIN END.")
-    scope = symbols.scope(None)
-    names = {text: scope.frame(expression(text)) for text in ("f", "arm-1", "world", "a", "a[1]", "t", "f * t", "x")}
-
-    assert {text: name for text, name in names.items() if name} == {"f": "F", "arm-1": "ARM_1", "world": "WORLD"}
 
 
 def test_units_of_a_program() -> None:

@@ -10,7 +10,7 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.program.vm.interpreter import RunError, interpret
 from armwright.program.vm.recording import Recording
-from armwright.report.files import summary
+from armwright.report.run_files import summary_data
 from program.guarded import guarded_program
 from program.running import cell_of, code_of, corpus_text
 from program.streams import Differences, differences, share_at_stop
@@ -193,5 +193,5 @@ def test_too_deep() -> None:
     }
     *_, move = (effect for effect in recording.effects if effect.kind == "MOVE")
     assert move.data["contact"] == stop.data["contact"]
-    (contact,) = summary(recording, [])["contacts"]
+    (contact,) = summary_data(recording, [])["contacts"]
     assert (contact["t1"], contact["depth"]) == (pytest.approx(move.t1), pytest.approx(depth, abs=1e-6))

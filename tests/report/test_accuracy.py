@@ -8,7 +8,7 @@ import pytest
 
 from armwright.accuracy.assessment import Assessment, assess
 from armwright.accuracy.measurement_file import read_measurements
-from armwright.report.accuracy_figures import drawings
+from armwright.report.accuracy_figures import accuracy_drawings
 from armwright.report.accuracy_files import accuracy_files
 
 NAME = r"P<1>&$\x$"
@@ -55,7 +55,7 @@ def everything(tmp_path: Path, rng: np.random.Generator) -> Assessment:
 
 def test_every_measure_is_drawn(everything: Assessment) -> None:
     """Every kind of test has its figure, each with words about it; a distance is numbers only."""
-    drawn = drawings(everything)
+    drawn = accuracy_drawings(everything)
 
     kinds = {one.name.partition("-")[2] for one in drawn}
     assert kinds == {test.kind for test in everything.tests} - {"distance"} | {"velocity"}
@@ -86,7 +86,7 @@ def test_page(everything: Assessment) -> None:
 
 def test_units_for_people(everything: Assessment) -> None:
     """People read millimetres, degrees and percent, plus and minus where it is one, and how many cycles were asked."""
-    by_symbol = {one.symbol: one for one in everything.within({"RV": 0.5, "RD": 1e-9}).measures}
+    by_symbol = {one.symbol: one for one in everything.with_limits({"RV": 0.5, "RD": 1e-9}).measures}
 
     assert by_symbol["C"].displayed_unit == "mm/N"
     assert float(by_symbol["C"].displayed_value) == pytest.approx(0.02, rel=0.02)

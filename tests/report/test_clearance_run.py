@@ -21,8 +21,8 @@ from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import ShapeError
 from armwright.report.clearance_run_figures import clearance_run_figures, magnification, round_number
 from armwright.report.clearance_run_files import samples_csv
-from armwright.report.clearance_run_page import clearance_run_page, film
-from armwright.report.five_bar_figure import workspace_figure, workspace_of
+from armwright.report.clearance_run_page import animation_data, clearance_run_page
+from armwright.report.five_bar_figure import scenario_workspace, workspace_figure
 
 # The page writes five significant digits.
 FIVE_DIGITS = 0.5e-4
@@ -68,7 +68,7 @@ def diverged(simulation: Simulation) -> ClearanceRun:
 
 
 @cache
-def page_of(run: ClearanceRun) -> str:
+def run_page_data(run: ClearanceRun) -> str:
     return clearance_run_page(
         run, clearance_run_figures(run), title="A & B", command="armwright clearance simulate <x>"
     )
@@ -131,7 +131,7 @@ def test_diverged_run(simulation: Simulation) -> None:
     assert run.as_data()["pins"]["J2"]["peak_force"] is None
     assert len(list(samples_csv(run))) == 1 + 500
     assert "shown until" in run.notes[0]
-    assert "diverged" in page_of(run)
+    assert "diverged" in run_page_data(run)
     assert len(clearance_run_figures(run)) == 6
 
 
@@ -185,11 +185,11 @@ def test_round_numbers(x: float, round_one: float) -> None:
 def test_workspace(task: Scenario, run: ClearanceRun, cranked: dict[str, ClearanceRun]) -> None:
     """The workspace of a five-bar is drawn in the mode in which it stands, of no other linkage at all."""
     assert run.simulation.scenario is task
-    drawn = workspace_of(task)
+    drawn = scenario_workspace(task)
 
     assert drawn is not None
     assert "elbows out" in drawn.caption
-    assert workspace_of(cranked["four-bar"].simulation.scenario) is None
+    assert scenario_workspace(cranked["four-bar"].simulation.scenario) is None
     for mode in ("left", "in"):
         assert (
             workspace_figure(FiveBar(motors=[[-0.45, 0], [0.45, 0]], cranks=[0.3, 0.3], rods=[0.4, 0.4]), mode).svg
@@ -202,7 +202,7 @@ def test_workspace(task: Scenario, run: ClearanceRun, cranked: dict[str, Clearan
 
 def test_film(run: ClearanceRun) -> None:
     """The film puts every point where the linkage has it: without play on the path, with play off by the error."""
-    shown = film(run)
+    shown = animation_data(run)
 
     rows = len(shown["t"])
     tip = shown["points_m"].reshape(rows, -1, 2)[:, shown["tip"]]
@@ -230,7 +230,7 @@ def test_long_runs_are_thinned(simulation: Simulation) -> None:
         )
     )
 
-    shown = film(run)
+    shown = animation_data(run)
 
     assert len(shown["t"]) <= 2601
     assert shown["t"][-1] == time[-1]
@@ -239,7 +239,7 @@ def test_long_runs_are_thinned(simulation: Simulation) -> None:
 
 def test_page_carries_all(run: ClearanceRun) -> None:
     """The page names no address, no text on it is taken for HTML, and it stays below three megabytes."""
-    page = page_of(run)
+    page = run_page_data(run)
 
     assert len(page) < 3 * MEGABYTE
     assert "<x>" not in page
@@ -254,7 +254,7 @@ def test_page_carries_all(run: ClearanceRun) -> None:
 def test_other_linkages(cranked: dict[str, ClearanceRun], name: str) -> None:
     """A slider-crank has a rail and a four-bar none; both have one motor on the ground and one bearing."""
     run = cranked[name]
-    shown = film(run)
+    shown = animation_data(run)
 
     assert len(shown["rails"]) == (1 if name == "slider-crank" else 0)
     assert shown["motors"] == [[0.0, 0.0]]
@@ -276,7 +276,7 @@ def test_bearing_in_the_ground() -> None:
 
     run = ClearanceRun.of(simulate(prepare_scenario(other, path, Settings(start="centred"))))
 
-    (shown,) = film(run)["pins"]
+    (shown,) = animation_data(run)["pins"]
     assert shown["bearing"] == [0.3, 0.0]
     assert isinstance(shown["journal"], int)
     assert all(one.svg for one in clearance_run_figures(run))
@@ -313,7 +313,7 @@ class Opened:
 
 def written(file: Path, run: ClearanceRun) -> Path:
     """Write the page of a run."""
-    file.write_text(page_of(run), encoding="utf-8")
+    file.write_text(run_page_data(run), encoding="utf-8")
     return file
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.report import clearance_figures, move_figures
-from armwright.report.figures import bars, curves, literal
+from armwright.report.figures import bar_chart, curves, plain_label
 
 # What is no formula, with a tab and an end of line, what a terminal obeys, half a letter, and a page of letters.
 STRANGE = "$x_{$\t$\\frac\n\x1b[31m\ud800" + "a" * 100_000
@@ -14,10 +14,10 @@ STRANGE = "$x_{$\t$\\frac\n\x1b[31m\ud800" + "a" * 100_000
 
 def test_literal() -> None:
     """Dollars stay dollars, blanks blanks; what is no letter becomes a mark, and a page is cut."""
-    assert literal("a $ b") == r"a \$ b"
-    assert literal("a\tb\nc") == "a b c"
-    assert literal("\x1b\ud800") == "\N{REPLACEMENT CHARACTER}" * 2
-    assert len(literal("a" * 1000)) < 200
+    assert plain_label("a $ b") == r"a \$ b"
+    assert plain_label("a\tb\nc") == "a b c"
+    assert plain_label("\x1b\ud800") == "\N{REPLACEMENT CHARACTER}" * 2
+    assert len(plain_label("a" * 1000)) < 200
 
 
 @pytest.mark.parametrize("what", ["curves", "bars", "panels", "path", "surface", "lines", "paths"])
@@ -29,13 +29,13 @@ def test_strange_texts(what: str) -> None:
     plane = np.stack([x, x], axis=1)
     draw = {
         "curves": lambda: curves(STRANGE, x, {STRANGE: x, "b": x}, x_label="s", y_label="m"),
-        "bars": lambda: bars(STRANGE, ["a"], {STRANGE: [1.0]}, y_label="m"),
+        "bars": lambda: bar_chart(STRANGE, ["a"], {STRANGE: [1.0]}, y_label="m"),
         "panels": lambda: move_figures.panels(
             STRANGE, x, [move_figures.Panel(STRANGE, "m", {STRANGE: x})], marks={STRANGE: 0.5}
         ),
-        "path": lambda: move_figures.path_in_space(STRANGE, X, {STRANGE: np.zeros(3)}),
+        "path": lambda: move_figures.path_figure(STRANGE, X, {STRANGE: np.zeros(3)}),
         "surface": lambda: clearance_figures.surface(STRANGE, x, x, np.outer(x, x), ("a", "b", "c")),
-        "lines": lambda: clearance_figures.lines_of_spectrum(STRANGE, x, {STRANGE: x}, "mm"),
+        "lines": lambda: clearance_figures.spectrum_figure(STRANGE, x, {STRANGE: x}, "mm"),
         "paths": lambda: clearance_figures.paths(STRANGE, {STRANGE: {STRANGE: plane}}, np.zeros((1, 2))),
     }[what]
     with warnings.catch_warnings():

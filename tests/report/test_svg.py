@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.report.figures import curves
-from armwright.report.svg import alike, steady
+from armwright.report.svg import alike, normalize_svg
 
 DOCS = Path(__file__).parents[2] / "docs"
 DRAWINGS = sorted([*(DOCS / "gallery").glob("*.svg"), *(DOCS / "pictures").glob("*.svg")])
@@ -36,7 +36,7 @@ def test_drawings_of_the_docs(drawing: Path) -> None:
     """The drawings of the docs are of that kind, and every part that they name is there."""
     text = drawing.read_text(encoding="utf-8")
 
-    assert steady(text) == text
+    assert normalize_svg(text) == text
     root = ET.fromstring(text)
     parts = {one.get("id") for one in root.iter() if one.get("id")}
     named = {value[1:] for one in root.iter() for key, value in one.attrib.items() if key.endswith("href")}

@@ -19,7 +19,7 @@ from armwright.errors import ShapeError
 from armwright.files.result_table import ResultTable
 from armwright.version import __version__
 
-# Residual of the energy balance that a note tells, as a part of the losses, and so little that none does [J].
+# Residuals of the energy balance above this part of the losses, and above this energy [J], have a note.
 _MAX_IMBALANCE, _NEGLIGIBLE = 0.02, 1e-4
 # Indentation beyond which the contact law of Hertz does not hold, as a part of the clearance.
 _MAX_INDENTATION = 0.1

@@ -1,8 +1,8 @@
 """The correction of paths for joint clearance: nodes, or the entire path, are moved against the error.
 
-The correction is a fixed-point iteration, not a search: where the tip misses its goal by e, the commanded path is moved
-by -e, and after one or two simulations the tip reaches the goal. The correction is the mean error over
-indistinguishable runs, since after some impacts a single run is chance; where the clearances are known as a
+The correction is a fixed-point iteration, not a search: where the tip has the error e at its goal, the commanded path
+is moved by -e, and after one or two simulations the tip reaches the goal. The correction is the mean error over
+indistinguishable runs, since after some impacts a single run is random; where the clearances are known as a
 distribution, it is the mean over that.
 
 Source:
@@ -31,7 +31,7 @@ from armwright.errors import InvalidValueError, ShapeError
 _MAX_CORRECTION = 0.02
 # Knots of the shift of a path: more would be closer together than the samples of a simulation.
 _MAX_KNOTS = 1000
-# Three rounds reduce the error to a millionth; the remainder is chance.
+# Three rounds reduce the error to a millionth; the remainder is random.
 _MAX_ROUNDS = 100
 
 
@@ -44,7 +44,7 @@ class Correction:
         nodes: (k, 2) of the commanded path [m].
         before: (r, j) error at the goals of the original path, of r runs: one for each sample of the clearances, or
             sixteen indistinguishable ones where these are known [m].
-        after: (r, j) error there of the corrected path; its scatter over the runs is chance [m].
+        after: (r, j) error there of the corrected path; its scatter over the runs is random [m].
         history: mean error at the goals before the first and after each round [m].
         best: number of the round whose path this is; 0 for the original path.
     """

@@ -1,7 +1,7 @@
 """The features of the error curves of many linkages on several paths, as the task of a sweep.
 
 Each linkage is simulated several times with indistinguishable clearances: a feature is the mean over these replicates,
-and their spread is the part of it that is chance.
+and their spread is its random variation.
 """
 
 from __future__ import annotations
@@ -159,15 +159,15 @@ class FeatureSweep:
 
 
 def is_random(values: Array, spreads: Array, runs: int) -> bool:
-    """Whether a feature is chance alone: it varies more between indistinguishable runs than over the design.
+    """Whether a feature is nothing but random: it varies more between indistinguishable runs than over the design.
 
     Args:
         values: (m,) means over such runs, at the points of a design.
         spreads: (m,) their standard deviations there.
-        runs: number of runs in each mean, which contains a part of the chance.
+        runs: number of runs in each mean, which contains a part of the random variation.
     """
-    chance = float(np.mean(spreads**2))
-    return chance > float(np.var(values)) - chance / runs
+    variance = float(np.mean(spreads**2))
+    return variance > float(np.var(values)) - variance / runs
 
 
 def feature_vector(values: Mapping[str, Array], paths: Sequence[str], names: Sequence[str]) -> Array:

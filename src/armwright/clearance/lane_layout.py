@@ -1,6 +1,6 @@
-"""Where the numbers of a run stand in the lanes of a compiled simulation.
+"""The layout of the numbers of a run in the lanes of a compiled simulation.
 
-``LANES`` runs stand side by side: number ``i`` of run ``k`` is at ``i * LANES + k`` of an array. The sizes here are
+``LANES`` runs are interleaved: number ``i`` of run ``k`` is at ``i * LANES + k`` of an array. The sizes here are
 those of the smallest linkage there is, one coordinate and one pin driven by an effort. They, and ``rates``, are what
 ``kernel.emit_simulation`` exchanges for those of a linkage when it emits the functions of ``simulation_loop`` and
 ``event_location``; everything else is compiled as it stands there.

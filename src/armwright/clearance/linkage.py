@@ -18,7 +18,7 @@ import numpy as np
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, not_negative, number, of_shape, positive
 from armwright.errors import InvalidValueError, UnknownNameError, one_of
 
-# The name of what stands still.
+# The name of the fixed body.
 GROUND = "ground"
 # Of the thesis [m/s²]; the standard's 9.80665 changes nothing to four digits.
 GRAVITY = (0.0, -9.81)
@@ -79,7 +79,7 @@ class Pin:
     """An ideal pin: a point of a body stays on a point of another.
 
     Attributes:
-        body: the body it hangs.
+        body: the body that it carries.
         point: the point of that body.
         on: the point of the other body.
     """
@@ -209,8 +209,8 @@ class Linkage:
 
     Attributes:
         name: of the linkage.
-        bodies: all but the ground; each after the one it hangs on.
-        ground: what stands still.
+        bodies: all but the ground; each after the one that carries it.
+        ground: the fixed body.
         joints: ideal ones; at most one for each body, none for a body that only pins with clearance hold.
         pins: those with clearance.
         drives: the motors.
@@ -248,7 +248,9 @@ class Linkage:
             joint = self.joint(body.name)
             if joint is not None and joint.on.body not in known:
                 one_of("body", joint.on.body, names)
-                raise InvalidValueError(f"body {body.name} hangs on {joint.on.body}, which must be named before it")
+                raise InvalidValueError(
+                    f"body {body.name} is carried by {joint.on.body}, which must be named before it"
+                )
             if body.mass == 0 or (body.inertia == 0 and not isinstance(joint, Guide)):
                 raise InvalidValueError(f"body {body.name}: mass and inertia must be above 0")
             known.add(body.name)
@@ -263,14 +265,14 @@ class Linkage:
             self.point(point)
         for drive in self.drives:
             if self.joint(drive.body) is None:
-                raise InvalidValueError(f"drive of {drive.body}: it hangs on no ideal joint, so nothing drives it")
+                raise InvalidValueError(f"drive of {drive.body}: the body has no ideal joint that it could drive")
             one_of("kind of drive", drive.kind, ("effort", "motion"))
             self._check_prescribed(drive)
         for name in self.assembly:
             one_of("body", name, names[1:])
 
     def joint(self, body: str) -> Pin | Guide | None:
-        """Return the ideal joint that a body hangs on; None for a free one."""
+        """Return the ideal joint that carries a body; None for a free one."""
         return next((joint for joint in self.joints if joint.body == body), None)
 
     def body(self, name: str) -> Body:

@@ -101,7 +101,7 @@ class Placement:
     """All bodies of a linkage in one configuration."""
 
     def __init__(self, linkage: Linkage, q: Sequence[Scalar], qd: Sequence[Scalar]) -> None:
-        """Determine the poses of the bodies, each after the body it hangs on.
+        """Determine the poses of the bodies, each after the body that carries it.
 
         Args:
             linkage: what moves.

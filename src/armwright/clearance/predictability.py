@@ -23,8 +23,8 @@ from armwright.errors import InvalidValueError
 # The difference of the clearances of indistinguishable runs [m], and how many of them beside the first fill a vector.
 PERTURBATION, MAX_REPLICATES = 1e-9, 15
 # Runs that are farther from one another have diverged [m]. With smaller steps they must be nearer by a factor: after an
-# impact the error of a step is of first order, half as much again as what a third of it changes, and chance more than
-# doubles that. One of them may meet an impact at the same part of its step as the whole one, and hardly both.
+# impact the error of a step is of first order, half as much again as what a third of it changes, and random variation
+# more than doubles that. One of them may meet an impact at the same part of its step as the whole one, and hardly both.
 MAX_DISTANCE, STEP_DIVISORS, DISTANCE_DIVISOR = 1e-5, (2, 3), 4.0
 
 

@@ -38,7 +38,7 @@ def load_linkage(source: str | Path) -> Linkage:
 
     Raises:
         UnknownNameError: the catalogue has no such linkage; the nearest is named.
-        FileFormatError: the file is missing or broken, or says what cannot be; the text has file, line and key.
+        FileFormatError: the file is missing, broken or inconsistent; the text has file, line and key.
     """
     text = str(source)
     if isinstance(source, str) and not ("/" in text or "." in text or Path(text).is_file()):
@@ -52,7 +52,7 @@ def read_linkage(path: Path) -> Linkage:
     """Read a linkage from a TOML file.
 
     Raises:
-        FileFormatError: it is missing or broken, or says what cannot be.
+        FileFormatError: it is missing, broken or inconsistent.
     """
     top = Document.read(path).root
     fields: dict[str, Any] = {

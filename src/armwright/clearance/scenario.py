@@ -64,7 +64,7 @@ def prepare_scenario(
         linkage: that moves.
         path: for its tip or its drives.
         settings: of the simulation.
-        guess: (n,) coordinates near those at the start, which choose the assembly; that of the linkage when left out.
+        guess: (n,) coordinates near those at the start, in the same assembly; that of the linkage when left out.
 
     Raises:
         InvalidValueError: the path cannot be followed, or takes too many steps.

@@ -1,4 +1,4 @@
-"""Until when the runs of a sweep are predictions, and which features of their error curves chance dominates."""
+"""The summary of a sweep: until when its runs are predictions, and which features are dominated by random variation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class SweepSummary:
         paths: names of the test paths.
         folder: folder of the sweep.
         chaos: by path, until when half of the runs and all runs are predictions [s], the duration [s], and the
-            features that chance dominates.
+            features that random variation dominates.
     """
 
     runs: int
@@ -44,10 +44,10 @@ class SweepSummary:
         failures = f", {self.failed} of them failed" if self.failed else ""
         notes = [f"{self.runs} linkages on {', '.join(self.paths)}{failures}: {self.folder}"]
         for path, limits in self.chaos.items():
-            chance = f"; dominated by chance: {', '.join(limits['chance'])}" if limits["chance"] else ""
+            random = f"; dominated by random variation: {', '.join(limits['chance'])}" if limits["chance"] else ""
             notes.append(
                 f"{path}: predictable until t = {limits['until']:.4g} s in half of the runs, "
-                f"{limits['earliest']:.4g} s in all, of {limits['duration']:.4g} s{chance}"
+                f"{limits['earliest']:.4g} s in all, of {limits['duration']:.4g} s{random}"
             )
         return tuple(notes)
 

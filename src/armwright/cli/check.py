@@ -69,7 +69,7 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
     compilations = [compile_program(path, option_cell, strict=strict, std=std) for path in paths]
     if as_json or output_format is Format.JSON:
         results = [_as_data(compilation, emit) for compilation in compilations]
-        print_json(results[0] if len(results) == 1 else _joined_data(results, paths))
+        print_json(results[0] if len(results) == 1 else _combine_data(results, paths))
     elif output_format is Format.SARIF:
         from armwright.program.diagnostics.sarif import to_sarif
 
@@ -79,7 +79,7 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
         for compilation in compilations:
             _print(compilation, emit)
         if len(compilations) > 1:
-            print(_totals(compilations), file=sys.stderr if emit else sys.stdout)
+            print(_totals_line(compilations), file=sys.stderr if emit else sys.stdout)
     if any(compilation.code is None for compilation in compilations):
         raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
 
@@ -122,7 +122,7 @@ def _print(compilation: "Compilation", emit: Emit | None) -> None:
         print_diagnostics(compilation.diagnostics, compilation.source, to_errors=emit is not None)
 
 
-def _totals(compilations: "list[Compilation]") -> str:
+def _totals_line(compilations: "list[Compilation]") -> str:
     """Return the numbers of errors and warnings of several programs as a line of text."""
     from armwright.program.language.diagnostic import counts_text
 
@@ -131,7 +131,7 @@ def _totals(compilations: "list[Compilation]") -> str:
     return f"{len(compilations)} programs: {counts_text(errors, warnings)}"
 
 
-def _joined_data(results: list[dict[str, Any]], paths: list[Path]) -> dict[str, Any]:
+def _combine_data(results: list[dict[str, Any]], paths: list[Path]) -> dict[str, Any]:
     """Return the diagnostics of several programs as plain data, each program with its path."""
     return {
         "exit_status": max(result["exit_status"] for result in results),

@@ -104,10 +104,10 @@ def save(launch: "LaunchRequest", loaded: "LoadedProgram", recording: "Recording
         OutputError: the folder cannot be written.
     """
     from armwright.program.vm.interpreter import run_diagnostics
-    from armwright.report.files import Origin, write_run
+    from armwright.report.run_files import RunInputs, write_run
 
     assert launch.output is not None  # noqa: S101 - the session calls this only with an output
-    origin = Origin(
+    origin = RunInputs(
         program=launch.program,
         cell=launch.cell,
         imports=loaded.imports,

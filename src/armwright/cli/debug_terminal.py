@@ -30,7 +30,7 @@ th N      select process N                        q         quit
 Full words are accepted too: next, step, out, stage, continue, break, print, quit.
 An empty line repeats the last step. Ctrl-C stops a program that runs."""
 # Commands in full, as users of other debuggers type them.
-_WHOLE_WORDS = {
+_ABBREVIATIONS = {
     "next": "n",
     "step": "s",
     "out": "o",
@@ -42,7 +42,7 @@ _WHOLE_WORDS = {
     "delete": "x",
 }
 # Lines listed before and after the current line.
-_AROUND = 5
+_LIST_CONTEXT = 5
 _SLICE = 0.05
 _PROMPT = "(rlo) "
 # Digits of a count, or of the number of a breakpoint or process, at most.
@@ -65,7 +65,7 @@ class Terminal:
         self._interrupted = False
         self._commands: dict[str, Callable[[str], None]] = {
             **{word: functools.partial(self._resume, command) for word, command in _STEPS.items()},
-            "t": self._ticks,
+            "t": self._advance_ticks,
             "b": self._break,
             "d": self._watch,
             "x": self._forget,
@@ -82,18 +82,18 @@ class Terminal:
     def run(self) -> ExitStatus:
         """Read commands until the user quits; return the exit status of the program, 0 if it has not ended."""
         self._debugger.begin()
-        self._finish()
+        self._run_to_stop()
         while True:
             try:
-                line = self._line().strip()
+                line = self._read_line().strip()
             except EOFError:
                 break
             if line in {"q", "quit", "exit"}:
                 break
-            self._do(line or self._last)
+            self._execute(line or self._last)
         return ExitStatus.DONE if self._debugger.stop is None else self._debugger.stop.status
 
-    def _line(self) -> str:
+    def _read_line(self) -> str:
         if sys.stdin.isatty():
             return input(_PROMPT)
         print(_PROMPT, end="", flush=True)
@@ -102,9 +102,9 @@ class Terminal:
             raise EOFError
         return line
 
-    def _do(self, line: str) -> None:
+    def _execute(self, line: str) -> None:
         word, _, argument = line.partition(" ")
-        word = _WHOLE_WORDS.get(word, word)
+        word = _ABBREVIATIONS.get(word, word)
         command = self._commands.get(word)
         if command is None:
             if line:
@@ -120,21 +120,21 @@ class Terminal:
 
     def _resume(self, command: "Command", _: str) -> None:
         self._debugger.resume(command, self._path)
-        self._finish()
+        self._run_to_stop()
 
-    def _ticks(self, count: str) -> None:
-        for _ in range(_number(count) if count else 1):
+    def _advance_ticks(self, count: str) -> None:
+        for _ in range(_parse_number(count) if count else 1):
             self._debugger.resume("tick", self._path)
-            stop = self._work()
+            stop = self._run()
             if stop.reason != "step":
                 break
         self._print_stop()
 
-    def _finish(self) -> None:
-        self._work()
+    def _run_to_stop(self) -> None:
+        self._run()
         self._print_stop()
 
-    def _work(self) -> "Stop":
+    def _run(self) -> "Stop":
         from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, shorten_list
 
         debugger = self._debugger
@@ -187,7 +187,7 @@ class Terminal:
 
     def _break(self, argument: str) -> None:
         line, _, condition = argument.partition(" if ")
-        breakpoint_ = self._debugger.add_breakpoint(_number(line), condition=condition.strip())
+        breakpoint_ = self._debugger.add_breakpoint(_parse_number(line), condition=condition.strip())
         if breakpoint_.start is None:
             print(breakpoint_.message)
             self._debugger.remove_breakpoint(breakpoint_.number)
@@ -200,14 +200,14 @@ class Terminal:
         print(f"breakpoint {watch.number}: when {name} changes")
 
     def _forget(self, number: str) -> None:
-        if not self._debugger.remove_breakpoint(_number(number)):
+        if not self._debugger.remove_breakpoint(_parse_number(number)):
             print(f"there is no breakpoint {number}")
 
     # ---- inspection ------------------------------------------------------------------------------------------------
 
     def _show(self, text: str) -> None:
-        shown = self._debugger.evaluate(text, self._path)
-        print(f"{shown.value}  {shown.type}".rstrip())
+        variable = self._debugger.evaluate(text, self._path)
+        print(f"{variable.value}  {variable.type}".rstrip())
 
     def _set(self, argument: str) -> None:
         name, _, text = argument.partition("=")
@@ -220,8 +220,8 @@ class Terminal:
     def _variables(self, _: str) -> None:
         for scope in self._debugger.scopes(self._path):
             print(scope.name)
-            for shown in scope.children() if scope.children else ():
-                print(f"  {shown.name} = {shown.value}  {shown.type}".rstrip())
+            for variable in scope.children() if scope.children else ():
+                print(f"  {variable.name} = {variable.value}  {variable.type}".rstrip())
 
     def _where(self, _: str) -> None:
         source = self._loaded.code.source
@@ -233,13 +233,13 @@ class Terminal:
 
     def _list(self, _: str) -> None:
         source = self._loaded.code.source
-        here = source.line(self._debugger.stack(self._path)[0].span.start)
-        for line in range(max(1, here - _AROUND), min(len(source.line_starts), here + _AROUND) + 1):
-            print(f"{'>' if line == here else ' '}{line:>4}  {source.line_text(line)}")
+        current = source.line(self._debugger.stack(self._path)[0].span.start)
+        for line in range(max(1, current - _LIST_CONTEXT), min(len(source.line_starts), current + _LIST_CONTEXT) + 1):
+            print(f"{'>' if line == current else ' '}{line:>4}  {source.line_text(line)}")
 
     def _thread(self, number: str) -> None:
         processes = self._debugger.processes
-        index = _number(number)
+        index = _parse_number(number)
         if not 1 <= index <= len(processes):
             print(f"expected the number of a process, 1 to {len(processes)}, got {index}")
             return
@@ -263,7 +263,7 @@ class _NumberError(ArmwrightError, ValueError):
     """A number was expected."""
 
 
-def _number(text: str) -> int:
+def _parse_number(text: str) -> int:
     number = text.strip()
     if not number.isdecimal() or len(number) > _MAX_DIGITS:
         raise _NumberError(f"expected an integer, got `{shortened(number)}`")

@@ -68,14 +68,14 @@ def fix(
             print_difference(source, result.text)
         elif printed and not diff:
             print_verbatim(result.text)
-        _print(result, done="could be corrected" if diff else "corrected", to_errors=printed and not diff)
+        _print(result, verb="could be corrected" if diff else "corrected", to_errors=printed and not diff)
     if as_json:
         print_json(rows)
     if any(row["exit_status"] for row in rows):
         raise typer.Exit(max(row["exit_status"] for row in rows))
 
 
-def _print(result: "FixResult", *, done: str, to_errors: bool) -> None:
+def _print(result: "FixResult", *, verb: str, to_errors: bool) -> None:
     from armwright.cli.programs import print_diagnostics
 
     out = sys.stderr if to_errors else sys.stdout
@@ -84,7 +84,7 @@ def _print(result: "FixResult", *, done: str, to_errors: bool) -> None:
         location = f"{source.name}:{source.line(start)}:{source.column(start)}"
         print(f"{location}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.description}", file=out)
     count = len(result.applied)
-    mistakes = f"{counted(count, 'mistake')} {done}" if count else "nothing to correct"
+    mistakes = f"{counted(count, 'mistake')} {verb}" if count else "nothing to correct"
     print(f"{result.compilation.source.name}: {mistakes}", file=out)
     if result.compilation.diagnostics:
         print_diagnostics(result.compilation.diagnostics, result.compilation.source, to_errors=to_errors)

@@ -76,7 +76,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.motion.moves import joint_move
     from armwright.motion.poses_file import read_poses
     from armwright.report.move_files import move_files
-    from armwright.report.movie import films
+    from armwright.report.movie import render_films
 
     for name, option in (("--orientation", orientation), ("--deviation-mm", deviation_mm), ("--around", around)):
         if kind == "joint" and option is not None:
@@ -112,7 +112,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
         )
         if film:
             with counting("drawing the film", quiet=quiet) as progress:
-                files |= films(planned.arm, planned.trajectory, planned.poses, progress)
+                files |= render_films(planned.arm, planned.trajectory, planned.poses, progress)
         write_results(output, files)
     print_result(assessment, as_json=as_json, quiet=quiet, output=output)
 

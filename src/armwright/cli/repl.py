@@ -46,7 +46,7 @@ def repl(
     """
     from armwright.cli.programs import read_cell_option
     from armwright.cli.repl_commands import COMMANDS, Commands
-    from armwright.cli.repl_lines import Script, editing, typed_line
+    from armwright.cli.repl_lines import Script, line_editing, read_typed_line
     from armwright.program.api import import_reader
     from armwright.program.repl.session import Session
 
@@ -65,9 +65,9 @@ def repl(
             raise typer.Exit(printer.status)
         return
     _greet(session)
-    with _interruptible(), editing(session, COMMANDS):
+    with _interruptible(), line_editing(session, COMMANDS):
         colour = not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") != "dumb"
-        _converse(session, commands, functools.partial(typed_line, colour=colour), printer)
+        _converse(session, commands, functools.partial(read_typed_line, colour=colour), printer)
 
 
 @contextlib.contextmanager
@@ -97,37 +97,37 @@ def _converse(
     """Read and execute lines until the input ends; ``next_line`` takes a prompt, and returns None at the end."""
     from armwright.cli.repl_commands import EndOfSessionError
 
-    begun = ""
+    incomplete = ""
     while True:
-        number = session.line + begun.count("\n")
+        number = session.line + incomplete.count("\n")
         try:
-            line = next_line(f"... {number}> " if begun else f"rlo {number}> ")
+            line = next_line(f"... {number}> " if incomplete else f"rlo {number}> ")
         except KeyboardInterrupt:
             print()
             # Abandoned lines keep their numbers.
-            session.skip_lines(begun)
-            begun = ""
+            session.skip_lines(incomplete)
+            incomplete = ""
             continue
         if line is None:
             break
         try:
-            begun = _execute_line(session, commands, begun, line, printer)
+            incomplete = _execute_line(session, commands, incomplete, line, printer)
         except EndOfSessionError:
             return
         except KeyboardInterrupt:
-            begun = ""
+            incomplete = ""
             printer.interrupted()
-    if begun:
-        printer.answer(session.enter(begun, complete=True))
+    if incomplete:
+        printer.answer(session.enter(incomplete, complete=True))
 
 
-def _execute_line(session: "Session", commands: "Commands", begun: str, line: str, printer: "_Printer") -> str:
+def _execute_line(session: "Session", commands: "Commands", incomplete: str, line: str, printer: "_Printer") -> str:
     """Execute a line; return the text of a statement that is not complete yet."""
-    if not begun and line.lstrip().startswith(":"):
+    if not incomplete and line.lstrip().startswith(":"):
         session.skip_lines(line)
         printer.command(commands, line)
         return ""
-    text = f"{begun}{line}\n"
+    text = f"{incomplete}{line}\n"
     answer = session.enter(text)
     if not answer.is_complete:
         return text
@@ -156,7 +156,7 @@ class _Printer:
 
         self.status = max(self.status, answer.status)
         effects = [effect for effect in answer.effects if effect.kind not in SILENT_EFFECTS]
-        shown = excerpt(effects, MAX_TERMINAL_LINES).map(_shown)
+        shown = excerpt(effects, MAX_TERMINAL_LINES).map(_effect_text)
         for text, style in shown.join((omission_text(shown.omitted, _EVENT_LOG_HINT), _DIM)):
             self._console.print(text, style=style)
         if answer.diagnostics:
@@ -182,7 +182,7 @@ class _Printer:
         self._console.print("interrupted; the current statement was undone", style="yellow")
 
 
-def _shown(effect: "Effect") -> tuple[str, str]:
+def _effect_text(effect: "Effect") -> tuple[str, str]:
     """Return the text and the style of an effect."""
     from armwright.program.vm.excerpt import shorten_line
 

@@ -57,11 +57,11 @@ class Commands:
         argument = argument.strip()
         if (command := _COMMANDS.get(word.lower())) is None:
             raise UnknownNameError("command", f":{word}", [f":{name}" for name in _COMMANDS])
-        if command.takes.startswith("[") or not command.takes:
-            if argument and not command.takes:
+        if command.argument.startswith("[") or not command.argument:
+            if argument and not command.argument:
                 raise InvalidValueError(f":{word} takes no argument, got '{argument}'")
         elif not argument:
-            raise InvalidValueError(f":{word} needs {command.takes}, such as `:{word} {command.example}`")
+            raise InvalidValueError(f":{word} needs {command.argument}, such as `:{word} {command.example}`")
         return command.run(self, argument)
 
     # ---- inspection ------------------------------------------------------------------------------------------------
@@ -88,7 +88,7 @@ class Commands:
 
     def help(self, _: str) -> Reply:
         """List the commands."""
-        rows = [(f":{name} {command.takes}".rstrip(), command.summary) for name, command in _COMMANDS.items()]
+        rows = [(f":{name} {command.argument}".rstrip(), command.summary) for name, command in _COMMANDS.items()]
         width = max(len(usage) for usage, _ in rows)
         return Reply(
             lines=(
@@ -106,14 +106,14 @@ class Commands:
 
     def undo(self, argument: str) -> Reply:
         """Undo the last statements, with frames, arms, clock, camera and devices."""
-        undone = self._session.undo(_count(argument))
+        undone = self._session.undo(_parse_count(argument))
         if not undone:
             raise InvalidValueError("there is nothing to undo")
         return Reply(lines=tuple(f"undone: {text}" for text in undone))
 
     def redo(self, argument: str) -> Reply:
         """Redo the statements that were undone last."""
-        redone = self._session.redo(_count(argument))
+        redone = self._session.redo(_parse_count(argument))
         if not redone:
             raise InvalidValueError("there is nothing to redo")
         return Reply(lines=tuple(f"redone: {text}" for text in redone))
@@ -122,7 +122,7 @@ class Commands:
 
     def load(self, argument: str) -> Reply:
         """Enter the statements of a file, such as a program."""
-        return Reply(answer=self.load_file(_path(argument)))
+        return Reply(answer=self.load_file(_parse_path(argument)))
 
     def load_file(self, path: Path) -> "InputResult":
         """Enter the statements of a file.
@@ -140,11 +140,11 @@ class Commands:
 
     def save(self, argument: str) -> Reply:
         """Write the session as a program with the same final state."""
-        return self._save(_target(argument), overwrite=False)
+        return self._save(_output_path(argument), overwrite=False)
 
     def overwrite(self, argument: str) -> Reply:
         """Write the session over an existing file."""
-        return self._save(_target(argument), overwrite=True)
+        return self._save(_output_path(argument), overwrite=True)
 
     def _save(self, path: Path, *, overwrite: bool) -> Reply:
         from armwright.files.output import write_file
@@ -166,7 +166,7 @@ class Commands:
         """Write the program and its results: motion, events, frames, and a page that shows the arms moving."""
         from armwright.files.output import folder_error_text
 
-        folder = _target(argument)
+        folder = _output_path(argument)
         missing = [path for path in (folder, *folder.parents) if not path.exists()]
         try:
             # The imports of the program are relative to this folder.
@@ -188,7 +188,7 @@ class Commands:
         from armwright.program import Source, compile as compile_program, run
         from armwright.program.api import import_reader, imported_files
         from armwright.program.vm.interpreter import run_diagnostics
-        from armwright.report.files import Origin, write_run
+        from armwright.report.run_files import RunInputs, write_run
 
         session, program = self._session, folder / _PROGRAM
         text = self._program(program)
@@ -197,7 +197,7 @@ class Commands:
         )
         recording = run(compiled)
         command = ["armwright", "run", str(program), *(["--cell", str(self._cell)] if self._cell else [])]
-        origin = Origin(
+        origin = RunInputs(
             program=program,
             cell=self._cell,
             imports=imported_files(program, compiled),
@@ -214,12 +214,12 @@ class _Command:
 
     Attributes:
         run: the method that runs it.
-        takes: name of its argument for people, in brackets where it is optional; empty without an argument.
+        argument: name of its argument for people, in brackets where it is optional; empty without an argument.
         example: example of the argument.
     """
 
     run: Callable[[Commands, str], Reply]
-    takes: str = ""
+    argument: str = ""
     example: str = ""
 
     @property
@@ -233,19 +233,19 @@ _COMMANDS: Mapping[str, _Command] = {
     "arms": _Command(run=Commands.arms),
     "time": _Command(run=Commands.time),
     "list": _Command(run=Commands.list),
-    "undo": _Command(run=Commands.undo, takes="[n]"),
-    "redo": _Command(run=Commands.redo, takes="[n]"),
-    "load": _Command(run=Commands.load, takes="FILE", example="stacking.rlo"),
-    "save": _Command(run=Commands.save, takes="FILE", example="try.rlo"),
-    "save!": _Command(run=Commands.overwrite, takes="FILE", example="try.rlo"),
-    "report": _Command(run=Commands.report, takes="DIR", example="out"),
+    "undo": _Command(run=Commands.undo, argument="[n]"),
+    "redo": _Command(run=Commands.redo, argument="[n]"),
+    "load": _Command(run=Commands.load, argument="FILE", example="stacking.rlo"),
+    "save": _Command(run=Commands.save, argument="FILE", example="try.rlo"),
+    "save!": _Command(run=Commands.overwrite, argument="FILE", example="try.rlo"),
+    "report": _Command(run=Commands.report, argument="DIR", example="out"),
     "help": _Command(run=Commands.help),
     "quit": _Command(run=Commands.quit),
 }
 COMMANDS = tuple(_COMMANDS)
 
 
-def _count(argument: str) -> int:
+def _parse_count(argument: str) -> int:
     if not argument:
         return 1
     if argument.isascii() and argument.isdigit() and int(argument[:9]) > 0:
@@ -253,7 +253,7 @@ def _count(argument: str) -> int:
     raise InvalidValueError(f"expected an integer from 1, got '{argument}'")
 
 
-def _path(argument: str) -> Path:
+def _parse_path(argument: str) -> Path:
     quoted = len(argument) > 1 and argument[0] == argument[-1] == '"'
     path = Path(argument[1:-1] if quoted else argument)
     try:
@@ -262,13 +262,13 @@ def _path(argument: str) -> Path:
         return path
 
 
-def _target(argument: str) -> Path:
+def _output_path(argument: str) -> Path:
     """Return the path of an output.
 
     Raises:
         OutputError: the path is invalid or not accessible.
     """
-    path = _path(argument)
+    path = _parse_path(argument)
     try:
         path.stat()
     except (FileNotFoundError, NotADirectoryError):

@@ -18,7 +18,7 @@ _MAX_HISTORY_LENGTH = 2000
 _DELIMITERS = ' \t\n()[],;:=<>*/+"'
 _PROMPT = "\001\033[1;34m\002{}\001\033[0m\002"
 # The commands whose argument is a file or folder.
-WITH_PATH = ("load", "save", "save!", "report")
+PATH_COMMANDS = ("load", "save", "save!", "report")
 
 
 class Script:
@@ -34,15 +34,15 @@ class Script:
         Raises:
             FileFormatError: the line is longer than a program may be.
         """
-        most = limit("program_mb") * MEGABYTE
-        line = sys.stdin.buffer.readline(most + 1)
-        if len(line) > most:
+        max_length = limit("program_mb") * MEGABYTE
+        line = sys.stdin.buffer.readline(max_length + 1)
+        if len(line) > max_length:
             raise FileFormatError("standard input", None, "", f"a line is too long: {limit_message('program_mb')}")
         text, self._encoding = line.decode(self._encoding, errors="replace"), "utf-8"
         return text.rstrip("\r\n") if line else None
 
 
-def typed_line(prompt: str, *, colour: bool) -> str | None:
+def read_typed_line(prompt: str, *, colour: bool) -> str | None:
     """Return the line that is typed on a terminal after a prompt, which may be in colour; None at the end of the input.
 
     Raises:
@@ -56,7 +56,7 @@ def typed_line(prompt: str, *, colour: bool) -> str | None:
 
 
 @contextlib.contextmanager
-def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
+def line_editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
     """Let the arrow keys recall lines of this and earlier sessions, and the tab key complete words."""
     from armwright.files.store import make_private
 
@@ -116,18 +116,18 @@ def completions(session: "Session", commands: tuple[str, ...], before: str, word
         return sorted(command for command in commands if command.startswith(word.lower()))
     if start.startswith(":"):
         command, blank, path = start[1:].partition(" ")
-        return _paths(path.lstrip(), word) if blank and command in WITH_PATH else []
+        return _path_completions(path.lstrip(), word) if blank and command in PATH_COMMANDS else []
     words = {*VOCABULARIES[session.std].reserved, *SENSORS}
     if session.std is Standard.RLO_2:
         words |= FUNCTIONS.keys()
-    own = visible_names(session)
-    known = {name.upper() for name in own}
+    names_ = visible_names(session)
+    known = {name.upper() for name in names_}
     # Keywords in the case of the word; names as they are spelled.
-    shown = (str.lower if word.islower() else str.upper)(" ".join(words - known)).split()
-    return sorted({choice for choice in (*own, *shown) if choice.upper().startswith(word.upper())})
+    keywords = (str.lower if word.islower() else str.upper)(" ".join(words - known)).split()
+    return sorted({choice for choice in (*names_, *keywords) if choice.upper().startswith(word.upper())})
 
 
-def _paths(before: str, word: str) -> list[str]:
+def _path_completions(before: str, word: str) -> list[str]:
     """Return the completions of a path; folders end with a slash."""
     folder, slash, name = before.rpartition("/")
     begun = name + word

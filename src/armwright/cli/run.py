@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armwright.program.language.diagnostic import Diagnostic
     from armwright.program.vm.interpreter import Limits, RunError
     from armwright.program.vm.recording import Recording
-    from armwright.report.files import Origin
+    from armwright.report.run_files import RunInputs
 
 
 # The kind of detour where the arm cannot follow a straight line.
@@ -77,7 +77,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.program import ProgramError
     from armwright.program.api import load
     from armwright.program.vm.interpreter import Limits, RunError
-    from armwright.report.files import Origin
+    from armwright.report.run_files import RunInputs
 
     warn_of_stray(program)
     try:
@@ -104,7 +104,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         "std": std.value,
         "strict": strict,
     }
-    origin = Origin(
+    inputs = RunInputs(
         program=program,
         cell=cell,
         imports=loaded.imports,
@@ -112,13 +112,13 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         options=options,
         motion_rows=most_rows,
     )
-    _finish(recording, loaded.diagnostics, origin, output, error, as_json=as_json, quiet=quiet)
+    _finish(recording, loaded.diagnostics, inputs, output, error, as_json=as_json, quiet=quiet)
 
 
 def _finish(
     recording: "Recording",
     compiler_diagnostics: "Sequence[Diagnostic]",
-    origin: "Origin",
+    inputs: "RunInputs",
     output: Path | None,
     error: "RunError | None",
     *,
@@ -130,15 +130,15 @@ def _finish(
     from armwright.cli.terminal import console
     from armwright.program.vm.excerpt import EVENT_LOG_HINT, NO_EVENT_LOG_HINT
     from armwright.program.vm.interpreter import run_diagnostics
-    from armwright.report.files import left_out, write_run
+    from armwright.report.run_files import omission_notes, write_run
     from armwright.report.run_summary import RunSummary, frame_table
 
     diagnostics = (*compiler_diagnostics, *run_diagnostics(recording))
     hint = EVENT_LOG_HINT if output else NO_EVENT_LOG_HINT
     result = RunSummary(recording=recording, diagnostics=diagnostics, hint=hint)
-    notes = left_out(recording, origin.motion_rows) if output is not None else ()
+    notes = omission_notes(recording, inputs.motion_rows) if output is not None else ()
     if output is not None:
-        write_run(output, recording, diagnostics, origin)
+        write_run(output, recording, diagnostics, inputs)
     if as_json:
         folder = {"output": str(output)} if output else {}
         frames = {"time": error.time, "frames": _frame_positions(error)} if error else {}

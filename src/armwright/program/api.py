@@ -24,7 +24,7 @@ from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.semantics import check
-from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadImport, known_cell
+from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport, known_cell
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
@@ -55,7 +55,7 @@ class Compilation:
         code: the intermediate code; None where the program has errors, or where only names were requested.
         cell: the cell that it was compiled for, or the first that it IMPORTs and that has arms, with all frames that
             it imports; None where there is none, or only its names are known.
-        known: what was known of the cell when the program was checked.
+        cell_symbols: what was known of the cell when the program was checked.
         strict: whether an AFFIX that is only implied is an error.
     """
 
@@ -65,12 +65,12 @@ class Compilation:
     comments: tuple[Span, ...]
     tree: tree.Program
     symbols: Symbols
-    imports: tuple[Imported, ...]
+    imports: tuple[ImportedFrames, ...]
     flow: Flow | None
     diagnostics: tuple[Diagnostic, ...]
     code: Code | None
     cell: Cell | None = None
-    known: KnownCell | None = None
+    cell_symbols: KnownCell | None = None
     strict: bool = False
 
 
@@ -225,14 +225,14 @@ def imported_files(program: Path, compiled: Compilation) -> tuple[Path, ...]:
 def import_reader(folder: Path) -> ReadImport:
     """Return what reads the files that a program of this folder IMPORTs."""
 
-    def read(name: str) -> Imported:
+    def read(name: str) -> ImportedFrames:
         cell = read_cell(regular_file(folder / name), arms_needed=False)
-        return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
+        return ImportedFrames(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     return read
 
 
-def add_imported_frames(cell: Cell | None, imports: Iterable[Imported]) -> Cell | None:
+def add_imported_frames(cell: Cell | None, imports: Iterable[ImportedFrames]) -> Cell | None:
     """Return a cell with the frames of imported cells; a frame of the cell itself stays as it is."""
     cells = [imported.cell for imported in imports if imported.cell is not None and imported.cell is not cell]
     if cell is None or not cells:
@@ -262,7 +262,7 @@ def _limit_imports(read_import: ReadImport) -> ReadImport:
     """Return what reads imports, and refuses more files than the limit, or more frames in all of them."""
     frames: dict[str, int] = {}
 
-    def read(name: str) -> Imported:
+    def read(name: str) -> ImportedFrames:
         if name not in frames and len(frames) >= limit("imports"):
             raise InvalidValueError(f"too many files: {limit_message('imports')}")
         frames.setdefault(name, 0)
@@ -298,8 +298,8 @@ def _check_names(
     if read_import is not None:
         read_import = cache(_limit_imports(read_import))
         cell = _imported_cell(program, read_import) if cell is None else cell
-    known = known_cell(cell) if isinstance(cell, Cell) else cell
-    symbols, name_errors, imports = check.check(program, known, std=std, read_import=read_import)
+    cell_symbols = known_cell(cell) if isinstance(cell, Cell) else cell
+    symbols, name_errors, imports = check.check(program, cell_symbols, std=std, read_import=read_import)
     diagnostics += [*scanned.diagnostics, *syntax_errors]
     guessed = any(diagnostic.is_syntax for diagnostic in diagnostics)
     # Where the parser had to guess, a name may seem unused.
@@ -316,7 +316,7 @@ def _check_names(
         diagnostics=sort_diagnostics(diagnostics),
         code=None,
         cell=add_imported_frames(cell, imports) if isinstance(cell, Cell) else None,
-        known=known,
+        cell_symbols=cell_symbols,
         strict=strict,
     )
 
@@ -328,10 +328,10 @@ def analyse_flow(compiled: Compilation) -> Compilation:
     """
     if any(diagnostic.is_syntax for diagnostic in compiled.diagnostics):
         return compiled
-    source, known, strict = compiled.source, compiled.known, compiled.strict
+    source, cell_symbols, strict = compiled.source, compiled.cell_symbols, compiled.strict
     with pause_garbage_collection():
         flow, diagnostics = analysis.check(
-            compiled.tree, compiled.symbols, _name_spellings(compiled), known, strict=strict, source=source
+            compiled.tree, compiled.symbols, _name_spellings(compiled), cell_symbols, strict=strict, source=source
         )
     return attrs.evolve(compiled, flow=flow, diagnostics=sort_diagnostics((*compiled.diagnostics, *diagnostics)))
 

@@ -15,35 +15,35 @@ from armwright.accuracy.settling_time import PosingTime, Settling, attained_posi
 from armwright.accuracy.variation import PoseDrift, Variation
 from armwright.accuracy.weaving import WeavingDeviation
 from armwright.arrays import Array
-from armwright.report.figures import Drawing, empty_figure, literal, plain_axes, spread, svg_text
+from armwright.report.figures import Drawing, empty_figure, evenly_spaced, plain_axes, plain_label, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Samples of a run that are drawn, and the drawn range about a corner, relative to its round-off or the shorter leg.
-_DRAWN, _AROUND, _OF_LEG = 2000, 5.0, 0.15
+_MAX_SAMPLES, _CORNER_RANGE, _LEG_SHARE = 2000, 5.0, 0.15
 _MARKS = "osD^v"
 
 
-def drawings(assessment: Assessment) -> list[Drawing]:
+def accuracy_drawings(assessment: Assessment) -> list[Drawing]:
     """Return the figures of an assessment, in the order of its tests."""
     drawn: list[Drawing] = []
     for test, results in zip(assessment.tests, assessment.results, strict=True):
         title = f"{test.name}{f', {test.condition}' if test.condition else ''}"
         for result in results:
-            if type(result) not in _DRAW:
+            if type(result) not in _DRAWING_FUNCTIONS:
                 continue
-            draw, caption = _DRAW[type(result)]
+            draw, caption = _DRAWING_FUNCTIONS[type(result)]
             kind = "velocity" if isinstance(result, PathVelocity) else test.kind
             figure = empty_figure((7.4, 4.2))
             draw(figure, test, result)
-            figure.suptitle(literal(f"{kind}: {title}"))
+            figure.suptitle(plain_label(f"{kind}: {title}"))
             drawn.append(Drawing(f"{len(drawn) + 1:02d}-{kind}", f"{kind} {title}: {caption}", svg_text(figure)))
     return drawn
 
 
-def _views(figure: "Figure", size: int) -> "list[tuple[Axes, int, int]]":
+def _plane_axes(figure: "Figure", size: int) -> "list[tuple[Axes, int, int]]":
     """Return the axes for a plane or the two axes for space, with the coordinates that they show."""
     pairs = [(0, 1)] if size == 2 else [(0, 1), (0, 2)]
     views = []
@@ -55,13 +55,13 @@ def _views(figure: "Figure", size: int) -> "list[tuple[Axes, int, int]]":
     return views
 
 
-def _cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability) -> None:
+def _draw_pose_cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability) -> None:
     from matplotlib.patches import Circle  # noqa: PLC0415
 
     cloud = test.clouds[0]
     assert cloud.commanded is not None  # noqa: S101 - every test of a pose has it
     points, centre = (cloud.positions - cloud.commanded) * 1e3, (result.barycentre - cloud.commanded) * 1e3
-    for axis, i, j in _views(figure, test.size):
+    for axis, i, j in _plane_axes(figure, test.size):
         axis.plot(points[:, i], points[:, j], "o", markersize=3.5, color="C0", label="attained")
         axis.plot(centre[i], centre[j], "s", markersize=6, color="C1", label="barycentre")
         axis.plot(0, 0, "+", markersize=13, markeredgewidth=1.8, color="C3", label="commanded")
@@ -70,43 +70,43 @@ def _cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability) -> None:
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
 
 
-def _clouds(figure: "Figure", test: PoseTest, result: Variation) -> None:
+def _draw_variation(figure: "Figure", test: PoseTest, result: Variation) -> None:
     origin = result.barycentres.mean(axis=0)
-    for axis, i, j in _views(figure, test.size):
+    for axis, i, j in _plane_axes(figure, test.size):
         for number, (cloud, centre) in enumerate(zip(test.clouds, result.barycentres, strict=True)):
             points, middle = (cloud.positions - origin) * 1e3, (centre - origin) * 1e3
             marker, colour = _MARKS[number % len(_MARKS)], f"C{number % 10}"
             style: dict[str, Any] = {"marker": marker, "color": colour, "linestyle": ""}
             axis.plot(points[:, i], points[:, j], **style, markersize=3.5, fillstyle="none", alpha=0.7)
-            axis.plot(middle[i], middle[j], **style, markersize=8, markeredgecolor="k", label=literal(cloud.label))
+            axis.plot(middle[i], middle[j], **style, markersize=8, markeredgecolor="k", label=plain_label(cloud.label))
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
 
 
-def _drift(figure: "Figure", _test: PoseTest, result: PoseDrift) -> None:
-    axis = _axes(figure, "time, h", "mm")
+def _draw_drift(figure: "Figure", _test: PoseTest, result: PoseDrift) -> None:
+    axis = _axes_without_offset(figure, "time, h", "mm")
     axis.plot(result.times / 3600, result.accuracy * 1e3, "o-", markersize=3.5, label="AP")
     axis.plot(result.times / 3600, result.repeatability * 1e3, "s--", markersize=3.5, label="RP")
     axis.set_ylim(bottom=0)
     axis.legend()
 
 
-def _settling(figure: "Figure", test: PathTest, result: Settling | PosingTime) -> None:
-    axis = _axes(figure, "time, s", "distance from the attained position, mm")
+def _draw_settling(figure: "Figure", test: PathTest, result: Settling | PosingTime) -> None:
+    axis = _axes_without_offset(figure, "time, s", "distance from the attained position, mm")
     for j, run in enumerate(test.runs):
         t = run.timed("settling")
-        some = spread(len(t), _DRAWN)
-        distances = np.linalg.norm(run.positions - attained_position(run), axis=1)[some] * 1e3
-        axis.plot(t[some], np.maximum(distances, result.band * 1e1), linewidth=1.1, label=f"cycle {j + 1}")
+        samples = evenly_spaced(len(t), _MAX_SAMPLES)
+        distances = np.linalg.norm(run.positions - attained_position(run), axis=1)[samples] * 1e3
+        axis.plot(t[samples], np.maximum(distances, result.band * 1e1), linewidth=1.1, label=f"cycle {j + 1}")
         if isinstance(result, Settling):
-            for moment, style in ((result.entered[j], ":"), (result.settled[j], "-")):
-                axis.axvline(moment, color=f"C{j % 10}", linestyle=style, linewidth=0.8)
+            for time, style in ((result.entered[j], ":"), (result.settled[j], "-")):
+                axis.axvline(time, color=f"C{j % 10}", linestyle=style, linewidth=0.8)
     axis.axhline(result.band * 1e3, color="C3", linestyle="--", linewidth=1.2, label="band")
     axis.set_yscale("log")
     axis.legend(fontsize="small")
 
 
-def _deviation(figure: "Figure", _test: PathTest, result: PathDeviation) -> None:
-    axis = _axes(figure, "along the path, mm", "mm")
+def _draw_path_deviation(figure: "Figure", _test: PathTest, result: PathDeviation) -> None:
+    axis = _axes_without_offset(figure, "along the path, mm", "mm")
     s = result.stations * 1e3
     for name, values, station, style in (
         ("AT", result.offsets, result.accuracy_at, "-"),
@@ -118,37 +118,37 @@ def _deviation(figure: "Figure", _test: PathTest, result: PathDeviation) -> None
     axis.legend()
 
 
-def _speeds(figure: "Figure", test: PathTest, result: PathVelocity) -> None:
-    axis = _axes(figure, "along the path, mm", "speed, mm/s")
+def _draw_speeds(figure: "Figure", test: PathTest, result: PathVelocity) -> None:
+    axis = _axes_without_offset(figure, "along the path, mm", "speed, mm/s")
     for speeds in result.speeds:
         axis.plot(result.stations * 1e3, speeds * 1e3, linewidth=1.0, color="C0", alpha=0.7)
     assert test.speed is not None  # noqa: S101 - every result has it
     axis.axhline(test.speed * 1e3, color="C3", linestyle="--", linewidth=1.2)
 
 
-def _corner(figure: "Figure", test: PathTest, result: CornerDeviation) -> None:
+def _draw_corner(figure: "Figure", test: PathTest, result: CornerDeviation) -> None:
     assert test.commanded is not None  # noqa: S101 - every test of a corner has it
     path = test.commanded.positions
     near = np.linalg.norm(path - result.position, axis=1)
-    reach = max(_AROUND * max(result.round_off, result.overshoot), 1e-6)
-    reach = min(reach, near[near > 0].min()) if result.round_off + result.overshoot > 0 else _OF_LEG * near.max()
-    for axis, i, j in _views(figure, test.size):
-        _lines(axis, [(run.positions - result.position)[:, [i, j]] * 1e3 for run in test.runs])
+    reach = max(_CORNER_RANGE * max(result.round_off, result.overshoot), 1e-6)
+    reach = min(reach, near[near > 0].min()) if result.round_off + result.overshoot > 0 else _LEG_SHARE * near.max()
+    for axis, i, j in _plane_axes(figure, test.size):
+        _draw_runs(axis, [(run.positions - result.position)[:, [i, j]] * 1e3 for run in test.runs])
         axis.plot(*((path - result.position)[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
         axis.set_aspect("equal", adjustable="box")
         axis.set(xlim=(-reach * 1e3, reach * 1e3), ylim=(-reach * 1e3, reach * 1e3))
 
 
-def _weave(figure: "Figure", test: PathTest, _result: WeavingDeviation) -> None:
+def _draw_weave(figure: "Figure", test: PathTest, _result: WeavingDeviation) -> None:
     assert test.commanded is not None  # noqa: S101 - every test of weaving has it
-    for axis, i, j in _views(figure, test.size):
-        _lines(axis, [run.positions[:, [i, j]] * 1e3 for run in test.runs])
+    for axis, i, j in _plane_axes(figure, test.size):
+        _draw_runs(axis, [run.positions[:, [i, j]] * 1e3 for run in test.runs])
         axis.plot(*(test.commanded.positions[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
         axis.set_aspect("auto")
 
 
-def _compliance(figure: "Figure", _test: PoseTest, result: StaticCompliance) -> None:
-    axis = _axes(figure, "force, N", "displacement, mm")
+def _draw_compliance(figure: "Figure", _test: PoseTest, result: StaticCompliance) -> None:
+    axis = _axes_without_offset(figure, "force, N", "displacement, mm")
     forces = np.append(0.0, result.loads[-1])
     for i, name in enumerate("xyz"[: result.components.size]):
         axis.plot(result.loads, result.deflections[:, i] * 1e3, _MARKS[i], color=f"C{i}", markersize=4, label=name)
@@ -156,30 +156,33 @@ def _compliance(figure: "Figure", _test: PoseTest, result: StaticCompliance) -> 
     axis.legend()
 
 
-def _lines(axis: "Axes", runs: Sequence[Array]) -> None:
+def _draw_runs(axis: "Axes", runs: Sequence[Array]) -> None:
     for number, run in enumerate(runs):
-        axis.plot(*run[spread(len(run), _DRAWN)].T, linewidth=1.0, color=f"C{number % 10}")
+        axis.plot(*run[evenly_spaced(len(run), _MAX_SAMPLES)].T, linewidth=1.0, color=f"C{number % 10}")
 
 
-def _axes(figure: "Figure", x: str, y: str) -> "Axes":
+def _axes_without_offset(figure: "Figure", x: str, y: str) -> "Axes":
     axis = plain_axes(figure, x, y)
     axis.ticklabel_format(useOffset=False)
     return axis
 
 
 # The function that draws each kind of result, and the caption of the figure.
-_DRAW: dict[type, tuple[Callable[["Figure", Any, Any], None], str]] = {
-    PoseRepeatability: (_cloud, "attained positions about the commanded one, their barycentre, and the circle of RP"),
-    Variation: (_clouds, "attained positions by direction or robot, about the mean of all; barycentres filled"),
-    PoseDrift: (_drift, "AP and RP over time"),
+_DRAWING_FUNCTIONS: dict[type, tuple[Callable[["Figure", Any, Any], None], str]] = {
+    PoseRepeatability: (
+        _draw_pose_cloud,
+        "attained positions about the commanded one, their barycentre, and the circle of RP",
+    ),
+    Variation: (_draw_variation, "attained positions by direction or robot, about the mean of all; barycentres filled"),
+    PoseDrift: (_draw_drift, "AP and RP over time"),
     Settling: (
-        _settling,
+        _draw_settling,
         "distance from the attained position; dotted lines: the band is entered, full lines: the last time",
     ),
-    PosingTime: (_settling, "distance from the attained position, from departure to rest"),
-    PathDeviation: (_deviation, "distance of the mean run from the path (AT), and spread of the runs (RT)"),
-    PathVelocity: (_speeds, "speed of every run on the steady part of the path; the commanded one dashed"),
-    CornerDeviation: (_corner, "the runs about the corner, which is the origin; the commanded path dashed"),
-    WeavingDeviation: (_weave, "the runs; the commanded path dashed"),
-    StaticCompliance: (_compliance, "displacement under load along every axis, and the straight lines fitted"),
+    PosingTime: (_draw_settling, "distance from the attained position, from departure to rest"),
+    PathDeviation: (_draw_path_deviation, "distance of the mean run from the path (AT), and spread of the runs (RT)"),
+    PathVelocity: (_draw_speeds, "speed of every run on the steady part of the path; the commanded one dashed"),
+    CornerDeviation: (_draw_corner, "the runs about the corner, which is the origin; the commanded path dashed"),
+    WeavingDeviation: (_draw_weave, "the runs; the commanded path dashed"),
+    StaticCompliance: (_draw_compliance, "displacement under load along every axis, and the straight lines fitted"),
 }

@@ -3,8 +3,8 @@
 import json
 
 from armwright.accuracy.assessment import Assessment
-from armwright.report.accuracy_figures import drawings
-from armwright.report.plain_page import plain_page
+from armwright.report.accuracy_figures import accuracy_drawings
+from armwright.report.static_page import static_page
 
 
 def accuracy_files(assessment: Assessment, *, title: str, command: str) -> dict[str, str]:
@@ -15,12 +15,12 @@ def accuracy_files(assessment: Assessment, *, title: str, command: str) -> dict[
         title: heading of the page.
         command: the command line that made it.
     """
-    drawn = drawings(assessment)
+    drawn = accuracy_drawings(assessment)
     bounded = any(measure.limit is not None for measure in assessment.measures)
     good = not assessment.exceeded
     return {
         "measures.json": json.dumps(assessment.as_data(), indent=2, ensure_ascii=False) + "\n",
-        "report.html": plain_page(
+        "report.html": static_page(
             title=title,
             command=command,
             tables=assessment.tables(),

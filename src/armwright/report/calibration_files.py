@@ -9,7 +9,7 @@ from armwright.arm.write import toml_text
 from armwright.calibration.assessment import CalibrationAssessment
 from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf
 from armwright.report.figures import Drawing, empty_figure, plain_axes, svg_text
-from armwright.report.plain_page import plain_page
+from armwright.report.static_page import static_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +27,7 @@ def calibration_files(assessment: CalibrationAssessment, *, title: str, command:
         Drawing(
             "residuals",
             "Residuals of each reading: along x, y and z where points were measured; held-out distances below",
-            svg_text(_residuals(assessment)),
+            svg_text(_residuals_figure(assessment)),
         ),
         Drawing("distances", "Distances before and after, sorted", svg_text(distances_figure(assessment))),
     ]
@@ -42,7 +42,7 @@ def calibration_files(assessment: CalibrationAssessment, *, title: str, command:
         "arm.urdf": corrected_urdf(assessment.full),
         **{f"dh_{name}.csv": text for name, text in tables.items()},
         "errors.json": json.dumps(assessment.as_data(), indent=2) + "\n",
-        "report.html": plain_page(
+        "report.html": static_page(
             title=title,
             command=command,
             tables=assessment.tables(),
@@ -59,27 +59,27 @@ def calibration_files(assessment: CalibrationAssessment, *, title: str, command:
     }
 
 
-def _residuals(assessment: CalibrationAssessment) -> "Figure":
+def _residuals_figure(assessment: CalibrationAssessment) -> "Figure":
     measured = assessment.fitted
     residuals = assessment.full.model.residuals(measured, assessment.full.errors)
     figure = empty_figure((7.4, 4.6))
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1))
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1))
     size = np.bincount(residuals.reading[~residuals.is_rotation], minlength=len(measured))
     number, millimetres = residuals.reading + 1, residuals.values * 1e3
     points = ~residuals.is_rotation & (size[residuals.reading] == 3)
     for i, (name, marker) in enumerate(zip("xyz", "o^s", strict=True)):
-        above.plot(number[points][i::3], millimetres[points][i::3], marker, markersize=2.4, label=name, alpha=0.7)
+        upper.plot(number[points][i::3], millimetres[points][i::3], marker, markersize=2.4, label=name, alpha=0.7)
     others = ~residuals.is_rotation & (size[residuals.reading] == 1)
     if others.any():
-        above.plot(number[others], millimetres[others], ".", label="planes, distances", color="C4")
-    above.set(ylabel="residual, mm")
-    above.legend(ncols=4, fontsize="small", loc="upper right", markerscale=2)
-    below.plot(np.arange(1, len(measured) + 1), assessment.held_out.distance * 1e3, ".", color="C3", markersize=3)
+        upper.plot(number[others], millimetres[others], ".", label="planes, distances", color="C4")
+    upper.set(ylabel="residual, mm")
+    upper.legend(ncols=4, fontsize="small", loc="upper right", markerscale=2)
+    lower.plot(np.arange(1, len(measured) + 1), assessment.held_out.distance * 1e3, ".", color="C3", markersize=3)
     if assessment.repeatability is not None:
-        below.axhline(assessment.repeatability.floor * 1e3, color="C2", label="repeatability")
-        below.legend(fontsize="small", loc="upper right")
-    below.set(xlabel="reading", ylabel="held out, mm", ylim=(0, None))
-    for axis in (above, below):
+        lower.axhline(assessment.repeatability.floor * 1e3, color="C2", label="repeatability")
+        lower.legend(fontsize="small", loc="upper right")
+    lower.set(xlabel="reading", ylabel="held out, mm", ylim=(0, None))
+    for axis in (upper, lower):
         axis.grid(visible=True, alpha=0.3)
     return figure
 

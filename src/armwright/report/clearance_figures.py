@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.report.figures import empty_figure, literal, svg_text
+from armwright.report.figures import empty_figure, plain_label, svg_text
 
 # Half the width of what is shown around a target [mm].
-_CLOSE = 1.5
+_DETAIL_HALF_WIDTH = 1.5
 
 
 def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> str:
@@ -30,14 +30,14 @@ def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> 
     X, Y = np.meshgrid(x, y, indexing="ij")
     axis.plot_surface(X, Y, z, cmap="viridis", alpha=0.85, linewidth=0.3, edgecolor="0.35")
     axis.scatter(X.ravel(), Y.ravel(), z.ravel(), s=5, color="0.15", depthshade=False)
-    axis.set(title=literal(title), xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
+    axis.set(title=plain_label(title), xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
     axis.locator_params(nbins=5)
     axis.view_init(elev=24, azim=-128)
     axis.set_box_aspect(None, zoom=0.88)
     return svg_text(figure)
 
 
-def lines_of_spectrum(title: str, frequencies: Array, spectra: Mapping[str, Array], unit: str) -> str:
+def spectrum_figure(title: str, frequencies: Array, spectra: Mapping[str, Array], unit: str) -> str:
     """Draw amplitudes over frequency, with the lines of several spectra side by side.
 
     Args:
@@ -54,11 +54,11 @@ def lines_of_spectrum(title: str, frequencies: Array, spectra: Mapping[str, Arra
     for axis, (name, values) in zip(panels, spectra.items(), strict=True):
         axis.vlines(frequencies, 0, values, color="C0", linewidth=1.6)
         axis.plot(frequencies, values, "o", color="C0", markersize=3)
-        axis.set(title=literal(name), ylabel=f"amplitude, {unit}")
+        axis.set(title=plain_label(name), ylabel=f"amplitude, {unit}")
         axis.set_ylim(bottom=0)
         axis.grid(visible=True, alpha=0.3)
     panels[-1].set_xlabel("frequency, Hz")
-    figure.suptitle(literal(title))
+    figure.suptitle(plain_label(title))
     return svg_text(figure)
 
 
@@ -74,27 +74,27 @@ def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array)
         An SVG file's text.
     """
     figure = empty_figure((4.6 * len(panels) + 0.6, 6.4))
-    near = len(targets)
-    grid = figure.add_gridspec(2, len(panels) * near, height_ratios=(1.7, 1.0))
+    columns = len(targets)
+    grid = figure.add_gridspec(2, len(panels) * columns, height_ratios=(1.7, 1.0))
     for i, (name, lines) in enumerate(panels.items()):
-        axis = figure.add_subplot(grid[0, i * near : (i + 1) * near])
-        _plane(axis, lines, targets)
-        axis.set(title=literal(name), xlabel="x, mm", ylabel="y, mm")
+        axis = figure.add_subplot(grid[0, i * columns : (i + 1) * columns])
+        _draw_paths(axis, lines, targets)
+        axis.set(title=plain_label(name), xlabel="x, mm", ylabel="y, mm")
         axis.set_aspect("equal", adjustable="datalim")
         axis.legend(fontsize="small", loc="lower center")
         for k, target in enumerate(targets):
-            close = figure.add_subplot(grid[1, i * near + k])
-            _plane(close, lines, targets)
-            xlim, ylim = ((x - _CLOSE, x + _CLOSE) for x in target)
-            close.set(xlim=xlim, ylim=ylim, title=f"Q{k + 1}")
-            close.set_aspect("equal")
-            close.tick_params(labelsize="x-small")
-    figure.suptitle(literal(title))
+            detail = figure.add_subplot(grid[1, i * columns + k])
+            _draw_paths(detail, lines, targets)
+            xlim, ylim = ((x - _DETAIL_HALF_WIDTH, x + _DETAIL_HALF_WIDTH) for x in target)
+            detail.set(xlim=xlim, ylim=ylim, title=f"Q{k + 1}")
+            detail.set_aspect("equal")
+            detail.tick_params(labelsize="x-small")
+    figure.suptitle(plain_label(title))
     return svg_text(figure)
 
 
-def _plane(axis: Any, lines: Mapping[str, Array], targets: Array) -> None:
-    for style, (name, places) in zip(("k--", "C0-", "C1-"), lines.items(), strict=False):
-        axis.plot(*places.T, style, linewidth=1.2, label=literal(name))
+def _draw_paths(axis: Any, lines: Mapping[str, Array], targets: Array) -> None:
+    for style, (name, positions) in zip(("k--", "C0-", "C1-"), lines.items(), strict=False):
+        axis.plot(*positions.T, style, linewidth=1.2, label=plain_label(name))
     axis.plot(*targets.T, "r+", markersize=9, label="targets")
     axis.grid(visible=True, alpha=0.3)

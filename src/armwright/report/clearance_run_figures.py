@@ -14,33 +14,48 @@ from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import tip_position
-from armwright.report.figures import Drawing, empty_figure, literal, plain_axes, spread, svg_text
+from armwright.report.figures import Drawing, empty_figure, evenly_spaced, plain_axes, plain_label, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # The largest error is drawn as this part of the size of the path, and no curve with more points than this.
-_SHOWN, _DRAWN = 0.2, 2500
+_ERROR_SHARE, _MAX_POINTS = 0.2, 2500
 # The way of a journal is coloured by time in so many pieces.
-_PIECES = 100
+_SEGMENTS = 100
 # So many places of the path without play are tied to those of the same moment with it.
-_TIES = 31
+_LINKS = 31
 # The spectrum is shown up to here [Hz].
-_HIGHEST = 200.0
+_MAX_FREQUENCY = 200.0
 
 
 def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
     """Return the figures of a run: path, bearings, error, forces, energy, spectrum."""
     drawn = []
-    times = magnification(run)
+    factor = magnification(run)
     pins = len(run.simulation.scenario.linkage.pins)
     for name, draw, size, caption in (
-        ("path", _path, (6.4, 5.2), f"The path without play and the path taken, its error magnified {times:g} times"),
-        ("bearings", _bearings, (3.1 * pins + 1.0, 3.6), "Middles of the journals in their bearings; circles: walls"),
-        ("error", _error, (7.4, 4.2), "Error of the tip over time"),
-        ("spectrum", _spectrum, (7.4, 4.2), "Amplitudes of the error: mean removed, up to 200 Hz"),
-        ("forces", _forces, (7.4, 4.2), "Forces between journals and bearings; a gap in a curve: the journal flies"),
-        ("energy", _energy, (7.4, 4.2), "What impacts and friction have taken, and what the books lack"),
+        (
+            "path",
+            _draw_path,
+            (6.4, 5.2),
+            f"The path without play and the path taken, its error magnified {factor:g} times",
+        ),
+        (
+            "bearings",
+            _draw_bearings,
+            (3.1 * pins + 1.0, 3.6),
+            "Middles of the journals in their bearings; circles: walls",
+        ),
+        ("error", _draw_error, (7.4, 4.2), "Error of the tip over time"),
+        ("spectrum", _draw_spectrum, (7.4, 4.2), "Amplitudes of the error: mean removed, up to 200 Hz"),
+        (
+            "forces",
+            _draw_forces,
+            (7.4, 4.2),
+            "Forces between journals and bearings; a gap in a curve: the journal flies",
+        ),
+        ("energy", _draw_energy, (7.4, 4.2), "What impacts and friction have taken, and what the books lack"),
     ):
         figure = empty_figure(size)
         draw(figure, run)
@@ -51,10 +66,10 @@ def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
 def magnification(run: ClearanceRun) -> float:
     """Return a round number by which errors are magnified so that one sees them beside the path."""
     path = tip_position(run.simulation.scenario.linkage, run.simulation.scenario.ideal.q)
-    return magnified(path, run.error, _SHOWN)
+    return magnification_factor(path, run.error, _ERROR_SHARE)
 
 
-def magnified(points: Array, errors: Array, share: float) -> float:
+def magnification_factor(points: Array, errors: Array, share: float) -> float:
     """Return a round factor by which errors (..., 2) are magnified to at most this share of the extent of points."""
     size = float(np.ptp(points, axis=0).max())
     largest = float(np.linalg.norm(errors, axis=-1).max())
@@ -69,46 +84,46 @@ def round_number(x: float) -> float:
     return max(digit * power for digit in (1, 2, 5) if digit * power <= x)
 
 
-def _path(figure: "Figure", run: ClearanceRun) -> None:
-    simulation, times = run.simulation, magnification(run)
-    some = spread(run.rows, _DRAWN)
-    ideal = (simulation.tip[: run.rows] - run.error)[some] * 1e3
-    taken = ideal + times * run.error[some] * 1e3
-    width, height = np.ptp(np.concatenate([ideal, taken]), axis=0)
+def _draw_path(figure: "Figure", run: ClearanceRun) -> None:
+    simulation, factor = run.simulation, magnification(run)
+    samples = evenly_spaced(run.rows, _MAX_POINTS)
+    ideal = (simulation.tip[: run.rows] - run.error)[samples] * 1e3
+    actual = ideal + factor * run.error[samples] * 1e3
+    width, height = np.ptp(np.concatenate([ideal, actual]), axis=0)
     figure.set_size_inches(float(np.clip(5.0 * width / max(height, 1e-9), 3.8, 8.0)), 5.4)
     axis = figure.subplots()
     # Of the same moment.
-    for k in np.unique(np.linspace(0, len(some) - 1, _TIES).astype(int)):
-        axis.plot(*np.stack([ideal[k], taken[k]], axis=-1), color="C7", linewidth=0.7)
+    for k in np.unique(np.linspace(0, len(samples) - 1, _LINKS).astype(int)):
+        axis.plot(*np.stack([ideal[k], actual[k]], axis=-1), color="C7", linewidth=0.7)
     axis.plot(*ideal.T, "k--", linewidth=1.3, label="without play")
-    axis.plot(*taken.T, color="C0", linewidth=1.3, label=f"with play, error × {times:g}")
+    axis.plot(*actual.T, color="C0", linewidth=1.3, label=f"with play, error × {factor:g}")
     for k, label in ((0, "start"), (-1, "end")):
-        axis.plot(*taken[k], "os"[k], color="C3", markersize=6, fillstyle="none", linestyle="", label=label)
+        axis.plot(*actual[k], "os"[k], color="C3", markersize=6, fillstyle="none", linestyle="", label=label)
     axis.set(xlabel="x, mm", ylabel="y, mm")
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(visible=True, alpha=0.3)
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
 
 
-def _bearings(figure: "Figure", run: ClearanceRun) -> None:
+def _draw_bearings(figure: "Figure", run: ClearanceRun) -> None:
     from matplotlib.collections import LineCollection  # noqa: PLC0415
     from matplotlib.patches import Circle  # noqa: PLC0415
 
-    pins, some = run.simulation.scenario.linkage.pins, spread(run.rows, _DRAWN)
+    pins, samples = run.simulation.scenario.linkage.pins, evenly_spaced(run.rows, _MAX_POINTS)
     panels = figure.subplots(1, len(pins), squeeze=False)[0]
     # Each piece begins where the one before it ends.
-    cuts = np.unique(np.linspace(0, len(some) - 1, _PIECES + 1).astype(int))
-    pieces = [slice(a, b + 1) for a, b in pairwise(cuts)]
-    times = np.array([run.time[some[a]] for a in cuts[:-1]]) * 1e3
+    bounds = np.unique(np.linspace(0, len(samples) - 1, _SEGMENTS + 1).astype(int))
+    segments = [slice(a, b + 1) for a, b in pairwise(bounds)]
+    factor = np.array([run.time[samples[a]] for a in bounds[:-1]]) * 1e3
     lines: Any = None
     for i, (axis, pin) in enumerate(zip(panels, pins, strict=True)):
-        gaps = run.gaps[some, i] * 1e3
+        gaps = run.gaps[samples, i] * 1e3
         wall = float(run.simulation.clearances[i]) * 1e3
         axis.add_patch(Circle((0, 0), wall, fill=False, color="k", linewidth=1.2))
-        lines = LineCollection([gaps[piece] for piece in pieces], array=times, cmap="viridis", linewidths=1.0)
+        lines = LineCollection([gaps[segment] for segment in segments], array=factor, cmap="viridis", linewidths=1.0)
         axis.add_collection(lines)
         axis.plot(*gaps[0], "o", color="C3", markersize=6, fillstyle="none", zorder=4)
-        axis.set(title=literal(f"{pin.name}, {wall:g} mm"), xlabel="x, mm", xlim=(-1.12 * wall, 1.12 * wall))
+        axis.set(title=plain_label(f"{pin.name}, {wall:g} mm"), xlabel="x, mm", xlim=(-1.12 * wall, 1.12 * wall))
         axis.set_ylim(-1.12 * wall, 1.12 * wall)
         axis.set_aspect("equal")
         axis.grid(visible=True, alpha=0.3)
@@ -116,12 +131,12 @@ def _bearings(figure: "Figure", run: ClearanceRun) -> None:
     figure.colorbar(lines, ax=panels, label="time, ms", shrink=0.8)
 
 
-def _error(figure: "Figure", run: ClearanceRun) -> None:
-    axis, some = plain_axes(figure, "time, s", "error, mm"), spread(run.rows, _DRAWN)
-    t = run.time[some]
+def _draw_error(figure: "Figure", run: ClearanceRun) -> None:
+    axis, samples = plain_axes(figure, "time, s", "error, mm"), evenly_spaced(run.rows, _MAX_POINTS)
+    t = run.time[samples]
     lines = (("E", run.distance, "-", "C0"), ("x", run.error[:, 0], "--", "C1"), ("y", run.error[:, 1], "-.", "C2"))
     for name, values, style, colour in lines:
-        axis.plot(t, values[some] * 1e3, style, color=colour, linewidth=1.3, label=name)
+        axis.plot(t, values[samples] * 1e3, style, color=colour, linewidth=1.3, label=name)
     for knot in run.simulation.scenario.path.knots[1:-1]:
         axis.axvline(knot, color="0.6", linewidth=0.8, linestyle=":")
     if run.predictability is not None and not run.predictability.to_the_end:
@@ -130,41 +145,41 @@ def _error(figure: "Figure", run: ClearanceRun) -> None:
     axis.legend(fontsize="small")
 
 
-def _spectrum(figure: "Figure", run: ClearanceRun) -> None:
+def _draw_spectrum(figure: "Figure", run: ClearanceRun) -> None:
     axis = plain_axes(figure, "frequency, Hz", "amplitude, mm")
     waves = spectrum(run.distance) * 1e3
     per_line = 1.0 / (len(run.time) * (run.time[1] - run.time[0])) if len(run.time) > 1 else 1.0
     frequencies = per_line * np.arange(len(waves))
-    shown = (frequencies > 0) & (frequencies <= max(_HIGHEST, 20 * per_line))
+    shown = (frequencies > 0) & (frequencies <= max(_MAX_FREQUENCY, 20 * per_line))
     axis.vlines(frequencies[shown], 0.0, waves[shown], color="C0", linewidth=1.6)
     axis.plot(frequencies[shown], waves[shown], "o", color="C0", markersize=3.5)
     axis.set_ylim(bottom=0.0)
     axis.set_title(f"constant part, counted twice: {waves[0]:.4g} mm", fontsize="medium")
 
 
-def _forces(figure: "Figure", run: ClearanceRun) -> None:
-    axis, some = plain_axes(figure, "time, s", "force, N"), spread(run.rows, _DRAWN)
+def _draw_forces(figure: "Figure", run: ClearanceRun) -> None:
+    axis, samples = plain_axes(figure, "time, s", "force, N"), evenly_spaced(run.rows, _MAX_POINTS)
     for i, pin in enumerate(run.simulation.scenario.linkage.pins):
-        forces = run.simulation.forces[: run.rows, i][some]
+        forces = run.simulation.forces[: run.rows, i][samples]
         axis.plot(
-            run.time[some],
+            run.time[samples],
             np.where(forces > 0, forces, np.nan),
             linewidth=1.1,
             color=f"C{i % 10}",
-            label=literal(pin.name),
+            label=plain_label(pin.name),
         )
     if np.any(run.simulation.forces[: run.rows] > 0):
         axis.set_yscale("log")
     axis.legend(fontsize="small")
 
 
-def _energy(figure: "Figure", run: ClearanceRun) -> None:
-    axis, some, energy = plain_axes(figure, "time, s", "energy, J"), spread(run.rows, _DRAWN), run.energy
+def _draw_energy(figure: "Figure", run: ClearanceRun) -> None:
+    axis, samples, energy = plain_axes(figure, "time, s", "energy, J"), evenly_spaced(run.rows, _MAX_POINTS), run.energy
     for name, track, style in (
         ("lost in impacts", energy.impact_loss, "-"),
         ("lost in friction", energy.friction_loss, "--"),
         ("in the walls", energy.stored, "-."),
         ("not explained", energy.imbalance, ":"),
     ):
-        axis.plot(run.time[some], track[: run.rows][some], style, linewidth=1.4, label=name)
+        axis.plot(run.time[samples], track[: run.rows][samples], style, linewidth=1.4, label=name)
     axis.legend(fontsize="small")

@@ -13,7 +13,7 @@ from armwright.clearance.energy_balance import EnergyBalance
 from armwright.files.rows import text_cell
 from armwright.report.clearance_run_figures import clearance_run_figures
 from armwright.report.clearance_run_page import clearance_run_page
-from armwright.report.five_bar_figure import workspace_of
+from armwright.report.five_bar_figure import scenario_workspace
 
 
 def clearance_run_files(run: ClearanceRun, *, command: str) -> dict[str, Any]:
@@ -24,7 +24,7 @@ def clearance_run_files(run: ClearanceRun, *, command: str) -> dict[str, Any]:
         command: the command line that made it.
     """
     scenario = run.simulation.scenario
-    space = workspace_of(scenario)
+    space = scenario_workspace(scenario)
     drawn = [*clearance_run_figures(run), *([space] if space else [])]
     title = f"{scenario.linkage.name}: {scenario.path.name}"
     return {

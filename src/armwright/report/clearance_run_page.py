@@ -12,22 +12,22 @@ import numpy as np
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.ideal import point_position
 from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage, Pin
-from armwright.report.clearance_run_figures import magnified
+from armwright.report.clearance_run_figures import magnification_factor
 from armwright.report.elements import badge, facts, figures, notes as shown_notes, pairs, table
 from armwright.report.figures import Drawing
 from armwright.report.markup import asset, page_html
-from armwright.report.sticks import thinned
+from armwright.report.stick_figure import thinned_rows
 from armwright.version import __version__
 
 # Rows of a page at most, and the size of the largest error on the screen relative to that of the linkage.
-_ROWS, _SHOWN = 2600, 0.09
+_MAX_ROWS, _ERROR_SHARE = 2600, 0.09
 _SCRIPTS = ("plane.js", "bearings.js", "charts.js", "clearance_run_charts.js", "clearance_run.js")
 _MICRO = 1e6
 # Figures that are not charts drawn by the scripts.
-_PRINTED = ("path", "bearings", "spectrum", "workspace")
+_STATIC_FIGURES = ("path", "bearings", "spectrum", "workspace")
 
 
-def film(run: ClearanceRun) -> dict[str, Any]:
+def animation_data(run: ClearanceRun) -> dict[str, Any]:
     """Return the data of the scripts of the page, at r instants: as many as a screen can tell apart.
 
     Returns:
@@ -50,7 +50,7 @@ def film(run: ClearanceRun) -> dict[str, Any]:
         magnification: initial magnification of the displacements.
     """
     simulation, linkage = run.simulation, run.simulation.scenario.linkage
-    rows = thinned(run.rows, _ROWS)
+    rows = thinned_rows(run.rows, _MAX_ROWS)
     points = [BodyPoint(body.name, point) for body in linkage.bodies for point in body.points]
     q = simulation.q[rows]
     ideal_q = simulation.scenario.ideal.q[rows * simulation.scenario.stride]
@@ -62,25 +62,25 @@ def film(run: ClearanceRun) -> dict[str, Any]:
         "duration": float(run.time[-1]),
         "t": run.time[rows],
         "ground_m": [[float(x) for x in point] for point in linkage.ground.points.values()],
-        "rails": _rails(linkage),
+        "rails": _guide_data(linkage),
         "bodies": [
             {"name": body.name, "points": [i for i, point in enumerate(points) if point.body == body.name]}
             for body in linkage.bodies
         ],
-        "motors": [_motor(linkage, drive.body, points) for drive in linkage.drives],
+        "motors": [_motor_data(linkage, drive.body, points) for drive in linkage.drives],
         "points_m": ideal.reshape(len(rows), -1),
         "shifts_um": (actual - ideal).reshape(len(rows), -1) * _MICRO,
         "tip": points.index(linkage.tip) if linkage.tip in points else -1,
         "path_m": simulation.tip[rows] - simulation.error[rows],
         "error_um": simulation.error[rows] * _MICRO,
-        "pins": _pins(run, points),
+        "pins": _pin_data(run, points),
         "gaps_um": run.gaps[rows].reshape(len(rows), -1) * _MICRO,
         # A blow between two rows is not lost.
         "forces_N": np.maximum.reduceat(simulation.forces[: run.rows], rows, axis=0),
         "flies": (run.depths[rows] < 0).astype(np.float64),
         "energy_J": np.stack([track[rows] for track in (*tracks, energy.imbalance)], axis=-1),
-        "magnification": magnified(
-            ideal.reshape(-1, 2), np.concatenate([actual - ideal, simulation.error[rows, None]], 1), _SHOWN
+        "magnification": magnification_factor(
+            ideal.reshape(-1, 2), np.concatenate([actual - ideal, simulation.error[rows, None]], 1), _ERROR_SHARE
         ),
     }
 
@@ -109,11 +109,11 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
             targets=table(targets),
             totals=pairs((name, f"{value} {unit}") for name, value, unit in totals.rows),
             settings=pairs(_settings(data)),
-            figures=figures(drawing for drawing in drawn if drawing.name in _PRINTED),
+            figures=figures(drawing for drawing in drawn if drawing.name in _STATIC_FIGURES),
         ),
         styles=("clearance_run.css",),
         scripts=_SCRIPTS,
-        data=film(run),
+        data=animation_data(run),
         generated=f"armwright {__version__}: {command}",
     )
 
@@ -121,7 +121,7 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
 # ---- the film ------------------------------------------------------------------------------------------------------
 
 
-def _pins(run: ClearanceRun, points: Sequence[BodyPoint]) -> list[dict[str, Any]]:
+def _pin_data(run: ClearanceRun, points: Sequence[BodyPoint]) -> list[dict[str, Any]]:
     """Return the pins; a bearing or journal on the ground has a position instead of an index."""
     linkage = run.simulation.scenario.linkage
     pins = []
@@ -141,12 +141,12 @@ def _pins(run: ClearanceRun, points: Sequence[BodyPoint]) -> list[dict[str, Any]
     return pins
 
 
-def _rails(linkage: Linkage) -> list[list[float]]:
+def _guide_data(linkage: Linkage) -> list[list[float]]:
     guides = [joint for joint in linkage.joints if isinstance(joint, Guide) and joint.on.body == GROUND]
     return [[*(float(x) for x in linkage.point(guide.on)), guide.direction] for guide in guides]
 
 
-def _motor(linkage: Linkage, body: str, points: Sequence[BodyPoint]) -> int | list[float]:
+def _motor_data(linkage: Linkage, body: str, points: Sequence[BodyPoint]) -> int | list[float]:
     joint = linkage.joint(body)
     assert joint is not None  # noqa: S101 - a linkage has no drive without one
     if isinstance(joint, Pin) and joint.on.body == GROUND:

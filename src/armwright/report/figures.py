@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.report.svg import steady
+from armwright.report.svg import normalize_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,18 +70,18 @@ def curves(
     figure = empty_figure((7, 4.2))
     axes = plain_axes(figure, x_label, y_label)
     for i, (name, y) in enumerate(lines.items()):
-        axes.plot(x, y, _STYLES[i % len(_STYLES)], label=literal(name), linewidth=1.6)
+        axes.plot(x, y, _STYLES[i % len(_STYLES)], label=plain_label(name), linewidth=1.6)
     for name, (abscissae, values) in (fits or {}).items():
-        axes.plot(abscissae, values, "k--", label=literal(name), linewidth=1.4)
+        axes.plot(abscissae, values, "k--", label=plain_label(name), linewidth=1.4)
     for low, high in spans:
         axes.axvspan(low, high, color="0.88", zorder=0)
-    axes.set(title=literal(title), xlim=(float(x[0]), float(x[-1])))
+    axes.set(title=plain_label(title), xlim=(float(x[0]), float(x[-1])))
     if len(axes.lines) > 1:
         axes.legend()
     return svg_text(figure)
 
 
-def bars(
+def bar_chart(
     title: str, names: Sequence[str], values: Mapping[str, Sequence[float]], *, y_label: str, logarithmic: bool = False
 ) -> str:
     """Draw groups of bars side by side.
@@ -100,8 +100,8 @@ def bars(
     axes = figure.subplots()
     width = 0.8 / len(values)
     for i, (name, heights) in enumerate(values.items()):
-        axes.bar([k + (i + 0.5) * width - 0.4 for k in range(len(names))], heights, width, label=literal(name))
-    axes.set(title=literal(title), ylabel=y_label, xticks=range(len(names)), xticklabels=names)
+        axes.bar([k + (i + 0.5) * width - 0.4 for k in range(len(names))], heights, width, label=plain_label(name))
+    axes.set(title=plain_label(title), ylabel=y_label, xticks=range(len(names)), xticklabels=names)
     if logarithmic:
         axes.set_yscale("log")
     axes.grid(visible=True, axis="y", alpha=0.3)
@@ -124,7 +124,7 @@ def plain_axes(figure: "Figure", x: str, y: str) -> "Axes":
     return axes
 
 
-def equal_scales(axes: Any, low: Array, high: Array, *, least: float = 0.0) -> float:
+def set_equal_scales(axes: Any, low: Array, high: Array, *, least: float = 0.0) -> float:
     """Set equal scales along x, y and z, so that right angles appear as right angles.
 
     Args:
@@ -143,7 +143,7 @@ def equal_scales(axes: Any, low: Array, high: Array, *, least: float = 0.0) -> f
     return half
 
 
-def spread(count: int, most: int) -> Array:
+def evenly_spaced(count: int, most: int) -> Array:
     """Return the indices of at most this many rows, evenly distributed, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, most).astype(int))
 
@@ -156,10 +156,10 @@ def svg_text(figure: "Figure") -> str:
     # Without a date and with fixed identifiers, a figure changes only when its numbers do.
     with mpl.rc_context({"svg.hashsalt": "armwright"}):
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return steady(text.getvalue())
+    return normalize_svg(text.getvalue())
 
 
-def literal(text: str) -> str:
+def plain_label(text: str) -> str:
     """Return a text of the user for a figure: dollars begin no formulas, and all characters are printable.
 
     Tabs and line breaks become blanks, other unprintable characters become replacement characters, and a long text is

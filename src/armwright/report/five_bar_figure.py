@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Sine of the angle between rods below which they are aligned, and have no condition number.
-_IN_LINE = 1e-9
+_ALIGNED = 1e-9
 # Difference of equal angles at most [rad], and points of a path that are drawn.
-_SAME, _DRAWN = 1e-6, 200
+_EQUAL_ANGLES, _MAX_POINTS = 1e-6, 200
 # Cells of the map along its longer side.
-_CELLS = 260
+_MAP_CELLS = 260
 
 
 def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = ()) -> Drawing:
@@ -46,16 +46,16 @@ def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = 
     one_of("assembly mode", mode, MODES)
     figure = empty_figure((7.4, 6.6))
     axis = figure.subplots()
-    space = workspace(bar, _CELLS)
+    space = workspace(bar, _MAP_CELLS)
     edges = [np.append(x, 2 * x[-1] - x[-2]) - (x[1] - x[0]) / 2 for x in (space.x * 1e3, space.y * 1e3)]
     colours = axis.pcolormesh(
-        *edges, _evenness(bar, space, mode), cmap="YlGnBu", vmin=0, vmax=1, rasterized=True, zorder=0
+        *edges, _inverse_condition_numbers(bar, space, mode), cmap="YlGnBu", vmin=0, vmax=1, rasterized=True, zorder=0
     )
     figure.colorbar(colours, ax=axis, label="smallest gain of the motors by the largest", shrink=0.8)
     _draw_curves(axis, bar, mode)
     for path in paths:
         axis.plot(*(path * 1e3).T, color="C1", linewidth=2.2, zorder=4)
-    start = paths[0][0] if paths else _middle(space)
+    start = paths[0][0] if paths else _innermost_position(space)
     _draw_arm(axis, bar, inverse(bar, start, mode), start)
     axis.set(xlabel="x, mm", ylabel="y, mm", title=f"elbows {mode}")
     axis.set_aspect("equal")
@@ -68,7 +68,7 @@ def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = 
     return Drawing("workspace", caption, svg_text(figure))
 
 
-def workspace_of(scenario: Scenario) -> Drawing | None:
+def scenario_workspace(scenario: Scenario) -> Drawing | None:
     """Return the workspace of the five-bar of a scenario, with its path; None for another linkage."""
     try:
         bar = FiveBar.of(scenario.linkage)
@@ -76,19 +76,22 @@ def workspace_of(scenario: Scenario) -> Drawing | None:
         return None
     tips = tip_position(scenario.linkage, scenario.ideal.q)
     for mode, angles in inverse_all(bar, tips[0]).items():
-        if np.abs(np.sin((five_bar_coordinates(scenario.linkage, angles) - scenario.ideal.q[0]) / 2)).max() < _SAME:
-            return workspace_figure(bar, mode, [tips[:: max(1, len(tips) // _DRAWN)]])
+        if (
+            np.abs(np.sin((five_bar_coordinates(scenario.linkage, angles) - scenario.ideal.q[0]) / 2)).max()
+            < _EQUAL_ANGLES
+        ):
+            return workspace_figure(bar, mode, [tips[:: max(1, len(tips) // _MAX_POINTS)]])
     raise AssertionError("a five-bar has four assembly modes")
 
 
-def _evenness(bar: FiveBar, space: Workspace, mode: Mode) -> Array:
+def _inverse_condition_numbers(bar: FiveBar, space: Workspace, mode: Mode) -> Array:
     """Return the reciprocal condition number of the transmission, (j, i); NaN out of reach."""
     evenness = np.full(space.distance.shape, np.nan)
     inside = space.distance > 0
     positions = np.stack(np.meshgrid(space.x, space.y), axis=-1)[inside]
     angles = inverse(bar, positions, mode)
     values = np.zeros(len(positions))
-    bent = np.abs(singularity_sines(angles)[:, 1]) > _IN_LINE
+    bent = np.abs(singularity_sines(angles)[:, 1]) > _ALIGNED
     values[bent] = 1.0 / condition_number(bar, angles[bent])
     evenness[inside] = values
     return evenness
@@ -115,7 +118,7 @@ def _draw_arm(axis: "Axes", bar: FiveBar, angles: Array, tip: Array) -> None:
     axis.plot(*points.T, "o", color="w", markeredgecolor="0.25", markersize=6, zorder=6)
 
 
-def _middle(space: Workspace) -> Array:
+def _innermost_position(space: Workspace) -> Array:
     """Return the position farthest from the border, below the motors if the workspace extends there."""
     j, i = np.unravel_index(int(space.distance[: max(1, len(space.y) // 2)].argmax()), space.distance.shape)
     return np.array([space.x[i], space.y[j]])

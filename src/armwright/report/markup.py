@@ -17,8 +17,8 @@ _DIGITS, _DIGITS_OF_SCALARS = 5, 8
 # Decimals at most; smaller parts of a number are rounding errors.
 _DECIMALS = 7
 # Stands for a row that equals the previous row.
-_REPEATED = 0
-_NO_SCRIPTS = (
+_REPEATED_ROW = 0
+_NO_SCRIPTS_NOTE = (
     '<noscript><p class="empty">This page draws with a script of its own; please allow scripts for it.</p></noscript>'
 )
 
@@ -64,7 +64,7 @@ def page_html(
         badge=badge,
         facts=facts,
         notes=notes,
-        before=_NO_SCRIPTS if scripts else "",
+        before=_NO_SCRIPTS_NOTE if scripts else "",
         main=main,
         generated=html.escape(generated),
         after=film,
@@ -73,7 +73,7 @@ def page_html(
 
 def json_text(data: object) -> str:
     """Return ``data`` as JSON for a script element: in ASCII, and without ``<``."""
-    text = json.dumps(_plain(data), ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    text = json.dumps(_to_json_types(data), ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 
 
@@ -82,22 +82,22 @@ def asset(name: str) -> str:
     return (files("armwright.report") / "assets" / name).read_text(encoding="utf-8")
 
 
-def _plain(value: object) -> object:
+def _to_json_types(value: object) -> object:
     """Convert ``value`` to types of JSON."""
     if isinstance(value, np.ndarray):
-        return _rows(value)
+        return _array_rows(value)
     if isinstance(value, (int, float, np.number)) and not isinstance(value, bool):
-        return _short(float(value), _DIGITS_OF_SCALARS)
+        return _round_significant(float(value), _DIGITS_OF_SCALARS)
     if attrs.has(type(value)):
-        return {name: _plain(item) for name, item in attrs.asdict(value, recurse=False).items()}  # type: ignore[arg-type]
+        return {name: _to_json_types(item) for name, item in attrs.asdict(value, recurse=False).items()}  # type: ignore[arg-type]
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): _to_json_types(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [_to_json_types(item) for item in value]
     return value
 
 
-def _short(number: float, digits: int) -> float | int | None:
+def _round_significant(number: float, digits: int) -> float | int | None:
     """Round to significant digits; an integral number becomes an int, and an infinite one None."""
     if not math.isfinite(number):
         return None
@@ -105,14 +105,14 @@ def _short(number: float, digits: int) -> float | int | None:
     return int(rounded) if rounded.is_integer() else rounded
 
 
-def _rows(array: Array) -> list[object]:
+def _array_rows(array: Array) -> list[object]:
     """Return an array over time: numbers for a single axis, else a flat list per row, or 0 for a repeated row."""
     if array.ndim == 1:
-        return [_short(number, _DIGITS_OF_SCALARS) for number in array.tolist()]
+        return [_round_significant(number, _DIGITS_OF_SCALARS) for number in array.tolist()]
     rows: list[object] = []
     last: list[object] | None = None
     for numbers in array.reshape(len(array), math.prod(array.shape[1:])).tolist():
-        row: list[object] = [_short(number, _DIGITS) for number in numbers]
-        rows.append(_REPEATED if row == last else row)
+        row: list[object] = [_round_significant(number, _DIGITS) for number in numbers]
+        rows.append(_REPEATED_ROW if row == last else row)
         last = row
     return rows

@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.motion.tool_path import zyz_angles
 from armwright.motion.trajectory import Samples
-from armwright.report.figures import empty_figure, equal_scales, literal, spread, svg_text
+from armwright.report.figures import empty_figure, evenly_spaced, plain_label, set_equal_scales, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,14 +58,14 @@ def panels(
         for name, time in (marks or {}).items():
             # Above the title of the panel.
             above = {"xytext": (0, 17), "textcoords": "offset points", "ha": "center", "va": "bottom", "color": "0.4"}
-            axis.annotate(literal(name), (time, 1), xycoords=("data", "axes fraction"), **above)
+            axis.annotate(plain_label(name), (time, 1), xycoords=("data", "axes fraction"), **above)
     for axis in grid[-1]:
         axis.set_xlabel("time, s")
-    figure.suptitle(literal(title))
+    figure.suptitle(plain_label(title))
     return svg_text(figure)
 
 
-def path_in_space(title: str, X: Array, marks: Mapping[str, Array]) -> str:
+def path_figure(title: str, X: Array, marks: Mapping[str, Array]) -> str:
     """Draw the path of the tool with its approach vectors.
 
     Args:
@@ -78,17 +78,17 @@ def path_in_space(title: str, X: Array, marks: Mapping[str, Array]) -> str:
     """
     figure = empty_figure((6.4, 5.6))
     draw_path(figure.add_subplot(projection="3d"), X, marks)
-    figure.suptitle(literal(title))
+    figure.suptitle(plain_label(title))
     return svg_text(figure)
 
 
-def overview(title: str, t: Array, three: Sequence[Panel], X: Array, marks: Mapping[str, Array]) -> str:
+def overview(title: str, t: Array, time_panels: Sequence[Panel], X: Array, marks: Mapping[str, Array]) -> str:
     """Draw three panels over time and the path in space in a square.
 
     Args:
         title: title of the figure.
         t: (m,) times [s].
-        three: the panels: left above, right above, left below.
+        time_panels: three panels: left above, right above, left below.
         X: (k, 4, 4) poses along the path, drawn right below.
         marks: (3,) positions to mark, by name [m].
 
@@ -96,12 +96,12 @@ def overview(title: str, t: Array, three: Sequence[Panel], X: Array, marks: Mapp
         An SVG file's text.
     """
     figure = empty_figure((10.4, 7.6))
-    for place, panel in enumerate(three):
-        axis = figure.add_subplot(2, 2, place + 1)
+    for index, panel in enumerate(time_panels):
+        axis = figure.add_subplot(2, 2, index + 1)
         draw_curves(axis, t, panel)
         axis.set_xlabel("time, s")
     draw_path(figure.add_subplot(2, 2, 4, projection="3d"), X, marks)
-    figure.suptitle(literal(title))
+    figure.suptitle(plain_label(title))
     return svg_text(figure)
 
 
@@ -117,24 +117,24 @@ def joint_panels(samples: Samples, revolute: Sequence[bool]) -> list[Panel]:
     ]
 
 
-def hand_panels(t: Array, X: Array) -> list[Panel]:
+def tool_panels(t: Array, X: Array) -> list[Panel]:
     """Return panels of position and ZYZ angles of the tool (m, 4, 4), and of their differences in time."""
     positions = X[:, :3, 3] * 100
     angles = np.degrees(zyz_angles(X[:, :3, :3]))
-    made = []
+    result = []
     for unit, names, values in (("cm", "xyz", positions), ("deg", ("phi", "theta", "psi"), angles)):
-        rate = _rate(values, t)
+        rate = _time_derivative(values, t)
         quantity = "position" if unit == "cm" else "ZYZ angles"
         for title, per, curve in (
             (quantity, "", values),
             (f"speed of the {quantity}", "/s", rate),
-            (f"acceleration of the {quantity}", "/s²", _rate(rate, t)),
+            (f"acceleration of the {quantity}", "/s²", _time_derivative(rate, t)),
         ):
-            made.append(Panel(title, unit + per, dict(zip(names, curve.T, strict=True))))
-    return made
+            result.append(Panel(title, unit + per, dict(zip(names, curve.T, strict=True))))
+    return result
 
 
-def _rate(values: Array, t: Array) -> Array:
+def _time_derivative(values: Array, t: Array) -> Array:
     """Return the rates of values (m, k) by differences of second order where there are enough samples."""
     if len(t) < 2:
         return np.zeros_like(values)
@@ -144,9 +144,9 @@ def _rate(values: Array, t: Array) -> Array:
 def draw_curves(axis: "Axes", t: Array, panel: Panel) -> None:
     """Draw the curves of a panel."""
     for (name, values), style in zip(panel.lines.items(), _STYLES * 4, strict=False):
-        axis.plot(t, values, linestyle=style, label=literal(name), linewidth=1.4)
+        axis.plot(t, values, linestyle=style, label=plain_label(name), linewidth=1.4)
     axis.set(ylabel=panel.unit, xlim=(float(t[0]), float(t[-1])))
-    axis.set_title(literal(panel.title), loc="left", fontsize="medium")
+    axis.set_title(plain_label(panel.title), loc="left", fontsize="medium")
     axis.grid(visible=True, alpha=0.3)
     axis.legend(loc="center left", bbox_to_anchor=(1.005, 0.5), fontsize="small", frameon=False)
 
@@ -154,7 +154,7 @@ def draw_curves(axis: "Axes", t: Array, panel: Panel) -> None:
 def draw_path(axis: Any, X: Array, marks: Mapping[str, Array]) -> None:
     """Draw a path in space with its approach vectors."""
     p = X[:, :3, 3] * 100
-    some = spread(len(X), _ARROWS)
+    some = evenly_spaced(len(X), _ARROWS)
     extent = float(np.ptp(p, axis=0).max()) or 1.0
     a = X[some, :3, 2] * _ARROW_LENGTH * extent
     axis.plot(*p.T, linewidth=2.0, color="C0")
@@ -162,8 +162,8 @@ def draw_path(axis: Any, X: Array, marks: Mapping[str, Array]) -> None:
     for name, position in marks.items():
         x, y, z = position * 100
         axis.plot([x], [y], [z], "o", color="C3", markersize=5)
-        axis.text(x, y, z, f"  {literal(name)}", color="C3")
+        axis.text(x, y, z, f"  {plain_label(name)}", color="C3")
     tips = p[some] + a
     low, high = np.minimum(p.min(axis=0), tips.min(axis=0)), np.maximum(p.max(axis=0), tips.max(axis=0))
-    equal_scales(axis, low, high, least=1e-3)
+    set_equal_scales(axis, low, high, least=1e-3)
     axis.set(xlabel="x, cm", ylabel="y, cm", zlabel="z, cm")

@@ -9,7 +9,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.move_assessment import MoveAssessment
 from armwright.motion.poses_file import PosesFile
 from armwright.report.motion_table import motion_csv
-from armwright.report.move_figures import hand_panels, joint_panels, panels, path_in_space
+from armwright.report.move_figures import joint_panels, panels, path_figure, tool_panels
 from armwright.report.move_page import move_page
 from armwright.report.page import run_page
 
@@ -41,7 +41,7 @@ def move_files(
         "motion.csv": motion_csv(t, samples.q, samples.qd, samples.qdd, tau),
         "move.json": json.dumps(assessment.as_data(), indent=2, ensure_ascii=False) + "\n",
         "joints.svg": panels(f"{title}: joints", t, joints, marks=times),
-        "hand.svg": panels(f"{title}: tool", t, hand_panels(t, X), marks=times, columns=2),
-        "path.svg": path_in_space(f"{title}: path of the tool, approach vectors", X, positions),
+        "hand.svg": panels(f"{title}: tool", t, tool_panels(t, X), marks=times, columns=2),
+        "path.svg": path_figure(f"{title}: path of the tool, approach vectors", X, positions),
         "report.html": run_page(page),
     }

@@ -10,7 +10,7 @@ from armwright.motion.moves import Move
 from armwright.motion.poses_file import PosesFile
 from armwright.motion.trajectory import Samples
 from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, StageRow
-from armwright.report.sticks import joints_of, sticks, thinned
+from armwright.report.stick_figure import joint_infos, stick_figure, thinned_rows
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -44,7 +44,7 @@ def move_page(
         command: the command line.
         notes: warnings and remarks.
     """
-    rows = thinned(len(samples.times))
+    rows = thinned_rows(len(samples.times))
     return RunPage(
         title=title,
         program_name=name,
@@ -61,7 +61,7 @@ def move_page(
             ArmRecord(
                 name=_ARM,
                 model=move.arm.name,
-                joints=joints_of(move.arm),
+                joints=joint_infos(move.arm),
                 t=samples.times[rows],
                 q=samples.q[rows],
                 qd=samples.qd[rows],
@@ -115,4 +115,4 @@ def _animation(move: Move, file: PosesFile) -> Animation:
         FrameTrack(name=name, poses=to_noap(np.tile(X, (len(t), 1, 1))))
         for name, X in zip(file.names, move.poses, strict=True)
     ]
-    return Animation(fps=fps, t=t, arms={_ARM: sticks(move.arm, poses, np.ones(len(t)))}, frames=tracks)
+    return Animation(fps=fps, t=t, arms={_ARM: stick_figure(move.arm, poses, np.ones(len(t)))}, frames=tracks)

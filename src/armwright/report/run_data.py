@@ -16,7 +16,7 @@ from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt
 from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
 from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
-from armwright.report.sticks import joints_of, sticks, thinned
+from armwright.report.stick_figure import joint_infos, stick_figure, thinned_rows
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -28,7 +28,7 @@ _MAX_FRAMES = 400
 _T = TypeVar("_T")
 
 
-def page_of(
+def run_page_data(
     recording: Recording, diagnostics: Sequence[Diagnostic], command: str, left_out: Sequence[str] = ()
 ) -> RunPage:
     """Return the page of a run, also of one that failed.
@@ -40,12 +40,12 @@ def page_of(
         left_out: notes on what other files of the run omit.
     """
     source, cell, failure = recording.code.source, recording.cell, recording.failure
-    stages, fewer_stages = _fewer(recording.stages, MAX_LIST_ITEMS, "stages", "all in run.json")
+    stages, fewer_stages = _limit_items(recording.stages, MAX_LIST_ITEMS, "stages", "all in run.json")
     animation, fewer_frames = _animation(recording)
     status = "finished" if failure is None else f"failed: {failure.diagnostic.code} at {failure.time:.3f} s"
     reasons = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
     errors_first = sorted(diagnostics, key=lambda diagnostic: not diagnostic.is_error)
-    listed, fewer = _fewer(errors_first, MAX_LIST_ITEMS, "messages", "all in run.json")
+    listed, fewer = _limit_items(errors_first, MAX_LIST_ITEMS, "messages", "all in run.json")
     notes = (*reasons, *left_out, *fewer, *fewer_stages, *fewer_frames)
     return RunPage(
         title=f"{source.name} in {cell.name}" + ("" if failure is None else ": failed"),
@@ -62,13 +62,13 @@ def page_of(
         ]
         + [Message(severity="note", text=text) for text in notes],
         effects=_effects(recording),
-        stages=[_stage(run, source.line(run.span.start)) for run in stages],
-        arms=[_record(stream, cell) for stream in recording.streams],
+        stages=[_stage_row(run, source.line(run.span.start)) for run in stages],
+        arms=[_arm_record(stream, cell) for stream in recording.streams],
         animation=animation,
     )
 
 
-def _fewer(items: Sequence[_T], most: int, name: str, hint: str = EVENT_LOG_HINT) -> tuple[list[_T], list[str]]:
+def _limit_items(items: Sequence[_T], most: int, name: str, hint: str = EVENT_LOG_HINT) -> tuple[list[_T], list[str]]:
     """Return the first and last items, as many as a page can hold, and a note if others are omitted."""
     shown = excerpt(items, most)
     text = f"this page shows the first and the last {len(shown.first):,} of {len(items):,} {name}; {hint}"
@@ -88,7 +88,7 @@ def _effects(recording: Recording) -> list[Effect]:
     return effects.map(shown).join(*omitted)
 
 
-def _stage(run: RunStage, line: int) -> StageRow:
+def _stage_row(run: RunStage, line: int) -> StageRow:
     return StageRow(
         t0=run.t0,
         t1=run.t1,
@@ -105,13 +105,13 @@ def _stage(run: RunStage, line: int) -> StageRow:
     )
 
 
-def _record(stream: Stream, cell: Cell) -> ArmRecord:
+def _arm_record(stream: Stream, cell: Cell) -> ArmRecord:
     arm = cell.arms[stream.arm]
-    rows = thinned(len(stream.t))
+    rows = thinned_rows(len(stream.t))
     return ArmRecord(
         name=stream.arm,
         model=arm.arm.name,
-        joints=joints_of(arm.arm),
+        joints=joint_infos(arm.arm),
         t=stream.t[rows],
         q=stream.q[rows],
         qd=stream.qd[rows],
@@ -126,22 +126,29 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     fps = min(_FRAMES_PER_SECOND, _MAX_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
     arms = recording.cell.arms
-    links = {s.arm: _poses_in_world(arms[s.arm], _sampled(s, t)) for s in recording.streams}
-    hands = {name: poses[:, -1] for name, poses in links.items()}
-    visible = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
-    names, fewer_frames = _fewer(visible, _MAX_FRAMES, "frames", "all in frames.json")
-    changes, fewer_changes = _fewer([*_tree_changes(recording, t)], MAX_LIST_ITEMS, "changes of the tree of frames")
+    links = {s.arm: _poses_in_world(arms[s.arm], _sample_configurations(s, t)) for s in recording.streams}
+    tool_poses = {name: poses[:, -1] for name, poses in links.items()}
+    visible = [
+        name for name in recording.tree if _is_displayed(name, recording.cell) and recording.tree.has_value(name)
+    ]
+    names, fewer_frames = _limit_items(visible, _MAX_FRAMES, "frames", "all in frames.json")
+    changes, fewer_changes = _limit_items(
+        [*_tree_changes(recording, t)], MAX_LIST_ITEMS, "changes of the tree of frames"
+    )
     animation = Animation(
         fps=fps,
         t=t,
-        arms={name: sticks(arms[name].arm, poses, _grip(recording.effects, name, t)) for name, poses in links.items()},
-        frames=list(_tracks(recording, t, hands, names)),
+        arms={
+            name: stick_figure(arms[name].arm, poses, _finger_opening(recording.effects, name, t))
+            for name, poses in links.items()
+        },
+        frames=list(_frame_tracks(recording, t, tool_poses, names)),
         tree=changes,
     )
     return animation, [*fewer_frames, *fewer_changes]
 
 
-def _sampled(stream: Stream, t: Array) -> Array:
+def _sample_configurations(stream: Stream, t: Array) -> Array:
     period = stream.t[1] - stream.t[0] if len(stream.t) > 1 else 1.0
     return np.asarray(stream.q[np.clip(np.round(t / period).astype(int), 0, len(stream.t) - 1)])
 
@@ -150,7 +157,7 @@ def _poses_in_world(arm: CellArm, q: Array) -> Array:
     return np.asarray(arm.base @ link_poses(arm.arm, q))
 
 
-def _grip(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
+def _finger_opening(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
     """Return the opening of the fingers at each instant, 0 to 1; they are closed at the start."""
     times, values = [0.0], [0.0]
     for effect in effects:
@@ -160,13 +167,15 @@ def _grip(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
     return np.interp(t, times, values)
 
 
-def _tracks(recording: Recording, t: Array, hands: dict[str, Array], names: Sequence[str]) -> Iterator[FrameTrack]:
+def _frame_tracks(
+    recording: Recording, t: Array, tool_poses: dict[str, Array], names: Sequence[str]
+) -> Iterator[FrameTrack]:
     poses = {name: np.tile(np.eye(4), (len(t), 1, 1)) for name in names}
     first: dict[str, int] = {}
     for _, rows, tree in _valid_trees(recording, t):
-        known: dict[str, Array] = {WORLD: np.eye(4), **{arm: hand[rows] for arm, hand in hands.items()}}
+        known: dict[str, Array] = {WORLD: np.eye(4), **{arm: X[rows] for arm, X in tool_poses.items()}}
         for name in names:
-            if _locate(name, tree, known):
+            if _add_world_pose(name, tree, known):
                 poses[name][rows] = known[name]
                 first.setdefault(name, rows.start)
     for name in names:
@@ -174,7 +183,7 @@ def _tracks(recording: Recording, t: Array, hands: dict[str, Array], names: Sequ
             yield FrameTrack(name=recording.code.spelled(name), poses=to_noap(poses[name]), visible_from=first[name])
 
 
-def _locate(name: str, tree: FrameTree, poses: dict[str, Array]) -> bool:
+def _add_world_pose(name: str, tree: FrameTree, poses: dict[str, Array]) -> bool:
     """Add the poses of a frame and of its ancestors; return whether they have values."""
     chain = []
     while name not in poses:
@@ -216,5 +225,5 @@ def _tree_changes(recording: Recording, t: Array) -> Iterator[TreeChange]:
         before = tree.nodes
 
 
-def _shown(name: str, cell: Cell) -> bool:
+def _is_displayed(name: str, cell: Cell) -> bool:
     return name != WORLD and name not in cell.arms and not any(name == base_name(arm) for arm in cell.arms)

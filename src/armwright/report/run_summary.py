@@ -13,7 +13,7 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, Excerpt, excerpt, omission_text, shorten_line, shorten_list
 from armwright.program.vm.interpreter import RunError
 from armwright.program.vm.recording import Effect, Recording, RunStage
-from armwright.report.files import ending, summary
+from armwright.report.run_files import ending_data, summary_data
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -52,15 +52,15 @@ class RunSummary:
 
     def as_data(self) -> dict[str, Any]:
         """Return the summary as plain data in SI units."""
-        return {**ending(self.recording), **summary(self.recording, self.diagnostics, self.hint)}
+        return {**ending_data(self.recording), **summary_data(self.recording, self.diagnostics, self.hint)}
 
     def tables(self) -> Iterator[ResultTable]:
         """Yield the trace and, of a run that finished, its stages."""
-        yield self._trace()
+        yield self._trace_table()
         if self.recording.failure is None:
-            yield self._stages()
+            yield self._stage_table()
 
-    def _trace(self) -> ResultTable:
+    def _trace_table(self) -> ResultTable:
         recording = self.recording
         several = len(recording.processes) > 1
 
@@ -74,7 +74,7 @@ class RunSummary:
         omitted = (*[""] * (len(heads) - 1), omission_text(effects.omitted, self.hint))
         return ResultTable(title="", heads=heads, rows=effects.map(row).join(omitted), numbers=(0, 1, 2))
 
-    def _stages(self) -> ResultTable:
+    def _stage_table(self) -> ResultTable:
         stages: Excerpt[RunStage | None] = excerpt(self.recording.stages, MAX_TERMINAL_LINES)
         rows: list[tuple[str, ...]] = []
         exceeded: list[tuple[int, int]] = []

@@ -14,14 +14,14 @@ _NUMBER = re.compile(r"-?\d+\.\d+")
 _HASHED = re.compile(r'\bid="([A-Za-z]\w*?)([0-9a-f]{10})"')
 
 
-def steady(text: str) -> str:
+def normalize_svg(text: str) -> str:
     """Return a drawing whose text does not depend on the last digits of its numbers, nor on its metadata.
 
     Args:
         text: text of an SVG file by Matplotlib.
     """
     text = _METADATA.sub("", text, count=1)
-    text = _COORDINATES.sub(lambda match: _NUMBER.sub(_rounded, match.group()), text)
+    text = _COORDINATES.sub(lambda match: _NUMBER.sub(_round_match, match.group()), text)
     names: dict[str, str] = {}
     for kind, code in _HASHED.findall(text):
         names.setdefault(kind + code, f"{kind}-{len(names) + 1}")
@@ -32,18 +32,18 @@ def steady(text: str) -> str:
 
 def alike(new: str, old: str) -> bool:
     """Whether two drawings are equal except for differently rounded coordinates."""
-    (words, numbers), (others, before) = _parted(new), _parted(old)
+    (words, numbers), (others, before) = _split_coordinates(new), _split_coordinates(old)
     if words != others or len(numbers) != len(before):
         return False
     return all(abs(a - b) <= _TOLERANCE for a, b in zip(numbers, before, strict=True))
 
 
-def _rounded(match: re.Match[str]) -> str:
+def _round_match(match: re.Match[str]) -> str:
     number = f"{round(float(match.group()), _DECIMALS) + 0.0:.{_DECIMALS}f}"
     return number.rstrip("0").rstrip(".")
 
 
-def _parted(text: str) -> tuple[str, list[float]]:
+def _split_coordinates(text: str) -> tuple[str, list[float]]:
     """Return a drawing without its coordinates, and the coordinates."""
     numbers: list[float] = []
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import attrs
 
 from armwright.files.result_table import ResultTable
-from armwright.report.figures import bars
+from armwright.report.figures import bar_chart
 from armwright.study.dh_calibration import NOISE, PRINTED_POINTS, ParameterRow, Row, parameter_table, verification_table
 
 
@@ -60,7 +60,7 @@ class DhCalibration:
             if row.points in ("none", "flat", "all three")
         }
         title = "Errors at the verification points: nominal arm, the thesis' fit, the complete model"
-        return {"verification.svg": bars(title, names, values, y_label="error, mm", logarithmic=True)}
+        return {"verification.svg": bar_chart(title, names, values, y_label="error, mm", logarithmic=True)}
 
 
 def _verification(row: Row, nominal: Row) -> Iterator[tuple[str, ...]]:

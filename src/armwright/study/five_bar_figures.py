@@ -10,7 +10,7 @@ from armwright.clearance.ideal import tip_position
 from armwright.clearance.paths import Path, PickAndPlace, named_path
 from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.simulation import Simulation, simulate
-from armwright.report.clearance_figures import lines_of_spectrum, paths, surface
+from armwright.report.clearance_figures import paths, spectrum_figure, surface
 from armwright.report.clearance_run_figures import clearance_run_figures
 from armwright.report.figures import curves
 from armwright.study import five_bar_clearance as study
@@ -66,7 +66,7 @@ def _curves() -> dict[str, str | bytes]:
     ):
         low = frequencies <= highest
         shown = {name: values[low] for name, values in spectra.items()}
-        files[f"figure{number}.svg"] = lines_of_spectrum(title, frequencies[low], shown, "mm")
+        files[f"figure{number}.svg"] = spectrum_figure(title, frequencies[low], shown, "mm")
     return files
 
 

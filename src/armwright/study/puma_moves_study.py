@@ -8,8 +8,8 @@ import attrs
 
 from armwright.arm.load import load_arm
 from armwright.files.result_table import ResultTable
-from armwright.report.move_figures import overview, panels, path_in_space
-from armwright.report.movie import films
+from armwright.report.move_figures import overview, panels, path_figure
+from armwright.report.movie import render_films
 from armwright.study import puma_moves
 
 
@@ -104,14 +104,14 @@ class PumaMoves:
         for number, kind in puma_moves.PATHS.items():
             X = puma_moves.poses_along(kind, t)
             title = f"Figure {number}: {_title(kind)}, path and approach vectors"
-            files[_name(number)] = path_in_space(title, X, positions)
+            files[_name(number)] = path_figure(title, X, positions)
         for number, kind in puma_moves.OVERVIEWS.items():
             X = puma_moves.poses_along(kind, t)
             three = [
                 puma_moves.figure_panels(curves)[0] for curves, (moved, _) in puma_moves.CURVES.items() if moved == kind
             ]
             files[_name(number)] = overview(f"Figure {number}: {_title(kind)}", t, three, X, positions)
-        move = films(load_arm("puma560-seed"), puma_moves.joint_trajectory(), puma_moves.study_poses())
+        move = render_films(load_arm("puma560-seed"), puma_moves.joint_trajectory(), puma_moves.study_poses())
         return {**files, **{name.replace("move", f"figure{puma_moves.FILM}"): film for name, film in move.items()}}
 
 

@@ -9,6 +9,7 @@ from armwright.arrays import Array
 from armwright.clearance.estimation import static_estimate
 from armwright.clearance.estimation.static_estimate import (
     Estimate,
+    closed_at_poses,
     estimate_at_rest,
     rest_matrix,
     rest_offsets,
@@ -48,7 +49,10 @@ def test_held_out(five_bar: Linkage, rng: np.random.Generator) -> None:
     offsets = rest_offsets(five_bar, STARTS, true)
 
     estimate = estimate_at_rest(five_bar, STARTS, offsets)
-    linear = offsets.reshape(100, -1) @ np.linalg.pinv(rest_matrix(five_bar, STARTS).reshape(-1, 3)).T
+    linear = (
+        offsets.reshape(100, -1)
+        @ np.linalg.pinv(rest_matrix(five_bar, closed_at_poses(five_bar, STARTS)).reshape(-1, 3)).T
+    )
 
     assert accuracy(estimate.values, true).min() > WITHOUT_NOISE
     np.testing.assert_allclose(estimate.values, true, rtol=1e-7)
@@ -99,7 +103,7 @@ def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) 
 )
 def test_singular_values(five_bar: Linkage, poses: Array, singular: tuple[float, ...]) -> None:
     """Three poses determine the worst combination of clearances with 0.42, one pose not at all, 24 poses with 1.32."""
-    result = np.linalg.svd(rest_matrix(five_bar, poses).reshape(-1, 3), compute_uv=False)
+    result = np.linalg.svd(rest_matrix(five_bar, closed_at_poses(five_bar, poses)).reshape(-1, 3), compute_uv=False)
 
     np.testing.assert_allclose(result, singular, rtol=0, atol=PRINTED)
 
@@ -119,7 +123,7 @@ def test_deviations_of_the_spec(five_bar: Linkage) -> None:
 
 def test_map_at_the_first_goal(five_bar: Linkage) -> None:
     """At (-180, -600) mm a millimetre in J4 shifts the tip by 0.872 mm to the left and 0.313 mm down."""
-    result = rest_matrix(five_bar, [(-0.18, -0.6)])[0]
+    result = rest_matrix(five_bar, closed_at_poses(five_bar, [(-0.18, -0.6)]))[0]
 
     # The spec's numbers are those of arm A, where the tip hangs half a millimetre lower.
     np.testing.assert_allclose(result, [[0.6545, 0.6187, -0.8721], [-0.8197, -0.7748, -0.3134]], rtol=0, atol=1e-3)
@@ -134,7 +138,9 @@ def test_map_is_the_derivative(five_bar: Linkage) -> None:
 
     columns = [(offset - own) / 1e-6 for offset in more]
     # At 10 µm of play what is not linear is a few parts in a hundred thousand.
-    np.testing.assert_allclose(np.stack(columns, axis=-1), rest_matrix(five_bar, STARTS), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(
+        np.stack(columns, axis=-1), rest_matrix(five_bar, closed_at_poses(five_bar, STARTS)), rtol=0, atol=1e-4
+    )
 
 
 def test_told_or_not(five_bar: Linkage) -> None:

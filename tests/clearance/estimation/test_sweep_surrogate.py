@@ -50,7 +50,7 @@ def test_chance_is_left_out_and_named(folder: Path, five_bar: Linkage) -> None:
 
 def test_nothing_but_chance(folder: Path, five_bar: Linkage) -> None:
     """Where all features that were measured are chance they determine nothing, and other paths are asked for."""
-    with pytest.raises(InvalidValueError, match="on y13 all features are chance: they vary more between"):
+    with pytest.raises(InvalidValueError, match="on y13 all features are random: they vary more between"):
         learn_from_sweep(folder, five_bar, ("y13",), STRAIGHT)
 
 

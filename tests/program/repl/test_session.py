@@ -14,7 +14,7 @@ from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.repl.frame_view import arm_lines, frame_table_lines, zyx_angles
 from armwright.program.repl.session import InputResult, Session
-from armwright.program.semantics.cell_symbols import Imported
+from armwright.program.semantics.cell_symbols import ImportedFrames
 from armwright.program.vm.interpreter import Limits, interpret
 from armwright.program.vm.machine import Machine
 from armwright.spatial.poses import homogeneous
@@ -600,10 +600,10 @@ def test_an_import_brings_arms() -> None:
     """A session that begins without a cell gets its arms from the first import that has some."""
     cell = cell_of("cell1")
 
-    def read(name: str) -> Imported:
+    def read(name: str) -> ImportedFrames:
         if name != "cell.json":
             raise FileFormatError(Path(name), None, "", "no such file")
-        return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
+        return ImportedFrames(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     talk = Session(None, read_import=read)
     assert arm_lines(talk) == ["no arms: begin with `--cell`, or with an IMPORT of a cell"]

@@ -1,1 +1,1 @@
-"""How much play a linkage has, told from the error of its tip: at rest, and on paths."""
+"""Estimation of the clearances of a linkage from the error of its tip: at rest, and on paths."""

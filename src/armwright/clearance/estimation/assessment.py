@@ -283,18 +283,18 @@ def _unknown_noise_note(estimate: Estimate) -> str:
 
 def _fit_notes(misfit: float, widening: float) -> Iterator[str]:
     """Give the notes on the fit of the model to the data."""
-    yield f"where the model holds, residuals are as large or larger in {100 * misfit:.3g} % of cases"
+    yield f"test of the residuals: p = {misfit:.3g}"
     if widening > 1:
         yield f"residuals are {widening:.3g} times the noise: deviations and intervals are widened by that factor"
 
 
 def _predictability_notes(sweep: SweepSurrogate) -> Iterator[str]:
-    """Give the notes on predictability, and on features that are chance."""
+    """Give the notes on predictability, and on features that are random."""
     if not sweep.predictable_until:
-        yield "the sweep has no replicates (--replicates 0): chance is estimated from the scatter of its runs"
+        yield "the sweep has no replicates (--replicates 0): random variation is estimated from the scatter of its runs"
         return
     until = ", ".join(f"{path} {t:.3g} s" for path, t in sweep.predictable_until.items())
-    yield f"predictable until, in half of the simulations: {until}; later chance counts as noise"
+    yield f"predictable until, in half of the simulations: {until}; later variation counts as noise"
     if sweep.random_features:
         yield (
             f"excluded, since they vary more between indistinguishable runs than over the clearances: "

@@ -2,7 +2,7 @@
 
 Source:
     Thesis, 4.5.3 (Kriging); spec of the clearance, 4.2 and 4.4. Anisotropic squared exponential, with a noise of its
-    own: the chance in impacts is noise to a smooth surface.
+    own: the random effect of impacts is noise to a smooth surface.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from armwright.extras import import_extra
 
 # Bounds of the length scales, as parts of the range of a parameter.
 _LENGTHS = (0.1, 30.0)
-# Bounds of the noise, as parts of the variance of a feature: rounding hides less than the smallest, and a feature that
-# is chance alone has the largest.
+# Bounds of the noise, as parts of the variance of a feature: rounding is below the smallest, and a feature that is
+# nothing but random has the largest.
 _NOISE = (1e-8, 1.0)
 _AMPLITUDE = (1e-2, 1e4)
 # The largest number of points of a surrogate; the time grows with their cube.
@@ -112,14 +112,14 @@ class Surrogate:
     def predict(self, points: ArrayLike) -> tuple[Array, Array]:
         """Return features (m, f) at points (m, k), and their standard deviations.
 
-        The deviation contains that of the surface and that of a single run by chance.
+        The deviation contains that of the surface and the random variation of a single run.
         """
         unit = (floats(points, "points") - self.lower) / (self.upper - self.lower)
         predictions = [process.predict(unit) for process in self.processes]
         mean, deviation = (np.stack(columns, axis=-1) for columns in zip(*predictions, strict=True))
-        return mean, np.asarray(np.hypot(deviation, self._chance(unit)), dtype=np.float64)
+        return mean, np.asarray(np.hypot(deviation, self._run_deviation(unit)), dtype=np.float64)
 
-    def _chance(self, unit: Array) -> Array | float:
+    def _run_deviation(self, unit: Array) -> Array | float:
         """Return the standard deviation of single runs about points (m, k): a mean over their neighbours."""
         if self.spreads is None:
             return 0.0
@@ -287,12 +287,12 @@ def _fit_process(unit: Array, y: Array) -> Process:
         # A length at its bound is a feature that hardly depends on a parameter.
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(unit, (y - mean) / scale)
-    smooth, chance = process.kernel_.k1, process.kernel_.k2
+    smooth, noise = process.kernel_.k1, process.kernel_.k2
     return Process(
         x=unit,
         lengths=np.array(smooth.k2.length_scale, dtype=np.float64),
         amplitude=float(smooth.k1.constant_value),
-        noise=float(chance.noise_level),
+        noise=float(noise.noise_level),
         weights=np.array(process.alpha_, dtype=np.float64),
         whitener=np.asarray(solve_triangular(process.L_, np.eye(len(unit)), lower=True), dtype=np.float64),
         mean=mean,

@@ -1,9 +1,9 @@
 """Whether data contradict a model, and how much that widens the intervals of its parameters.
 
 The residuals of a fit, in standard deviations, have a sum of squares that follows chi-square where the model and the
-noise are right. A sum so large that it hardly comes by chance means that no values of the parameters explain the data;
-fitted values then mean nothing, however narrow their intervals. Where it is larger than usual but may be chance,
-intervals grow with it.
+noise are right. A sum with a p-value below the significance level means that no values of the parameters explain the
+data; fitted values then mean nothing, however narrow their intervals. A larger sum than expected that is not
+significant widens the intervals.
 
 Source:
     Particle Data Group, Review of Particle Physics, "Introduction", scale factors of weighted means.
@@ -19,7 +19,7 @@ from scipy.stats import chi2, f
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import ContradictionError
 
-# Data contradict the model where chance alone yields such residuals in a smaller part of all cases.
+# Significance level: data contradict the model if the p-value of their residuals is smaller.
 CONTRADICTION = 1e-4
 _MAX_NAMED = 3
 
@@ -62,8 +62,8 @@ def refuse_contradiction(misfit: float, residuals: Iterable[tuple[str, float]], 
     listed = ", ".join(f"{name} by {deviations:+.3g}" for name, deviations in worst)
     ends = list(bounds)
     raise ContradictionError(
-        f"the data contradict the model: no clearances explain them, and none are reported (chance yields residuals as "
-        f"large in {100 * misfit:.2g} % of cases); largest residuals, in standard deviations: {listed}"
+        f"the data contradict the model: no clearances explain them, and none are reported (test of the residuals: p = "
+        f"{misfit:.2g}); largest residuals, in standard deviations: {listed}"
         + (f"; at a bound: {', '.join(ends)}" if ends else "")
         + "; check the payload, the lengths of the links, friction and control of the model, signs, order and units "
         "of the columns, and the noise"

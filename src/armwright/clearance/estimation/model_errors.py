@@ -19,7 +19,7 @@ from scipy.stats import chi2, f, ncf, ncx2
 
 from armwright.arrays import Array, ArrayLike
 from armwright.clearance.estimation.misfit import CONTRADICTION
-from armwright.clearance.estimation.static_estimate import Estimate, closed_at_poses, rest_matrix_at
+from armwright.clearance.estimation.static_estimate import Estimate, closed_at_poses, rest_matrix
 from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Body, Linkage, Load
 from armwright.clearance.settings import contact_stiffness
@@ -86,7 +86,7 @@ def model_errors(
     """
     q = closed_at_poses(linkage, poses)
     weights = np.sqrt(np.repeat(estimate.readings, 2))
-    B = weights[:, None] * rest_matrix_at(linkage, q).reshape(-1, len(estimate.names))
+    B = weights[:, None] * rest_matrix(linkage, q).reshape(-1, len(estimate.names))
     Q, _ = np.linalg.qr(B)
     noncentrality = _noncentrality(estimate.degrees_of_freedom, estimate.noise_freedom) if noise_is_known else np.inf
     least = np.sqrt(noncentrality) * estimate.noise

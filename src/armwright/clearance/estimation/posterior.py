@@ -1,7 +1,7 @@
 """The posterior distribution of clearances after a measurement.
 
 The likelihood compares all features together, with the noise of the measurement, the uncertainty of the surrogate, and
-the chance in impacts. An ensemble of walkers draws the samples.
+the random effect of impacts. An ensemble of walkers draws the samples.
 
 Source:
     Spec of the clearance, 4.4; Goodman & Weare (2010) for the walkers.

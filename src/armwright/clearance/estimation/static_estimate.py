@@ -120,24 +120,19 @@ class Estimate:
         return tuple(map(bool, (self.deviations < _IDENTIFIABLE * width) & ~self.at_bound))
 
 
-def rest_matrix(linkage: Linkage, poses: ArrayLike) -> Array:
+def rest_matrix(linkage: Linkage, q: Array) -> Array:
     """Return B: the derivative of the resting position of the tip with respect to the clearances.
 
     Args:
         linkage: with p pins.
-        poses: (k, 2) positions of its tip without clearance [m].
+        q: (k, n) coordinates with closed pins; see ``closed_at_poses``.
 
     Returns:
         (k, 2, p) shift by clearance.
 
     Raises:
-        InvalidValueError: a pose cannot be reached, or a pin carries no force there.
+        InvalidValueError: a pin carries no force there.
     """
-    return rest_matrix_at(linkage, closed_at_poses(linkage, poses))
-
-
-def rest_matrix_at(linkage: Linkage, q: Array) -> Array:
-    """Return B (k, 2, p) at closed coordinates (k, n); see ``rest_matrix``."""
     still = np.zeros((len(q), 2))
     reactions = ideal_motion(linkage, q, still, still, by_tip=True).reactions
     direction = reactions / force_magnitudes(linkage, reactions)[..., None]
@@ -192,7 +187,7 @@ def estimate_at_rest(
     names = tuple(linkage.clearances)
     weights = np.sqrt(np.repeat(counts, 2))
     q = closed_at_poses(linkage, positions)
-    B = rest_matrix_at(linkage, q).reshape(-1, len(names))
+    B = rest_matrix(linkage, q).reshape(-1, len(names))
     singular = np.linalg.svd(B, compute_uv=False)
     if len(singular) < len(names) or singular[-1] < 1e-6 * singular[0]:
         raise TooFewError(f"{len(positions)} poses do not determine {len(names)} clearances; take more, or others")

@@ -1,4 +1,4 @@
-"""Surrogates learnt from a sweep: of the features of error curves that are more than chance."""
+"""Surrogates learnt from a sweep: of the features of error curves that are not random."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class SweepSurrogate:
     """A surrogate learnt from a sweep.
 
     Attributes:
-        surrogate: of the features that are more than chance.
+        surrogate: of the features that are not random.
         random_features: names of the other features.
         predictable_until: by path, the time until which half of the runs are predictions [s]; empty for a sweep without
             replicates.
@@ -60,7 +60,7 @@ def learn_from_sweep(
 
     Raises:
         FileFormatError: the folder does not have the results of a sweep of clearances.
-        InvalidValueError: the sweep is of another linkage, a path is missing, or all features are chance.
+        InvalidValueError: the sweep is of another linkage, a path is missing, or all features are random.
     """
     sweep = _read_sweep(folder, linkage, paths, features)
     table, finished, replicates = sweep.table, sweep.finished, sweep.replicates
@@ -72,7 +72,7 @@ def learn_from_sweep(
     ]
     if not names:
         raise InvalidValueError(
-            f"{folder}: on {', '.join(paths)} all features are chance: they vary more between indistinguishable runs "
+            f"{folder}: on {', '.join(paths)} all features are random: they vary more between indistinguishable runs "
             f"than over the clearances of the sweep; measure and sweep other paths"
         )
     surrogate = fit_surrogate(

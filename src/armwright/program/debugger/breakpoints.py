@@ -96,25 +96,25 @@ class Watch:
 
     def check_change(self, view: Machine) -> str | None:
         """Return what has changed since the last check, in words; None where nothing has."""
-        now = _value(view, self.slot)
-        before, self.last_value = self.last_value, now
+        value = _value(view, self.slot)
+        last_value, self.last_value = self.last_value, value
         motion = _motion_id(view, self.slot)
         if self.reported_motion is not None:
             # The motion goes on, or has just come to its end.
             self.reported_motion = motion if motion == self.reported_motion else None
             return None
-        if _are_equal(before, now):
+        if _are_equal(last_value, value):
             return None
         self.reported_motion = motion
         self.changes += 1
         name = view.spelling(self.slot)
-        if isinstance(now, float | int):
-            return f"{name} = {now:g}" + ("" if before is None else f", was {before:g}")
-        if now is None:
+        if isinstance(value, float | int):
+            return f"{name} = {value:g}" + ("" if last_value is None else f", was {last_value:g}")
+        if value is None:
             return f"{name} has no value any more"
         if motion is not None:
             return f"{name} begins to move with {view.carrier(self.slot)}"
-        return f"{name} has moved" if before is not None else f"{name} has a value"
+        return f"{name} has moved" if last_value is not None else f"{name} has a value"
 
     def reset(self, view: Machine, *, reported: bool) -> None:
         """Take the present value as the last.

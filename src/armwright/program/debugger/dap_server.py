@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 
 from armwright.errors import ArmwrightError
 from armwright.files.inputs import regular_file
-from armwright.program.debugger import dap_breakpoints, dap_inspection
+from armwright.program.debugger import dap_requests
 from armwright.program.debugger.dap_messages import (
     Arguments,
     InvalidMessage,
@@ -138,7 +138,7 @@ class Adapter:
             return _INSPECTIONS[command](self._session, Arguments(arguments))
         if command in _STEPS:
             return self._step(command, Arguments(arguments))
-        own: Mapping[str, Callable[[Arguments], Mapping[str, Any] | None]] = {
+        handlers: Mapping[str, Callable[[Arguments], Mapping[str, Any] | None]] = {
             "initialize": self._initialize,
             "launch": self._launch,
             "configurationDone": self._configuration_done,
@@ -147,9 +147,9 @@ class Adapter:
             "terminate": self._terminate,
             "disconnect": self._disconnect,
         }
-        if command not in own:
+        if command not in handlers:
             raise RequestError(f"this debugger does not support the request `{command}`")
-        return own[command](Arguments(arguments))
+        return handlers[command](Arguments(arguments))
 
     def _initialize(self, arguments: Arguments) -> Mapping[str, Any]:
         self._session.first_line = int(arguments.get(bool, "linesStartAt1", default=True))
@@ -254,19 +254,19 @@ _STEPS: Mapping[str, Command] = {
     "reverseContinue": "reverse",
 }
 _INSPECTIONS: Mapping[str, Callable[[EditorSession, Arguments], dict[str, Any]]] = {
-    "setBreakpoints": dap_breakpoints.set_breakpoints,
-    "breakpointLocations": dap_breakpoints.breakpoint_locations,
-    "dataBreakpointInfo": dap_breakpoints.data_breakpoint_info,
-    "setDataBreakpoints": dap_breakpoints.set_data_breakpoints,
-    "setExceptionBreakpoints": dap_breakpoints.set_exception_breakpoints,
-    "threads": dap_inspection.threads,
-    "stackTrace": dap_inspection.stack_trace,
-    "scopes": dap_inspection.scopes,
-    "variables": dap_inspection.variables,
-    "evaluate": dap_inspection.evaluate,
-    "setVariable": dap_inspection.set_variable,
-    "setExpression": dap_inspection.set_expression,
-    "completions": dap_inspection.completions,
-    "exceptionInfo": dap_inspection.exception_info,
-    "source": dap_inspection.source,
+    "setBreakpoints": dap_requests.set_breakpoints,
+    "breakpointLocations": dap_requests.breakpoint_locations,
+    "dataBreakpointInfo": dap_requests.data_breakpoint_info,
+    "setDataBreakpoints": dap_requests.set_data_breakpoints,
+    "setExceptionBreakpoints": dap_requests.set_exception_breakpoints,
+    "threads": dap_requests.threads,
+    "stackTrace": dap_requests.stack_trace,
+    "scopes": dap_requests.scopes,
+    "variables": dap_requests.variables,
+    "evaluate": dap_requests.evaluate,
+    "setVariable": dap_requests.set_variable,
+    "setExpression": dap_requests.set_expression,
+    "completions": dap_requests.completions,
+    "exceptionInfo": dap_requests.exception_info,
+    "source": dap_requests.source,
 }

@@ -79,7 +79,7 @@ class EditorSession:
         has_begun: whether it has.
         has_ended: whether its end has been reported.
         breakpoints: the breakpoints that were requested, with their numbers.
-        data_breakpoints: what shall be watched: number, where it is kept, condition, count.
+        data_breakpoints: the data breakpoints that were requested, with their numbers.
         exception_filters: the errors to stop at, ``uncaught`` and ``caught``.
         frame_references: of the stacks that the editor has seen, process and level.
         variable_references: what the editor can open, with process and level.
@@ -97,7 +97,7 @@ class EditorSession:
         self.configured = self.has_begun = self.has_ended = False
         self.first_line = self.first_column = 1
         self.breakpoints: list[tuple[int, Arguments]] = []
-        self.data_breakpoints: list[tuple[int, str, str, str]] = []
+        self.data_breakpoints: list[tuple[int, Arguments]] = []
         self.breakpoint_ids: dict[int, int] = {}
         self.exception_filters = frozenset({"uncaught"})
         self.ids = itertools.count(1)
@@ -321,13 +321,16 @@ class EditorSession:
         self.debugger.execution.breakpoints.clear()
         for number, request in self.breakpoints:
             self.send("breakpoint", {"reason": "changed", "breakpoint": self.set_breakpoint(number, request)})
-        for data_breakpoint in self.data_breakpoints:
-            self.watch(*data_breakpoint)
+        for number, request in self.data_breakpoints:
+            self.set_data_breakpoint(number, request)
 
-    def watch(self, number: int, slot: str, condition: str, hits: str) -> dict[str, Any]:
+    def set_data_breakpoint(self, number: int, request: Arguments) -> dict[str, Any]:
         """Watch a frame or a variable; return what the editor has to know of it."""
+        condition, hits = (request.get(str, key, "").strip() for key in ("condition", "hitCondition"))
         try:
-            watch = self.launched_debugger.add_watch(slot, condition=condition.strip(), hit_condition=hits.strip())
+            watch = self.launched_debugger.add_watch(
+                request.get(str, "dataId"), condition=condition, hit_condition=hits
+            )
         except ArmwrightError as error:
             return {"id": number, "verified": False, "message": str(error)}
         self.breakpoint_ids[watch.number] = number

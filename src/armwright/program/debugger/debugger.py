@@ -298,7 +298,7 @@ class Debugger:
         slot = expressions.find_slot(view, frame, parsed)
         if slot is not None:
             return attrs.evolve(variables.make_variable(view, slot, name=text), expression=text)
-        kind = "" if parsed.type is None else parsed.type.word
+        kind = "" if parsed.type is None else parsed.type.value.split(" ", 1)[1]
         return variables.value_variable(view, text, expressions.evaluate(view, frame, parsed), kind)
 
     def assign(self, slot: str, text: str, path: ProcessPath = (), level: int = 0) -> Variable:

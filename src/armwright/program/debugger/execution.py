@@ -78,10 +78,10 @@ class Execution:
             passed: whether it is in front of a statement at which the run now stands.
             reported: numbers of the watches that have spoken of the motion of this moment.
         """
-        done, self.tick = position
+        step_count, self.tick = position
         self._silent = False
-        self.timeline.seek(done)
-        self._passed_step, self._error_step = done if passed else -1, -1
+        self.timeline.seek(step_count)
+        self._passed_step, self._error_step = step_count if passed else -1, -1
         self._start_watches(reported)
 
     def _start_watches(self, reported: frozenset[int]) -> None:
@@ -201,20 +201,22 @@ class Execution:
     def _execute_step(self, process: Process | None, step: Step | None) -> Stop | None:
         """Do one step of the program; return why the run stops with it."""
         timeline, machine = self.timeline, self.machine
-        done, effects = timeline.step_count, len(machine.state.effects)
+        step_count, effects = timeline.step_count, len(machine.state.effects)
         path = () if process is None else process.path
         try:
             timeline.advance()
         except RunError as error:
             stop = Stop(reason="exception", text=str(error), diagnostic=error.diagnostic)
-            if self._error_step == done or "uncaught" not in self.exception_filters:
+            if self._error_step == step_count or "uncaught" not in self.exception_filters:
                 self.tick = max(self.tick, machine.state.ticks)
                 return attrs.evolve(stop, reason="failed", path=path, recording=error.recording)
-            return self._stop_before_error(done, path, stop)
-        if "caught" in self.exception_filters and self._error_step != done:
+            return self._stop_before_error(step_count, path, stop)
+        if "caught" in self.exception_filters and self._error_step != step_count:
             caught = next((effect for effect in machine.state.effects[effects:] if effect.kind == "ERROR"), None)
             if caught is not None:
-                return self._stop_before_error(done, path, Stop(reason="exception", text=caught.text, caught=True))
+                return self._stop_before_error(
+                    step_count, path, Stop(reason="exception", text=caught.text, caught=True)
+                )
         self.tick = max(self.tick, machine.state.ticks)
         if machine.state.has_ended:
             return Stop(reason="end", path=path)
@@ -225,10 +227,10 @@ class Execution:
         assert step is not None  # noqa: S101 - it has ended
         return Stop(reason="step", path=step.path, text=reason)
 
-    def _stop_before_error(self, done: int, path: ProcessPath, stop: Stop) -> Stop:
+    def _stop_before_error(self, step_count: int, path: ProcessPath, stop: Stop) -> Stop:
         """Go back to in front of the step that went wrong, so that everything can be looked at as it was then."""
-        self.timeline.seek(done)
-        self._error_step = done
+        self.timeline.seek(step_count)
+        self._error_step = step_count
         if self.timeline.next_process is None:
             path = self.machine.state.blocked_processes[0].path
         return attrs.evolve(stop, path=path)
@@ -250,9 +252,9 @@ class Execution:
             numbers.append(watch.number)
         if not numbers:
             return None
-        present = find_process(self.machine, path) if path is not None else None
-        shown = self.next_process if present is None or path is None else path
-        return Stop(reason="data breakpoint", path=shown, text="; ".join(texts), breakpoint_numbers=tuple(numbers))
+        process = find_process(self.machine, path) if path is not None else None
+        shown_path = self.next_process if process is None or path is None else path
+        return Stop(reason="data breakpoint", path=shown_path, text="; ".join(texts), breakpoint_numbers=tuple(numbers))
 
     def _is_stopped_by(self, watch: Watch) -> bool:
         try:
@@ -264,25 +266,25 @@ class Execution:
 
     def step_back(self, path: ProcessPath) -> RunToStop:
         """Go back to the statement that a process began last, at the same level or further out."""
-        now = find_process(self.machine, path)
-        depth = 0 if now is None else len(now.stack)
+        current = find_process(self.machine, path)
+        depth = 0 if current is None else len(current.stack)
         limit = self.timeline.step_count
-        for done in self.timeline.snapshots_before(limit):
-            self.timeline.seek(done)
+        for step_count in self.timeline.snapshots_before(limit):
+            self.timeline.seek(step_count)
             nearest: tuple[RunPosition, ProcessPath] | None = None
             while self.timeline.step_count < limit:
                 yield
                 process = self.timeline.next_process
                 if process is not None and self.timeline.begins_statement(process):
-                    own = process.path == path and (len(process.stack) <= depth or now is None)
+                    is_own = process.path == path and (len(process.stack) <= depth or current is None)
                     # A branch comes out of the process that began it.
-                    if own or (len(process.path) < len(path) and path[: len(process.path)] == process.path):
+                    if is_own or (len(process.path) < len(path) and path[: len(process.path)] == process.path):
                         due = max(process.due_tick or 0, self.machine.state.ticks)
                         nearest = (self.timeline.step_count, due), process.path
                 self.timeline.advance()
             if nearest is not None:
                 return self._stop_at(nearest[0], Stop(reason="step", path=nearest[1]))
-            limit = done
+            limit = step_count
         return self._stop_at((0, 0), Stop(reason="start"))
 
     def step_back_tick(self, path: ProcessPath) -> RunToStop:
@@ -291,9 +293,9 @@ class Execution:
         if tick < 0:
             return self._stop_at((0, 0), Stop(reason="start"))
         limit = self.timeline.step_count
-        for done in self.timeline.snapshots_before(limit + 1):
-            self.timeline.seek(done)
-            if not done or self.machine.state.ticks < tick:
+        for step_count in self.timeline.snapshots_before(limit + 1):
+            self.timeline.seek(step_count)
+            if not step_count or self.machine.state.ticks < tick:
                 break
         while (
             self.timeline.step_count < limit
@@ -307,17 +309,17 @@ class Execution:
     def reverse_to_breakpoint(self) -> RunToStop:
         """Go back to the last moment at which a breakpoint stops the run, or else to the start."""
         limit = self.position
-        for done in self.timeline.snapshots_before(max(limit[0], 1)):
-            self.go_to((done, 0), passed=False)
+        for step_count in self.timeline.snapshots_before(max(limit[0], 1)):
+            self.go_to((step_count, 0), passed=False)
             self.tick, self._silent = self.machine.state.ticks, True
-            begun, nearest = self.position, None
+            start, nearest = self.position, None
             while self.position < limit:
                 stop = yield from self.run_forward(until=limit)
                 if self.position < limit:
                     nearest = self.position, stop
             if nearest is not None:
                 return self._stop_at(nearest[0], nearest[1], passed=nearest[1].reason != "data breakpoint")
-            limit = begun
+            limit = start
         return self._stop_at((0, 0), Stop(reason="start"))
 
     def _stop_at(self, position: RunPosition, stop: Stop, *, passed: bool = True) -> Stop:

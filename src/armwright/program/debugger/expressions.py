@@ -13,8 +13,8 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
 from armwright.program.semantics import type_check
-from armwright.program.semantics.expression_types import FITTING, OF_KIND, ExpressionType, is_what
-from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.expression_types import ACCEPTED_TYPES, TYPE_OF_KIND, ExpressionType, type_phrase
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression
@@ -46,10 +46,10 @@ class CheckedExpression:
 
 def visible_names(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
     """Return what can be named: frames of the cell, arms aside, names of the program, and of the procedure if any."""
-    inner = (name for name in machine.state.tree if not set(name) & set(".'["))
-    own = {} if procedure is None else machine.code.procedures[procedure].types
-    cell = {name: VariableType(VariableKind.FRAME) for name in inner if name not in machine.cell.arms}
-    return {**cell, **PREDECLARED, **machine.code.types, **own}
+    frames = (name for name in machine.state.tree if not set(name) & set(".'["))
+    local = {} if procedure is None else machine.code.procedures[procedure].types
+    cell = {name: VariableType(VariableKind.FRAME) for name in frames if name not in machine.cell.arms}
+    return {**cell, **PREDECLARED, **machine.code.types, **local}
 
 
 def parse_expression(text: str, machine: Machine, procedure: str | None) -> CheckedExpression:
@@ -77,10 +77,10 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
         raise ExpressionError(f"`{tokens.current.text}` does not belong here")
     if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
         return CheckedExpression(source=source, node=node, type=None)
-    names = Names(None)
+    names = NameResolver(None)
     names.symbols.types = dict(types)
     names.symbols.units = machine.code.units
-    sort = type_check.sort(names, node)
+    sort = type_check.infer_type(names, node)
     _raise_errors(names.diagnostics)
     if sort is None:
         raise ExpressionError(f"`{text}` has no value")
@@ -98,11 +98,11 @@ def evaluate(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> 
     Raises:
         ExpressionError: something in it has no value.
     """
-    here, asking, operand = _execute(machine, frame, parsed)
+    evaluator, process, operand = _execute(machine, frame, parsed)
     if parsed.type is ExpressionType.EVENT:
-        return float(here.state.events.get(here.resolve_name(asking, operand), 0))
+        return float(evaluator.state.events.get(evaluator.resolve_name(process, operand), 0))
     try:
-        return here.read(asking, operand, Instruction(op=Op.PRINT, span=parsed.node.span))
+        return evaluator.read(process, operand, Instruction(op=Op.PRINT, span=parsed.node.span))
     except RunError as error:
         raise ExpressionError(str(error)) from None
 
@@ -120,8 +120,8 @@ def find_slot(machine: Machine, frame: StackFrame, parsed: CheckedExpression) ->
         return frame.activation.bindings.get(node.key, node.key)
     if not isinstance(node, tree.Index):
         return None
-    here, asking, operand = _execute(machine, frame, parsed)
-    return here.resolve_name(asking, operand)
+    evaluator, process, operand = _execute(machine, frame, parsed)
+    return evaluator.resolve_name(process, operand)
 
 
 def evaluate_as(machine: Machine, frame: StackFrame, text: str, kind: VariableKind) -> Value:
@@ -131,9 +131,9 @@ def evaluate_as(machine: Machine, frame: StackFrame, text: str, kind: VariableKi
         ExpressionError: it makes no sense, has no value, or is of another kind.
     """
     parsed = parse_expression(text, machine, frame.procedure)
-    expected = OF_KIND[kind]
-    if parsed.type not in FITTING[expected]:
-        actual = "an array" if parsed.type is None else is_what(parsed.node, parsed.type)
+    expected = TYPE_OF_KIND[kind]
+    if parsed.type not in ACCEPTED_TYPES[expected]:
+        actual = "an array" if parsed.type is None else type_phrase(parsed.node, parsed.type)
         raise ExpressionError(f"expected {expected.value}, but `{text}` is {actual}")
     return evaluate(machine, frame, parsed)
 
@@ -162,18 +162,20 @@ def _execute(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> 
     emitter = Emitter(parsed.source, machine.code.units)
     operand = emitter.value(parsed.node)
     steps = tuple(emitter.instructions)
-    here, asking = copy.copy(machine), copy.copy(frame.process)
-    here.code = attrs.evolve(machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source)
-    here.constants = constant_values(emitter.constants)
-    asking.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
+    evaluator, process = copy.copy(machine), copy.copy(frame.process)
+    evaluator.code = attrs.evolve(
+        machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source
+    )
+    evaluator.constants = constant_values(emitter.constants)
+    process.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
     try:
-        evaluate_instructions(here, asking, steps)
+        evaluate_instructions(evaluator, process, steps)
     except RunError as error:
         raise ExpressionError(str(error)) from None
-    return here, asking, operand
+    return evaluator, process, operand
 
 
-def _raise_errors(actual: Sequence[Diagnostic]) -> None:
-    for diagnostic in actual:
+def _raise_errors(diagnostics: Sequence[Diagnostic]) -> None:
+    for diagnostic in diagnostics:
         if diagnostic.is_error:
             raise ExpressionError("; ".join((diagnostic.message, *diagnostic.helps[:1])))

@@ -78,9 +78,9 @@ class Timeline:
         """The process that does the next step; None where all wait for one another."""
         return ready_process(self.machine)
 
-    def snapshots_before(self, done: int) -> list[int]:
-        """Return the numbers of steps, fewer than ``done``, after which a moment was kept, the largest first."""
-        return [moment.step_count for moment in reversed(self._snapshots) if moment.step_count < done]
+    def snapshots_before(self, step_count: int) -> list[int]:
+        """Return the numbers of steps, fewer than ``step_count``, after which a moment was kept, the largest first."""
+        return [moment.step_count for moment in reversed(self._snapshots) if moment.step_count < step_count]
 
     def begins_statement(self, process: Process) -> bool:
         """Whether the next step of a process begins a statement, or another pass of a loop."""
@@ -121,11 +121,11 @@ class Timeline:
         self._reapply_changes()
         return process
 
-    def seek(self, done: int) -> None:
+    def seek(self, step_count: int) -> None:
         """Come to the moment after so many steps, which were done before without an error."""
-        if self._broken or not self._snapshots[-1].step_count <= self.step_count <= done:
-            self._restore(next(moment for moment in reversed(self._snapshots) if moment.step_count <= done))
-        while self.step_count < done:
+        if self._broken or not self._snapshots[-1].step_count <= self.step_count <= step_count:
+            self._restore(next(moment for moment in reversed(self._snapshots) if moment.step_count <= step_count))
+        while self.step_count < step_count:
             self.advance()
 
     def apply_change(self, change: Change) -> None:
@@ -141,10 +141,10 @@ class Timeline:
 
     def discard_later(self) -> None:
         """Forget changes that were made later than now, and moments that come after one of them."""
-        later = [index for index, _ in self._changes if index > self.step_count]
+        discarded = [index for index, _ in self._changes if index > self.step_count]
         self._changes = [change for change in self._changes if change[0] <= self.step_count]
-        if later:
-            self._snapshots = [moment for moment in self._snapshots if moment.step_count <= min(later)]
+        if discarded:
+            self._snapshots = [moment for moment in self._snapshots if moment.step_count <= min(discarded)]
 
     def _reapply_changes(self) -> None:
         for index, change in self._changes:
@@ -166,11 +166,11 @@ class Timeline:
             self._interval *= 2
 
     def _take_snapshot(self) -> _Snapshot:
-        began = time.perf_counter()
+        start = time.perf_counter()
         moment = _Snapshot(self.step_count, self.machine.copy(), self.marks.copy())
         self._last_snapshot_time = time.perf_counter()
         # One that the machine was busy with something else for says little of the next.
-        cost = self._last_snapshot_time - began
+        cost = self._last_snapshot_time - start
         self._cost = min(cost, 2 * self._cost) if self._cost else cost
         return moment
 

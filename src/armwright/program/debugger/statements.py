@@ -43,8 +43,8 @@ class Statements:
     def statement_at(self, index: int) -> StatementStart:
         """Return the statement that an instruction belongs to; behind the last one, the last."""
         index = min(index, len(self._code.instructions) - 1)
-        at = bisect_right(self._start_indices, index) - 1
-        start = self._by_index[self._start_indices[max(at, 0)]]
+        number = bisect_right(self._start_indices, index) - 1
+        start = self._by_index[self._start_indices[max(number, 0)]]
         step = self._code.instructions[index]
         if step.op in _TRAILING and not step.begins:
             return StatementStart(index=index, span=step.span, line=self._code.line(step))
@@ -52,8 +52,8 @@ class Statements:
 
     def procedure_at(self, index: int) -> str | None:
         """Return the procedure that an instruction stands in; None for the main program."""
-        at = bisect_right(self._procedures, index, key=lambda procedure: procedure[0]) - 1
-        return self._procedures[at][1] if at >= 0 else None
+        number = bisect_right(self._procedures, index, key=lambda procedure: procedure[0]) - 1
+        return self._procedures[number][1] if number >= 0 else None
 
     def find(self, line: int, column: int | None = None) -> StatementStart | None:
         """Return the statement at which a run can be stopped for a line.
@@ -86,8 +86,8 @@ class Statements:
         ends = [*self._start_indices[1:], len(instructions)]
         for first, end in zip(self._start_indices, ends, strict=True):
             group = instructions[first:end]
-            own = [group[0], *(step for step in group[1:] if step.op not in _TRAILING)]
-            index = min(step.span.start for step in own)
+            instructions_of_statement = [group[0], *(step for step in group[1:] if step.op not in _TRAILING)]
+            index = min(step.span.start for step in instructions_of_statement)
             # A condition or an action of a MOVE lies inside of its statement, and never begins before it.
-            span = Span(index, max(step.span.end for step in own if step.span.start == index))
+            span = Span(index, max(step.span.end for step in instructions_of_statement if step.span.start == index))
             yield StatementStart(index=first, span=span, line=source.line(index))

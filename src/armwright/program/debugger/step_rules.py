@@ -52,9 +52,9 @@ class Step:
 
     def ends_at(self, process: Process) -> bool:
         """Whether the step ends at the statement that a process is about to begin."""
-        own = process.path == self.path
+        is_own = process.path == self.path
         # A step into a COBEGIN ends in the first of its branches.
-        if not self.has_advanced or not (own or (self.kind == "in" and process.path[: len(self.path)] == self.path)):
+        if not self.has_advanced or not (is_own or (self.kind == "in" and process.path[: len(self.path)] == self.path)):
             return False
         match self.kind:
             case "next":

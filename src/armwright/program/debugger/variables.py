@@ -49,9 +49,9 @@ def scopes(machine: Machine, frame: StackFrame) -> list[Variable]:
         machine: as it is seen now.
         frame: the level.
     """
-    own = {} if frame.procedure is None else machine.code.procedures[frame.procedure].types
+    local_types = {} if frame.procedure is None else machine.code.procedures[frame.procedure].types
     # Of a branch in the program itself, or of a procedure that has no names, there is nothing own to be seen.
-    local = {key: frame.activation.bindings.get(key, key) for key in own if key in frame.activation.bindings}
+    local = {key: frame.activation.bindings.get(key, key) for key in local_types if key in frame.activation.bindings}
     values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not VariableKind.FRAME}
     parts: list[tuple[str, Callable[[], Sequence[Variable]]]] = [
         ("Locals", lambda: [make_variable(machine, slot, name=machine.spelling(key)) for key, slot in local.items()]),
@@ -60,8 +60,8 @@ def scopes(machine: Machine, frame: StackFrame) -> list[Variable]:
         ("Arms", lambda: [_arm_variable(machine, name) for name in machine.cell.arms]),
         ("Run", lambda: list(_run_variables(machine, frame.process))),
     ]
-    there = {"Locals": local, "Variables": values}
-    return [Variable(name=name, value="", children=inside) for name, inside in parts if there.get(name, True)]
+    contents = {"Locals": local, "Variables": values}
+    return [Variable(name=name, value="", children=inside) for name, inside in parts if contents.get(name, True)]
 
 
 def frame_names(machine: Machine) -> list[str]:
@@ -103,10 +103,10 @@ def value_variable(machine: Machine, name: str, value: Value, kind: str) -> Vari
 
 def frame_tree_lines(machine: Machine) -> list[str]:
     """Return the tree of frames, a line each, what hangs on something under it."""
-    _, *below = frames_with_depth(machine.state.tree, sorted)
+    _, *frames = frames_with_depth(machine.state.tree, sorted)
     return [
         WORLD,
-        *(f"{'  ' * depth}{machine.spelling(name)}  {_position_text(machine, name)}" for name, depth in below),
+        *(f"{'  ' * depth}{machine.spelling(name)}  {_position_text(machine, name)}" for name, depth in frames),
     ]
 
 
@@ -126,10 +126,10 @@ def _frame_contents(machine: Machine, slot: str) -> list[Variable]:
     lines = _pose_columns(machine, machine.state.tree.world(slot))
     parent = machine.state.tree.parent(slot)
     if parent is not None:
-        above = _parent_name(machine, parent)
+        parent_name = _parent_name(machine, parent)
         X = machine.state.tree.relation(slot, parent)
         inside = make_variable(machine, parent).children if parent != WORLD else None
-        entry = Variable(name="parent", value=above, type="FRAME", children=inside, expression=above)
+        entry = Variable(name="parent", value=parent_name, type="FRAME", children=inside, expression=parent_name)
         lines += [entry, value_variable(machine, "relation", X, "TRANS")]
         if machine.state.tree.nodes[slot].rigid:
             lines.append(Variable(name="rigid", value="true"))
@@ -210,9 +210,11 @@ def _arm_variable(machine: Machine, name: str) -> Variable:
     ]
     joints = [Variable(name=f"joint {number}", value=text) for number, text in enumerate(texts, 1)]
 
-    def inside() -> list[Variable]:
+    def children() -> list[Variable]:
         holds = machine.state.hands[name].held_frame
-        force = ", ".join(f"{component:.6g}" for component in machine.hardware.contact_force(name, machine.now).tolist())
+        force = ", ".join(
+            f"{component:.6g}" for component in machine.hardware.contact_force(name, machine.now).tolist()
+        )
         hand = value_variable(machine, "hand", machine.gripper_pose(name), "FRAME")
         return [
             *joints,
@@ -222,7 +224,7 @@ def _arm_variable(machine: Machine, name: str) -> Variable:
             Variable(name="force", value=f"({force}) N"),
         ]
 
-    return Variable(name=name, value=", ".join(texts), type=arm.name, children=inside)
+    return Variable(name=name, value=", ".join(texts), type=arm.name, children=children)
 
 
 def _motion_text(machine: Machine, arm: str) -> str:

@@ -20,7 +20,7 @@ from armwright.program.api import compile as translate, run
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
-from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadImport
+from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport
 from armwright.program.vm.interpreter import Limits, RunError, motion_warnings
 
 _CELLS = Path(__file__).parent / "pages" / "cells"
@@ -65,8 +65,8 @@ def _run_cell(text: str) -> Cell | None:
     if match is None:
         return None
     cell = read_cell(_CELLS / f"{match[1]}.toml")
-    if around := _AROUND.search(text):
-        cell = attrs.evolve(cell, around=_DETOUR_METHODS[around[1]])
+    if detour := _AROUND.search(text):
+        cell = attrs.evolve(cell, around=_DETOUR_METHODS[detour[1]])
     for effort, number in _EFFORT.findall(text):
         arms = {name: _limit_effort(arm, int(number) - 1, float(effort)) for name, arm in cell.arms.items()}
         cell = attrs.evolve(cell, arms=arms)
@@ -104,9 +104,9 @@ def _import_reader(text: str) -> ReadImport | None:
     """Return a reader of the files that a program is told of; any other file is missing."""
     files = {path: _frame_parents(names.split(", ")) for path, names in _IMPORT.findall(text)}
 
-    def read(path: str) -> Imported:
+    def read(path: str) -> ImportedFrames:
         if path not in files:
             raise FileFormatError(path, None, "", "there is no such file")
-        return Imported(frames=files[path])
+        return ImportedFrames(frames=files[path])
 
     return read if files else None

@@ -69,38 +69,38 @@ def apply_fixes(source: Source, compile_source: Compile, *, rounds: int = MAX_RO
         compile_source: how to find out what is wrong.
         rounds: how often to look again at most.
     """
-    now = compile_source(source)
+    current = compile_source(source)
     cures: list[AppliedFix] = []
-    vain: set[tuple[str, str]] = set()
+    rejected: set[tuple[str, str]] = set()
     for _ in range(rounds if "\0" not in source.text else 0):
         offered = [
             diagnostic
-            for diagnostic in now.diagnostics
-            if diagnostic.fixes and _message_key(diagnostic, now.source) not in vain
+            for diagnostic in current.diagnostics
+            if diagnostic.fixes and _message_key(diagnostic, current.source) not in rejected
         ]
         selected = select_disjoint(offered)
         if not selected:
             break
-        after = compile_source(_apply(now.source, selected))
-        if not _improves(selected, now, after):
-            selected, after = _select_improving(selected, now, compile_source)
-            vain |= {_message_key(one, now.source) for one in offered if one not in selected}
-        cures += [AppliedFix(now.source, one) for one in selected]
-        now = after
-    return FixResult(applied=tuple(cures), compilation=now)
+        after = compile_source(_apply(current.source, selected))
+        if not _improves(selected, current, after):
+            selected, after = _select_improving(selected, current, compile_source)
+            rejected |= {_message_key(one, current.source) for one in offered if one not in selected}
+        cures += [AppliedFix(current.source, one) for one in selected]
+        current = after
+    return FixResult(applied=tuple(cures), compilation=current)
 
 
 def select_disjoint(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Return those whose changes can be made at once: of two that touch, the first."""
-    diagnostics_: list[Diagnostic] = []
+    disjoint: list[Diagnostic] = []
     taken: list[tuple[int, int]] = []
     for diagnostic in sorted(diagnostics, key=lambda diagnostic: min(fix.span.start for fix in diagnostic.fixes)):
-        own = [(fix.span.start, fix.span.end) for fix in diagnostic.fixes]
-        if not any(_touches(span, taken) for span in own):
-            diagnostics_.append(diagnostic)
-            for span in own:
+        spans = [(fix.span.start, fix.span.end) for fix in diagnostic.fixes]
+        if not any(_touches(span, taken) for span in spans):
+            disjoint.append(diagnostic)
+            for span in spans:
                 insort(taken, span)
-    return diagnostics_
+    return disjoint
 
 
 def _touches(span: tuple[int, int], taken: Sequence[tuple[int, int]]) -> bool:
@@ -122,16 +122,16 @@ def _improves(selected: Sequence[Diagnostic], before: Compilation, after: Compil
     of two slips at one place that can be cured one is told at a time.
     """
     changes = _OffsetMap(selected)
-    again = {(one.code, one.message, index) for one in selected for index in changes.map_offset(one.span.start)}
+    repeated = {(one.code, one.message, index) for one in selected for index in changes.map_offset(one.span.start)}
     known = {
         (diagnostic.code, index)
         for diagnostic in before.diagnostics
         if diagnostic.is_syntax
         for index in changes.map_offset(diagnostic.span.start)
-    } - {(code, index) for code, _, index in again}
+    } - {(code, index) for code, _, index in repeated}
     for diagnostic in after.diagnostics:
         index = diagnostic.span.start
-        if (diagnostic.code, diagnostic.message, index) in again:
+        if (diagnostic.code, diagnostic.message, index) in repeated:
             return False
         if (
             diagnostic.is_syntax
@@ -166,20 +166,20 @@ def _select_improving(
 
     Few do not as a rule, so that changes are tried many at a time, and half of them where those are too many.
     """
-    diagnostics_: list[Diagnostic] = []
+    accepted: list[Diagnostic] = []
     after = before
-    waiting = [list(selected)]
+    groups = [list(selected)]
     for _ in range(_MAX_TRIALS):
-        if not waiting:
+        if not groups:
             break
-        several = waiting.pop()
-        tried = compile_source(_apply(before.source, [*diagnostics_, *several]))
-        if _improves([*diagnostics_, *several], before, tried):
-            diagnostics_, after = [*diagnostics_, *several], tried
-        elif len(several) > 1:
-            half = len(several) // 2
-            waiting += [several[half:], several[:half]]
-    return diagnostics_, after
+        group = groups.pop()
+        tried = compile_source(_apply(before.source, [*accepted, *group]))
+        if _improves([*accepted, *group], before, tried):
+            accepted, after = [*accepted, *group], tried
+        elif len(group) > 1:
+            half = len(group) // 2
+            groups += [group[half:], group[:half]]
+    return accepted, after
 
 
 def _message_key(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:

@@ -71,11 +71,11 @@ def find_page(code: str) -> Page:
     """
     known = codes()
     match = _CODE.fullmatch(code.strip().upper())
-    meant = [one for one in known if match and one[1:] == match[2] and match[1] in ("", one[0])]
-    if not meant:
-        alike = [one for one in known if one[:2] == code.strip().upper()[:2]]
-        raise UnknownNameError("code", code, alike or known)
-    return _read_page(meant[0])
+    matches = [one for one in known if match and one[1:] == match[2] and match[1] in ("", one[0])]
+    if not matches:
+        similar = [one for one in known if one[:2] == code.strip().upper()[:2]]
+        raise UnknownNameError("code", code, similar or known)
+    return _read_page(matches[0])
 
 
 @cache

@@ -50,8 +50,8 @@ def _page_rows(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Ro
         yield from _diagnostic_rows(diagnostic, source)
         yield [("", "")]
     if len(ordered) > MAX_SHOWN:
-        rest = f"{len(ordered) - MAX_SHOWN} more are not shown; one mistake may have caused many"
-        yield [("note", "bold"), (f": {rest}. `armwright check --format json` prints all", "")]
+        omitted = f"{len(ordered) - MAX_SHOWN} more are not shown; one mistake may have caused many"
+        yield [("note", "bold"), (f": {omitted}. `armwright check --format json` prints all", "")]
         yield [("", "")]
     yield [(summary_line(ordered, source), "bold" if ordered else "")]
 
@@ -62,22 +62,22 @@ def _diagnostic_rows(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
     numbers = sorted({source.line(label.span.start) for label in labels})
     width = max(_NARROWEST_GUTTER, len(str(numbers[-1])))
     yield [(f"{diagnostic.severity.value}[{diagnostic.code}]", loud), (f": {diagnostic.message}", "bold")]
-    place = f"{source.name}:{source.line(diagnostic.span.start)}:{source.column(diagnostic.span.start)}"
-    yield [(" " * width + "--> ", _GUTTER_STYLE), (place, "")]
+    location = f"{source.name}:{source.line(diagnostic.span.start)}:{source.column(diagnostic.span.start)}"
+    yield [(" " * width + "--> ", _GUTTER_STYLE), (location, "")]
     yield [(" " * width + " |", _GUTTER_STYLE)]
     before = numbers[0]
     for number in numbers:
         if number > before + 1:
             yield [("...", _GUTTER_STYLE)]
         before = number
-        here = [label for label in labels if source.line(label.span.start) == number]
+        line_labels = [label for label in labels if source.line(label.span.start) == number]
         line = source.line_text(number)
-        anchor = labels[0] if labels[0] in here else here[0]
+        anchor = labels[0] if labels[0] in line_labels else line_labels[0]
         first, last = _visible_range(len(line), source.column(anchor.span.start) - 1)
         before_it, behind_it = _ELLIPSIS if first else "", _ELLIPSIS if last < len(line) else ""
         shown = before_it + "".join(_visible_cells(line[first:last])) + behind_it
         yield [(f"{number:>{width}} | ", _GUTTER_STYLE), (shown, "")]
-        for label in sorted(here, key=lambda one: one.span.start):
+        for label in sorted(line_labels, key=lambda one: one.span.start):
             mark, style = ("^", loud) if label is labels[0] else ("-", _GUTTER_STYLE)
             yield [
                 (" " * width + " | " + " " * len(before_it), _GUTTER_STYLE),
@@ -96,7 +96,7 @@ def _visible_range(length: int, column: int) -> tuple[int, int]:
     return first, min(length, first + _MAX_LINE_LENGTH)
 
 
-def _marker_row(label: Label, mark: str, style: str, source: Source, shown: tuple[int, int]) -> Row:
+def _marker_row(label: Label, mark: str, style: str, source: Source, visible: tuple[int, int]) -> Row:
     """Return the blanks, the marks and the words under one place; a place of several lines is marked in its first.
 
     Args:
@@ -104,9 +104,9 @@ def _marker_row(label: Label, mark: str, style: str, source: Source, shown: tupl
         mark: what it is marked with.
         style: of marks and words.
         source: the program.
-        shown: the first character of the line that is shown, and the one behind the last.
+        visible: the first character of the line that is shown, and the one behind the last.
     """
-    begin, end = shown
+    begin, end = visible
     line = source.line_text(source.line(label.span.start))
     cells = _visible_cells(line[begin:end])
     column = source.column(label.span.start) - 1

@@ -10,8 +10,8 @@ from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, La
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import array_name, is_any_element
 from armwright.program.language.source import Source
-from armwright.program.semantics.expression_types import written
-from armwright.program.semantics.symbols import Scope, Symbols, bodies
+from armwright.program.semantics.expression_types import expression_text
+from armwright.program.semantics.symbols import Scope, Symbols, scoped_bodies
 from armwright.program.syntax import tree
 
 # Locations shown in one message.
@@ -27,7 +27,7 @@ def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagn
         source: its text.
     """
     findings = DiagnosticList()
-    events = _Events(bodies(program, symbols))
+    events = _Events(scoped_bodies(program, symbols))
     for _, fork in events.forks:
         _priorities(findings, fork, source)
     if not events.waits or events.may_halt:
@@ -97,16 +97,16 @@ class _Step:
 class _Events:
     """Where a program signals and waits for which events, and where it parts into branches."""
 
-    def __init__(self, bodies: Sequence[tuple[Scope, Sequence[tree.Statement]]]) -> None:
+    def __init__(self, scoped_bodies: Sequence[tuple[Scope, Sequence[tree.Statement]]]) -> None:
         self.forks: list[tuple[Scope, tree.Cobegin]] = []
         self.waits: dict[str, list[tuple[Scope, tree.Wait]]] = {}
         self.signals: dict[str, list[tree.Signal]] = {}
         # Events that are given to procedures, so that one cannot see who signals them.
         self.given: set[str] = set()
-        for scope, statements in bodies:
+        for scope, statements in scoped_bodies:
             for statement in every(statements):
                 self._take(scope, statement)
-        self.may_halt = bool(self.waits) and any(_may_halt_beside(*body) for body in bodies)
+        self.may_halt = bool(self.waits) and any(_may_halt_beside(*body) for body in scoped_bodies)
 
     def _take(self, scope: Scope, node: tree.Statement) -> None:
         if isinstance(node, tree.Cobegin):
@@ -199,11 +199,11 @@ def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
         ):
             continue
         reported.add(array_name(name))
-        text = written(node.event)
+        text = expression_text(node.event)
         message = f"nothing signals `{text}`, so this WAIT never ends"
         advice = f"write `SIGNAL {text}` in another branch"
         findings.report(
-            "E501", message, node.span, "waits for ever", secondary=scope.where_declared(key), advice=advice
+            "E501", message, node.span, "waits for ever", secondary=scope.declaration_labels(key), advice=advice
         )
 
 
@@ -263,7 +263,7 @@ def _run(branches: list[list[_Step]]) -> list[int]:
 def _too_few(findings: DiagnosticList, step: _Step, branches: list[list[_Step]]) -> None:
     nodes = [statement.node for several in branches for statement in several if statement.event == step.event]
     signals = [node.span for node in nodes if isinstance(node, tree.Signal)]
-    text = f"`{written(step.node.event)}` is waited for more often than it is signalled"
+    text = f"`{expression_text(step.node.event)}` is waited for more often than it is signalled"
     here = tuple(Label(span, "signalled here") for span in signals[:_MAX_LOCATIONS])
     note = f"{len(nodes) - len(signals)} WAITs, and {len(signals)} SIGNAL{'s' * (len(signals) > 1)}"
     findings.report("E501", text, step.node.span, "waits for ever", secondary=here, note=note)

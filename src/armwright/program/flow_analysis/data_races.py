@@ -10,7 +10,7 @@ from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, la
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import array_name, is_any_element
 from armwright.program.language.source import Span
-from armwright.program.semantics.symbols import Scope, Symbols, bodies
+from armwright.program.semantics.symbols import Scope, Symbols, scoped_bodies
 from armwright.program.syntax import tree
 
 # Branches beside one another of which one checks each, and pairs of writes, signals and waits that are compared.
@@ -107,7 +107,7 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
     Branches of which one waits, before its write, for what the other signals behind its own are no danger.
     """
     findings = DiagnosticList()
-    everywhere = bodies(program, symbols)
+    everywhere = scoped_bodies(program, symbols)
     for scope, statements in everywhere:
         forks = [branch for branch in every(statements) if isinstance(branch, tree.Cobegin)]
         inner = {id(branch) for fork in forks for branch in every(part.body for part in fork.branches)}

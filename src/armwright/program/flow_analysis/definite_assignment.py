@@ -5,7 +5,7 @@ from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any_element, is_arm
-from armwright.program.semantics.expression_types import written
+from armwright.program.semantics.expression_types import expression_text
 from armwright.program.syntax import tree
 
 
@@ -59,12 +59,14 @@ def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
     slot = state.bound(head.key)
     if slot is None or kind is None or scope.is_poisoned(head.key) or not state.settle(slot):
         return
-    secondary = scope.where_declared(head.key)
+    secondary = scope.declaration_labels(head.key)
     if kind is VariableKind.FRAME:
         _no_place(state, node, secondary, from_cell=slot == head.key and head is node)
         return
-    text = f"`{written(node)}` is used before it has a value"
-    advice = f"write `{written(node)} = {'100' if kind is VariableKind.SCALAR else '( twelve numbers )'} ;` before"
+    text = f"`{expression_text(node)}` is used before it has a value"
+    advice = (
+        f"write `{expression_text(node)} = {'100' if kind is VariableKind.SCALAR else '( twelve numbers )'} ;` before"
+    )
     state.report("E303", text, node.span, "no value here", secondary=secondary, advice=advice)
 
 
@@ -76,7 +78,7 @@ def _uncertain(state: FlowState, node: tree.Name | tree.Index, name: str, partin
     open_cell = state.cell is None and _kind(state, node) is VariableKind.FRAME
     if open_cell or not state.settle(name):
         return
-    text = f"`{written(node)}` may have no value here"
+    text = f"`{expression_text(node)}` may have no value here"
     state.report(
         "W207", text, node.span, "needs a value", secondary=(Label(parting.span, parting.says),), advice=parting.help
     )
@@ -90,5 +92,5 @@ def _no_place(state: FlowState, node: tree.Name | tree.Index, secondary: tuple[L
     elif state.table.is_empty:
         note = "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
         secondary = ()
-    text = f"frame `{written(node)}` is used before it has a value"
+    text = f"frame `{expression_text(node)}` is used before it has a value"
     state.report(code, text, node.span, "no value here", secondary=secondary, note=note)

@@ -10,7 +10,7 @@ from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.names import is_arm
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import WORLD
-from armwright.program.semantics.expression_types import written
+from armwright.program.semantics.expression_types import expression_text
 from armwright.program.syntax import tree
 
 # ---- the gripper
@@ -87,8 +87,8 @@ def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
         visions = state.cell.visions if state.cell else None
         own = "'" in frame or "[" in frame
         if visions is not None and not own and frame not in visions and state.settle(frame):
-            near = closest(written(target), visions)
-            text = f"the camera of the cell has no answer for `{written(target)}`"
+            near = closest(expression_text(target), visions)
+            text = f"the camera of the cell has no answer for `{expression_text(target)}`"
             state.report("W601", text, target.span, "will not be found", advice=did_you_mean(near))
         set_pose(state, frame, target, node.span)
 

@@ -9,7 +9,7 @@ from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import WORLD
-from armwright.program.semantics.expression_types import written
+from armwright.program.semantics.expression_types import expression_text
 from armwright.program.syntax import tree
 
 
@@ -42,7 +42,7 @@ def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) ->
         return
     leader = frame if is_any_element(frame) else state.table.leader(frame)
     if leader is not None and leader != frame and (is_arm(leader) or leader == WORLD):
-        name, here = written(node), state.table.affixed(frame, "rigidly attached here")
+        name, here = expression_text(node), state.table.affixed(frame, "rigidly attached here")
         text = f"`{name}` is rigidly attached to {state.name(leader)}, which an assignment cannot move"
         advice = f"remove RIGIDLY, or write `UNFIX {name}` before this"
         state.report("E310", text, node.span, "cannot be assigned a pose", secondary=here, advice=advice)
@@ -163,7 +163,7 @@ def unfix(state: FlowState, node: tree.Unfix) -> None:
 def _not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
     assert node.parent is not None  # noqa: S101 - it has a name in the frame table
     link, name = state.table.links[child], state.name(child)
-    text = f"`{name}` is not affixed to `{written(node.parent)}`"
+    text = f"`{name}` is not affixed to `{expression_text(node.parent)}`"
     if link is None or link.parent is None:
         state.report("E306", text, node.parent.span, f"{name} has no parent", advice="remove this UNFIX")
         return

@@ -10,7 +10,7 @@ from armwright.program.language.diagnostic import Label, Severity, labels
 from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED
 from armwright.program.semantics.cell_symbols import WORLD
-from armwright.program.semantics.expression_types import written
+from armwright.program.semantics.expression_types import expression_text
 from armwright.program.semantics.move import SPEED_NOTE
 from armwright.program.syntax import tree
 
@@ -165,7 +165,7 @@ def _not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
 
 
 def _relative(state: FlowState, node: tree.Move, arm: str) -> None:
-    text = f"the goal `{written(node.goal)}` is attached to {arm} and moves with it"
+    text = f"the goal `{expression_text(node.goal)}` is attached to {arm} and moves with it"
     note = "the pose of the goal at the start of the motion is used, so the motion is relative to the tool"
     state.report("L302", text, node.goal.span, f"is attached to {arm}", note=note)
 

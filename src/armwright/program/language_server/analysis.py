@@ -1,6 +1,6 @@
 """All that is known of one version of a program, worked out once; and what stands around a position in a text."""
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +17,7 @@ from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.symbol_index import Occurrence, ScopeExtents, occurrences, scope_extents
-from armwright.program.semantics.cell_symbols import Imported
+from armwright.program.semantics.cell_symbols import ImportedFrames
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
@@ -97,8 +97,15 @@ class Analysis:
 
     def occurrence_at(self, offset: int) -> Occurrence | None:
         """Return the name at a position, or right in front of it."""
-        index = bisect_right(self.occurrences, offset, key=lambda occurrence: occurrence.start) - 1
-        return self.occurrences[index] if index >= 0 and self.occurrences[index].end >= offset else None
+        tokens = self.compiled.tokens
+        first = last = bisect_left(tokens, offset, key=lambda token: token.start)
+        # What a name is depends on its own statement alone, and so hover need not wait for the other names.
+        while first and (first == last or tokens[first].key != ";"):
+            first -= 1
+        while last < len(tokens) and tokens[last].key != ";":
+            last += 1
+        names = occurrences(tokens[first:last], self.scopes)
+        return next((name for name in reversed(names) if name.start <= offset <= name.end), None)
 
     def token_at(self, offset: int) -> Token | None:
         """Return the token that holds a position."""
@@ -141,7 +148,7 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: CellCac
         problem = str(error)
     imports: list[Path] = []
 
-    def read_import(path: str) -> Imported:
+    def read_import(path: str) -> ImportedFrames:
         assert folder is not None  # noqa: S101 - imports are read only with a folder
         imported = cells.read_import(folder, path)
         imports.append(folder / path)
@@ -195,11 +202,11 @@ def lexical_context(text: str, offset: int, std: Standard) -> LexicalContext | N
     if any(comment.start < offset < comment.end + text.startswith("//", comment.start) for comment in scanned.comments):
         return None
     front = tuple(token for token in scanned.tokens if token.end <= word.start and token.kind is not TokenKind.END)
-    behind = scanned.tokens[len(front) :]
-    if behind[0].kind is TokenKind.STRING and behind[0].start < offset:
+    following = scanned.tokens[len(front) :]
+    if following[0].kind is TokenKind.STRING and following[0].start < offset:
         return None
     opened = any(diagnostic.code == "E102" and diagnostic.span.end <= offset for diagnostic in scanned.diagnostics)
-    return None if opened else LexicalContext(preceding=front, word=word, following=behind)
+    return None if opened else LexicalContext(preceding=front, word=word, following=following)
 
 
 def _word_start(text: str, start: int, end: int) -> int:

@@ -11,7 +11,7 @@ from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.document import Document
 from armwright.files.inputs import regular_file
-from armwright.program.semantics.cell_symbols import Imported
+from armwright.program.semantics.cell_symbols import ImportedFrames
 
 _IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)
 _ARM = re.compile(r"ARM[-_]0*([0-9]+)", re.IGNORECASE)
@@ -57,14 +57,14 @@ class CellCache:
             raise known[1]
         return known[1]
 
-    def read_import(self, folder: Path, name: str) -> Imported:
+    def read_import(self, folder: Path, name: str) -> ImportedFrames:
         """Return what the IMPORT of a file brings.
 
         Raises:
             FileFormatError: it cannot be read.
         """
         cell = self.read(folder / name).cell
-        return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
+        return ImportedFrames(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     def find_cell(self, folder: Path | None, text: str, setting: Path | None) -> CellFile | None:
         """Return the cell that a program acts on; None where there is none.

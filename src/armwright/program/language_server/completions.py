@@ -142,19 +142,19 @@ def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippe
 
 def _completion_items(codec: PositionCodec, analysis: Analysis, offset: int, *, snippets: bool) -> list[CompletionItem]:
     text, compiled = codec.text, analysis.compiled
-    around = lexical_context(text, offset, compiled.standard)
-    if around is None:
+    context = lexical_context(text, offset, compiled.standard)
+    if context is None:
         return []
-    end = Token(TokenKind.END, "", "", around.word.start, around.word.start)
+    end = Token(TokenKind.END, "", "", context.word.start, context.word.start)
     source = Source(compiled.source.name, text)
-    expectation = expected_tokens(source, (*around.preceding, end), compiled.standard, declared=compiled.symbols.types)
+    expectation = expected_tokens(source, (*context.preceding, end), compiled.standard, declared=compiled.symbols.types)
     procedure = (
         expectation.enclosing_procedure if expectation.enclosing_procedure in compiled.symbols.procedures else None
     )
     scope = compiled.symbols.scope(procedure)
-    maker = _ItemFactory(analysis, span_range(codec, around.word), scope, snippets=snippets)
-    operand = _NO_OPERAND if expectation.operand is None else _operand_rule(expectation, around.preceding, scope)
-    words = (*operand.words, *_allowed_words(expectation, around, compiled.standard))
+    maker = _ItemFactory(analysis, span_range(codec, context.word), scope, snippets=snippets)
+    operand = _NO_OPERAND if expectation.operand is None else _operand_rule(expectation, context.preceding, scope)
+    words = (*operand.words, *_allowed_words(expectation, context, compiled.standard))
     if not expectation.starts_statement:
         operands = [*maker.arms(operand), *maker.names(operand.kinds), *maker.devices(operand)]
         return [*operands, *maker.functions(operand), *maker.words(words)]
@@ -196,17 +196,17 @@ def _argument_rule(name: Token, number: int, symbols: Symbols) -> _OperandRule:
     return _ANY_VALUE if kind is None else _RULES_BY_KIND[kind.kind]
 
 
-def _allowed_words(operand: ExpectedTokens, around: LexicalContext, std: Standard) -> Iterator[str]:
+def _allowed_words(operand: ExpectedTokens, context: LexicalContext, std: Standard) -> Iterator[str]:
     """Give the words that may stand at a place; of clauses those that go with the others of their MOVE."""
     vocabulary = VOCABULARIES[std]
     clauses = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *VOCABULARIES[Standard.RLO_2].with_clauses))
     written = operand.present_clauses | {
-        token.key for token in takewhile(lambda token: not _ends_clause(token), around.following)
+        token.key for token in takewhile(lambda token: not _ends_clause(token), context.following)
     }
     # What ends a stretch of statements is not offered behind each of them, unless it is being written.
     unasked = (
         frozenset()
-        if operand.starts_statement or around.word.start < around.word.end
+        if operand.starts_statement or context.word.start < context.word.end
         else frozenset(BLOCK_CLOSERS | {"RECOVER"})
     )
     without_via = "VIA" not in written
@@ -271,19 +271,19 @@ class _ItemFactory:
     def names(self, kinds: frozenset[VariableKind], *, starts: bool = False) -> Iterator[CompletionItem]:
         """Give the variables that can be seen and are of the right kind."""
         symbols, local = self._scope.symbols, self._scope.procedure
-        own = {} if local is None else local.types
-        others = [(key, kind) for key, kind in symbols.types.items() if key not in own]
+        local_types = {} if local is None else local.types
+        global_types = [(key, kind) for key, kind in symbols.types.items() if key not in local_types]
         # What the program declares comes before what there is without it.
-        others.sort(key=lambda item: item[0] not in symbols.declared)
-        for key, kind in (*own.items(), *others):
+        global_types.sort(key=lambda item: item[0] not in symbols.declared)
+        for key, kind in (*local_types.items(), *global_types):
             if kind is None or kind.kind not in kinds or (starts and key == WORLD):
                 continue
             declared = self._scope.declared(key)
             name = declared.text if declared else self._match_case(key)
-            where = "" if declared else "predeclared" if key in PREDECLARED else "imported"
-            where = f"of {local.node.name.text}" if local is not None and key in own else where
+            origin = "" if declared else "predeclared" if key in PREDECLARED else "imported"
+            origin = f"of {local.node.name.text}" if local is not None and key in local_types else origin
             text = f"{name}[${{1:1}}]" if kind.sizes else name
-            item, detail = _KINDS.get(kind.kind, Kind.Variable), f"{kind} {where}".rstrip()
+            item, detail = _KINDS.get(kind.kind, Kind.Variable), f"{kind} {origin}".rstrip()
             yield self._item(name, item, text, detail, self._parent(key, kind))
 
     def _parent(self, key: str, kind: VariableType) -> str:

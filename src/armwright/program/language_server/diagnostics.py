@@ -16,8 +16,8 @@ def lsp_diagnostics(analysis: Analysis, uri: str, *, related: bool) -> list[lsp.
         uri: of its document.
         related: whether the editor shows other locations beside the first.
     """
-    found = analysis.complete.diagnostics
-    return [_diagnostic(diagnostic, analysis.codec, uri, related=related) for diagnostic in found]
+    diagnostics = analysis.complete.diagnostics
+    return [_diagnostic(diagnostic, analysis.codec, uri, related=related) for diagnostic in diagnostics]
 
 
 def _diagnostic(diagnostic: Diagnostic, codec: PositionCodec, uri: str, *, related: bool) -> lsp.Diagnostic:

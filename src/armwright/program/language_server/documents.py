@@ -66,10 +66,10 @@ class Document:
     def change(self, changes: Sequence[lsp.TextDocumentContentChangeEvent], version: int | None) -> None:
         """Make changes, one after the other; a change that names no range brings the whole text anew."""
         for change in changes:
-            text, gone = self.text, Span(0, len(self.text))
+            text, replaced = self.text, Span(0, len(self.text))
             if isinstance(change, lsp.TextDocumentContentChangePartial):
-                gone = span_of(self.codec, change.range)
-            self.codec = PositionCodec(text[: gone.start] + change.text + text[gone.end :], self.codec.encoding)
+                replaced = span_of(self.codec, change.range)
+            self.codec = PositionCodec(text[: replaced.start] + change.text + text[replaced.end :], self.codec.encoding)
         self.version = version
         self.invalidate()
 

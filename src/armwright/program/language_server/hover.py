@@ -80,8 +80,10 @@ def _type_text(written: tree.TypeName) -> str:
 
 def _statement_word(analysis: Analysis, token: Token) -> str:
     """Return the word that starts the statement that a token stands in."""
-    own = takewhile(lambda before: before.key != ";", analysis.tokens_before(token.start))
-    starts = (before.key for before in own if before.key in _STATEMENT_STARTS and before.kind is TokenKind.KEYWORD)
+    statement = takewhile(lambda before: before.key != ";", analysis.tokens_before(token.start))
+    starts = (
+        before.key for before in statement if before.key in _STATEMENT_STARTS and before.kind is TokenKind.KEYWORD
+    )
     return next(starts, "")
 
 
@@ -105,7 +107,7 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
         case NameKind.AXIS:
             entry = key, [f"the {key.lower()} axis"]
         case NameKind.FUNCTION | NameKind.SENSOR if (word := word_doc(key)) is not None:
-            value = f" : {FUNCTIONS[key].gives.name}" if occurrence.kind is NameKind.FUNCTION else ""
+            value = f" : {FUNCTIONS[key].result.name}" if occurrence.kind is NameKind.FUNCTION else ""
             entry = word.syntax + value, [word.text]
     return entry
 
@@ -128,8 +130,8 @@ def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) ->
         if occurrence.owner is None:
             lines.append(f"declared in line {line}")
         else:
-            what = "parameter" if occurrence.key in symbols.procedures[occurrence.owner].parameters else "variable"
-            lines.append(f"{what} of `{symbols.procedures[occurrence.owner].node.name.text}`, declared in line {line}")
+            role = "parameter" if occurrence.key in symbols.procedures[occurrence.owner].parameters else "variable"
+            lines.append(f"{role} of `{symbols.procedures[occurrence.owner].node.name.text}`, declared in line {line}")
     elif occurrence.key in symbols.imported:
         lines.append("imported")
     elif occurrence.key in PREDECLARED:
@@ -200,5 +202,7 @@ def _describe_number(token: Token, units: UnitSystem) -> _Description | None:
     if unit not in UNITS or token.damaged:
         return None
     value = convert(float(token.key), unit, units)
-    own = {"length": units.length.lower(), "angle": units.angle.lower(), "time": "s", "force": "N"}[dimension(unit)]
-    return f"{token.text} = {value:.12g} {own}", [f"a {dimension(unit)} in the unit of the program"]
+    unit_name = {"length": units.length.lower(), "angle": units.angle.lower(), "time": "s", "force": "N"}[
+        dimension(unit)
+    ]
+    return f"{token.text} = {value:.12g} {unit_name}", [f"a {dimension(unit)} in the unit of the program"]

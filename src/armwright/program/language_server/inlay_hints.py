@@ -22,10 +22,10 @@ def inlay_hints(analysis: Analysis, within: lsp.Range) -> list[lsp.InlayHint]:
     statements = analysis.hinted_statements
     start, end = offset_of(analysis.codec, within.start), offset_of(analysis.codec, within.end)
     first = bisect_left(statements, start - _MAX_STATEMENT_LENGTH, key=lambda statement: statement.span.start)
-    near = takewhile(lambda statement: statement.span.start <= end, statements[first:])
-    found = [hint for statement in near for hint in _statement_hints(analysis, statement)]
-    own = (hint for hint in found if within.start <= hint.position <= within.end)
-    return sorted(own, key=lambda hint: (hint.position.line, hint.position.character))
+    candidates = takewhile(lambda statement: statement.span.start <= end, statements[first:])
+    hints = [hint for statement in candidates for hint in _statement_hints(analysis, statement)]
+    within_range = (hint for hint in hints if within.start <= hint.position <= within.end)
+    return sorted(within_range, key=lambda hint: (hint.position.line, hint.position.character))
 
 
 def _statement_hints(analysis: Analysis, statement: tree.Move | tree.Call | tree.Grasp) -> Iterator[lsp.InlayHint]:

@@ -168,7 +168,7 @@ def word_doc(word: str, statement: str = "") -> WordDoc | None:
         word: in upper case.
         statement: the word that starts the statement it stands in.
     """
-    here = _STATEMENT_WORDS.get((statement, word))
-    if here is None and word in ("TO", "ON"):
-        here = _STATEMENT_WORDS["MOVE", word]
-    return here or WORDS.get(word)
+    doc = _STATEMENT_WORDS.get((statement, word))
+    if doc is None and word in ("TO", "ON"):
+        doc = _STATEMENT_WORDS["MOVE", word]
+    return doc or WORDS.get(word)

@@ -25,20 +25,20 @@ def document_symbols(analysis: Analysis) -> list[DocumentSymbol]:
         if isinstance(header, tree.Declaration):
             declared += _variable_symbols(codec, header, symbols.types)
         elif isinstance(header, tree.Procedure):
-            own = symbols.procedures.get(header.name.key)
-            types = {} if own is None else own.types
+            procedure = symbols.procedures.get(header.name.key)
+            types = {} if procedure is None else procedure.types
             children = [
                 symbol
                 for part in header.parameters
                 for symbol in _variable_symbols(codec, part, types, parameters=True)
             ]
             children += [symbol for part in header.declarations for symbol in _variable_symbols(codec, part, types)]
-            whole, name = span_range(codec, header.span), span_range(codec, header.name.span)
+            symbol_range, name = span_range(codec, header.span), span_range(codec, header.name.span)
             # A name that is missing may stand anywhere.
-            name = name if whole.start <= name.start and name.end <= whole.end else whole
+            name = name if symbol_range.start <= name.start and name.end <= symbol_range.end else symbol_range
             _, opening, parameters = signature(header)[0].partition("(")
             detail = opening + parameters or None
-            symbol = DocumentSymbol(header.name.text or "?", SymbolKind.Function, whole, name, detail)
+            symbol = DocumentSymbol(header.name.text or "?", SymbolKind.Function, symbol_range, name, detail)
             symbol.children = children or None
             declared.append(symbol)
     return sorted(declared, key=lambda symbol: (symbol.range.start.line, symbol.range.start.character))
@@ -56,8 +56,8 @@ def _variable_symbols(
         if type_ is not None and not parameters:
             kind = SymbolKind.Array if type_.sizes else _KINDS.get(type_.kind, kind)
         detail = declaration.type.text if type_ is None else str(type_)
-        where = span_range(codec, name.span)
-        yield DocumentSymbol(name.text or "?", kind, where, where, detail or None)
+        name_range = span_range(codec, name.span)
+        yield DocumentSymbol(name.text or "?", kind, name_range, name_range, detail or None)
 
 
 # ---- folding -------------------------------------------------------------------------------------------------------

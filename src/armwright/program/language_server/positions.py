@@ -19,9 +19,9 @@ def position(codec: PositionCodec, offset: int) -> lsp.Position:
     return lsp.Position(*codec.line_and_column(offset))
 
 
-def offset_of(codec: PositionCodec, where: lsp.Position) -> int:
+def offset_of(codec: PositionCodec, position: lsp.Position) -> int:
     """Return the offset of a position."""
-    return codec.offset(where.line, where.character)
+    return codec.offset(position.line, position.character)
 
 
 def span_of(codec: PositionCodec, range_: lsp.Range) -> Span:

@@ -31,8 +31,8 @@ def renameable_occurrence(analysis: Analysis, offset: int) -> Occurrence:
     occurrence = analysis.occurrence_at(offset)
     if occurrence is None:
         token = analysis.token_at(offset)
-        what = f"`{token.text}` is no name" if token is not None else "here is no name"
-        raise InvalidValueError(f"{what}; only variables and procedures can be renamed")
+        subject = f"`{token.text}` is no name" if token is not None else "here is no name"
+        raise InvalidValueError(f"{subject}; only variables and procedures can be renamed")
     text = analysis.text[occurrence.start : occurrence.end]
     if occurrence.kind in _NOT_RENAMEABLE:
         raise InvalidValueError(f"`{text}` is {_NOT_RENAMEABLE[occurrence.kind]}, and cannot be renamed")
@@ -88,8 +88,8 @@ def _require_valid_name(analysis: Analysis, new: str) -> None:
     if _ARM.fullmatch(new):
         raise InvalidValueError(f"'{new}' is the name of an arm")
     if new.upper() in words.reserved:
-        later = " of RLO-2" if is_reserved_in_rlo_2_only(new.upper()) else ""
-        raise InvalidValueError(f"'{new}' is a reserved word{later}")
+        standard = " of RLO-2" if is_reserved_in_rlo_2_only(new.upper()) else ""
+        raise InvalidValueError(f"'{new}' is a reserved word{standard}")
 
 
 def _require_unused(analysis: Analysis, occurrence: Occurrence, new: str) -> None:

@@ -54,12 +54,12 @@ def _add_tokens(lines: list[list[SemanticToken]], codec: PositionCodec, analysis
     names = iter((*analysis.occurrences, None))
     name = next(names)
     for token in analysis.compiled.tokens:
-        what = _token_style(token)
+        style = _token_style(token)
         if name is not None and name.start == token.start:
-            what, name = _name_style(name, analysis), next(names)
-        if what is not None:
+            style, name = _name_style(name, analysis), next(names)
+        if style is not None:
             line, column = codec.line_and_column(token.start)
-            lines[line].append((column, codec.width(token.start, token.end), *what))
+            lines[line].append((column, codec.width(token.start, token.end), *style))
 
 
 def _token_style(token: Token) -> tuple[int, int] | None:
@@ -79,15 +79,15 @@ _OPERATORS = frozenset(("+", "-", "*", "/", "=", "<", ">", "<=", ">=", "<>"))
 
 
 def _name_style(name: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
-    own = _BIT["declaration"] * name.declares | _BIT["modification"] * (name.writes and not name.declares)
+    modifiers = _BIT["declaration"] * name.declares | _BIT["modification"] * (name.writes and not name.declares)
     if name.kind in _NAME_STYLES:
         kind, bits = _NAME_STYLES[name.kind]
-        return KINDS.index(kind), bits | own
+        return KINDS.index(kind), bits | modifiers
     if name.kind is not NameKind.VARIABLE:
         return None
     symbols = analysis.compiled.symbols
     word = "variable"
-    bits = own
+    bits = modifiers
     if name.owner is not None and name.key in symbols.procedures[name.owner].parameters:
         word = "parameter"
     elif name.owner is None and name.key not in symbols.declared:
@@ -122,28 +122,28 @@ def encode(lines: Sequence[list[SemanticToken]], first: int = 0, last: int | Non
         last: the last one.
         start: the line of the stretch before.
     """
-    found: list[int] = []
-    before = start
+    numbers: list[int] = []
+    line_before = start
     for line in range(first, len(lines) if last is None else min(len(lines), last + 1)):
         column_before = 0
         for column, length, kind, bits in lines[line]:
-            found += (line - before, column - column_before, length, kind, bits)
-            before, column_before = line, column
-    return found
+            numbers += (line - line_before, column - column_before, length, kind, bits)
+            line_before, column_before = line, column
+    return numbers
 
 
 def token_edit(old: Sequence[list[SemanticToken]], new: Sequence[list[SemanticToken]]) -> tuple[int, int, list[int]]:
     """Return what makes the numbers of new lines out of those of old ones: where, how many go, and what comes."""
-    above = next((at for at, (one, other) in enumerate(zip(old, new, strict=False)) if one != other), None)
-    if above is None:
-        above = min(len(old), len(new))
-    limit = min(len(old), len(new)) - above
-    below = next((at for at in range(limit) if old[-1 - at] != new[-1 - at]), limit)
+    common_head = next((at for at, (one, other) in enumerate(zip(old, new, strict=False)) if one != other), None)
+    if common_head is None:
+        common_head = min(len(old), len(new))
+    limit = min(len(old), len(new)) - common_head
+    common_tail = next((at for at in range(limit) if old[-1 - at] != new[-1 - at]), limit)
     # The first stretch below the change counts its line from the one above, and is told again.
-    while below and not old[-below]:
-        below -= 1
-    below -= below > 0
-    start = 5 * sum(map(len, old[:above]))
-    gone = 5 * sum(map(len, old[above : len(old) - below]))
-    before = next((line for line in range(above - 1, -1, -1) if new[line]), 0)
-    return start, gone, encode(new, above, len(new) - below - 1, before)
+    while common_tail and not old[-common_tail]:
+        common_tail -= 1
+    common_tail -= common_tail > 0
+    start = 5 * sum(map(len, old[:common_head]))
+    deleted = 5 * sum(map(len, old[common_head : len(old) - common_tail]))
+    line_before = next((line for line in range(common_head - 1, -1, -1) if new[line]), 0)
+    return start, deleted, encode(new, common_head, len(new) - common_tail - 1, line_before)

@@ -105,14 +105,14 @@ class RloServer(LanguageServer):
         """
         return await self.document(document.uri).analysis()
 
-    async def locate(self, document: lsp.TextDocumentIdentifier, where: lsp.Position) -> tuple[Analysis, int]:
+    async def locate(self, document: lsp.TextDocumentIdentifier, position: lsp.Position) -> tuple[Analysis, int]:
         """Return the analysis of an open document, and the offset of a position in it.
 
         Raises:
             JsonRpcException: it is not open.
         """
         analysis = await self.analysis(document)
-        return analysis, offset_of(analysis.codec, where)
+        return analysis, offset_of(analysis.codec, position)
 
     def invalidate(self) -> None:
         """Take the analyses of all documents for old: what they depend on has changed."""
@@ -179,9 +179,9 @@ class RloServer(LanguageServer):
             return
         items = [lsp.ConfigurationItem(section=SECTION)]
         with suppress(JsonRpcException):
-            told = await self.workspace_configuration_async(lsp.ConfigurationParams(items))
-            if told and told[0] is not None:
-                self.apply_settings(told[0])
+            answers = await self.workspace_configuration_async(lsp.ConfigurationParams(items))
+            if answers and answers[0] is not None:
+                self.apply_settings(answers[0])
 
 
 def request_error(text: str) -> JsonRpcException:
@@ -263,7 +263,7 @@ def _register_workspace_features(server: RloServer) -> None:
     """Let the server hear of settings and files, and of the end."""
 
     @server.feature(lsp.EXIT)
-    def left(_: Any) -> None:
+    def exited(_: Any) -> None:
         server.has_exited = True
 
     @server.feature(lsp.WORKSPACE_DID_CHANGE_CONFIGURATION)
@@ -287,15 +287,17 @@ def _register_workspace_features(server: RloServer) -> None:
 
 async def _register_watchers(server: RloServer) -> None:
     """Ask the editor to tell of changes of cell files, and of settings."""
-    wanted: dict[str, Any] = {}
+    requested: dict[str, Any] = {}
     if server.client_capability("workspace", "did_change_watched_files", "dynamic_registration"):
-        wanted[lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES] = lsp.DidChangeWatchedFilesRegistrationOptions(
+        requested[lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES] = lsp.DidChangeWatchedFilesRegistrationOptions(
             watchers=[lsp.FileSystemWatcher(glob_pattern="**/*.{toml,json}")]
         )
     if server.client_capability("workspace", "did_change_configuration", "dynamic_registration"):
-        wanted[lsp.WORKSPACE_DID_CHANGE_CONFIGURATION] = lsp.DidChangeConfigurationRegistrationOptions(section=SECTION)
-    if wanted:
-        asked = [lsp.Registration(method, method, options) for method, options in wanted.items()]
+        requested[lsp.WORKSPACE_DID_CHANGE_CONFIGURATION] = lsp.DidChangeConfigurationRegistrationOptions(
+            section=SECTION
+        )
+    if requested:
+        registrations = [lsp.Registration(method, method, options) for method, options in requested.items()]
         # An editor that will not do what it said it can do tells nothing of cell files, and that is all.
         with suppress(JsonRpcException):
-            await server.client_register_capability_async(lsp.RegistrationParams(asked))
+            await server.client_register_capability_async(lsp.RegistrationParams(registrations))

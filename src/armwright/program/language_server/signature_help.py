@@ -28,8 +28,8 @@ def signature_help(text: str, analysis: Analysis, offset: int) -> lsp.SignatureH
         analysis: of the program, or of what it was before.
         offset: the position.
     """
-    around = lexical_context(text, offset, analysis.compiled.standard)
-    call = None if around is None else enclosing_call(around.preceding)
+    context = lexical_context(text, offset, analysis.compiled.standard)
+    call = None if context is None else enclosing_call(context.preceding)
     if call is None:
         return None
     name, argument = call
@@ -38,7 +38,7 @@ def signature_help(text: str, analysis: Analysis, offset: int) -> lsp.SignatureH
         label, parameters = signature(procedure.node)
     elif name.key in FUNCTIONS and (word := word_doc(name.key)) is not None:
         takes, meaning = _PARAMETERS[name.key], word.text
-        label = f"{name.key} ({', '.join(takes)}) : {FUNCTIONS[name.key].gives.name}"
+        label = f"{name.key} ({', '.join(takes)}) : {FUNCTIONS[name.key].result.name}"
         parameters = _parameter_columns(label, takes)
     else:
         return None
@@ -51,13 +51,13 @@ def signature_help(text: str, analysis: Analysis, offset: int) -> lsp.SignatureH
 def enclosing_call(tokens: Sequence[Token]) -> tuple[Token, int] | None:
     """Return the name in front of the innermost parenthesis that is open behind tokens, and how many commas follow."""
     depth = commas = 0
-    for at in range(len(tokens) - 1, 0, -1):
-        key = tokens[at].key
+    for index in range(len(tokens) - 1, 0, -1):
+        key = tokens[index].key
         if key in (")", "]"):
             depth += 1
         elif key in ("(", "["):
             if depth == 0:
-                name = tokens[at - 1]
+                name = tokens[index - 1]
                 if key == "(" and name.kind is TokenKind.NAME:
                     return name, commas
                 # An index, or parentheses around a part of an argument: what is outside of them counts.
@@ -72,9 +72,9 @@ def enclosing_call(tokens: Sequence[Token]) -> tuple[Token, int] | None:
 
 
 def _parameter_columns(label: str, parts: Sequence[str]) -> tuple[tuple[int, int], ...]:
-    at, places = label.find("("), []
+    start, places = label.find("("), []
     for part in parts:
-        at = label.find(part, at + 1)
-        places.append((at, at + len(part)))
-        at += len(part)
+        start = label.find(part, start + 1)
+        places.append((start, start + len(part)))
+        start += len(part)
     return tuple(places)

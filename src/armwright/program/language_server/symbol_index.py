@@ -103,49 +103,48 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
         tokens: in order.
         scopes: the names that are visible in each stretch of the text.
     """
-    found: list[Occurrence] = []
+    result: list[Occurrence] = []
     in_units = in_read = False
-    before = ""
-    for at, token in enumerate(tokens):
+    previous = ""
+    for index, token in enumerate(tokens):
         kind, key = token.kind, token.key
         if kind is _NAME or kind is _ARM:
-            follows = tokens[at + 1].key if at + 1 < len(tokens) else ""
+            next_key = tokens[index + 1].key if index + 1 < len(tokens) else ""
             if kind is _ARM:
-                found.append(Occurrence(token.start, token.end, key, NameKind.ARM))
+                name = Occurrence(token.start, token.end, key, NameKind.ARM)
             else:
-                found.append(_classify_name(token, scopes.scope_at(token.start), before, follows, in_units=in_units))
-            name = found[-1]
-            if (in_read and before in ("(", ",")) or before == "FOR":
+                name = _classify_name(token, scopes.scope_at(token.start), previous, next_key, in_units=in_units)
+            result.append(name)
+            if (in_read and previous in ("(", ",")) or previous == "FOR":
                 name.writes = True
-            elif before in STATEMENT_OPENERS or not before:
-                name.writes = follows == "=" or (follows == "[" and _is_assigned(tokens, at + 1))
-            elif before == "(" and key in AXES and at > 1 and tokens[at - 2].key == "FORCE":
+            elif previous in STATEMENT_OPENERS or not previous:
+                name.writes = next_key == "=" or (next_key == "[" and _is_assigned(tokens, index + 1))
+            elif previous == "(" and key in AXES and index > 1 and tokens[index - 2].key == "FORCE":
                 name.kind, name.owner, name.type = NameKind.AXIS, None, None
         elif kind is _KEYWORD or key in (";", ")"):
             in_units = key == "UNITS"
             in_read = key == "READ" or (in_read and key not in (";", ")") and kind is not _KEYWORD)
-        before = key
-    return tuple(found)
+        previous = key
+    return tuple(result)
 
 
-def _classify_name(token: Token, scope: Scope, before: str, follows: str, *, in_units: bool) -> Occurrence:
+def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, in_units: bool) -> Occurrence:
     """Return what a name is between the tokens around it."""
     key, start, end = token.key, token.start, token.end
     procedures = scope.symbols.procedures
-    called = follows == "(" and not scope.is_local(key)
-    if before == "PROCEDURE" or (called and key in procedures):
+    is_called = next_key == "(" and not scope.is_local(key)
+    if previous == "PROCEDURE" or (is_called and key in procedures):
         procedure = procedures.get(key)
         declares = procedure is not None and procedure.node.name.span.start == start
         return Occurrence(start, end, key, NameKind.PROCEDURE, declares=declares)
-    fixed = (
-        (in_units, NameKind.UNIT),
-        (before == "READ" and key in SENSORS, NameKind.SENSOR),
-        (before == "OPERATE", NameKind.DEVICE),
-        (follows == "(" and key in FUNCTIONS, NameKind.FUNCTION),
-    )
-    for holds, what in fixed:
-        if holds:
-            return Occurrence(start, end, key, what)
+    if in_units:
+        return Occurrence(start, end, key, NameKind.UNIT)
+    if previous == "READ" and key in SENSORS:
+        return Occurrence(start, end, key, NameKind.SENSOR)
+    if previous == "OPERATE":
+        return Occurrence(start, end, key, NameKind.DEVICE)
+    if next_key == "(" and key in FUNCTIONS:
+        return Occurrence(start, end, key, NameKind.FUNCTION)
     return _classify_variable(token, scope)
 
 
@@ -161,10 +160,10 @@ def _classify_variable(token: Token, scope: Scope) -> Occurrence:
     return Occurrence(token.start, token.end, key, NameKind.VARIABLE, owner, kind, declares)
 
 
-def _is_assigned(tokens: Sequence[Token], at: int) -> bool:
+def _is_assigned(tokens: Sequence[Token], start: int) -> bool:
     """Whether ``=`` stands behind the index that begins at a token."""
     depth = 0
-    for index in range(at, min(len(tokens), at + _MAX_INDEX_LENGTH)):
+    for index in range(start, min(len(tokens), start + _MAX_INDEX_LENGTH)):
         key = tokens[index].key
         depth += (key == "[") - (key == "]")
         if not depth:

@@ -87,41 +87,42 @@ def merge_headers(
             old = _replace_units(old, statements, header)
         new.append(header)
     new = [*imports, *new]
-    again = declared_names(old).keys() & declared_names(new).keys()
+    redeclared = declared_names(old).keys() & declared_names(new).keys()
     words = VOCABULARIES[std]
     taken = {*declared_names((*old, *new)), *cell_names, *words.reserved, *FUNCTIONS}
     for header in (*old, *new):
         taken |= local_names(header) if isinstance(header, tree.Procedure) else set()
-    changed = redeclare(old, statements, again, unavailable=taken, max_length=words.longest_name)
-    for key in sorted(changed.new_names.keys() & again & set(cell_names)):
+    changed = redeclare(old, statements, redeclared, unavailable=taken, max_length=words.longest_name)
+    for key in sorted(changed.new_names.keys() & redeclared & set(cell_names)):
         raise RedefinitionError(_cell_name_error(declared_names(new)[key]))
     return MergedHeaders(
         headers=(*changed.headers, *new),
         statements=changed.statements,
-        spelling={**_spelling(changed), **{key: declared_names(new)[key].text for key in again}},
+        spelling={**_spelling(changed), **{key: declared_names(new)[key].text for key in redeclared}},
         new_names=changed.new_names,
         unused_names=changed.unused_names,
         imports=tuple(imports),
-        remarks=(*remarks, *_redefinition_messages(changed, declared_names(old), again)),
+        remarks=(*remarks, *_redefinition_messages(changed, declared_names(old), redeclared)),
     )
 
 
 def _spelling(changed: RenamedProgram) -> dict[str, str]:
-    now = declared_names(changed.headers)
-    return {key: now[key].text for key in changed.new_names.values()}
+    names = declared_names(changed.headers)
+    return {key: names[key].text for key in changed.new_names.values()}
 
 
-def _redefinition_messages(changed: RenamedProgram, old: Mapping[str, tree.Name], again: Collection[str]) -> list[str]:
-    now = _spelling(changed)
-    called = {key: f"`{old[key].text}`" for key in {*again, *changed.new_names}}
-    messages = {key: f"{called[key]} is declared again" for key in sorted(again)}
+def _redefinition_messages(
+    changed: RenamedProgram, old: Mapping[str, tree.Name], redeclared: Collection[str]
+) -> list[str]:
+    new_spellings = _spelling(changed)
+    spellings = {key: f"`{old[key].text}`" for key in {*redeclared, *changed.new_names}}
+    messages = {key: f"{spellings[key]} is declared again" for key in sorted(redeclared)}
     for key, name in sorted(changed.new_names.items()):
-        if key in again:
-            messages[key] += f"; the previous one is now called `{now[name]}`"
+        renaming = f"is now called `{new_spellings[name]}`"
+        if key in redeclared:
+            messages[key] += f"; the previous one {renaming}"
         else:
-            messages[key] = (
-                f"{called[key]} uses the new declarations; the previous procedure is now called `{now[name]}`"
-            )
+            messages[key] = f"{spellings[key]} uses the new declarations; the previous procedure {renaming}"
     return [*messages.values()]
 
 
@@ -146,13 +147,13 @@ def _replace_units(
     Raises:
         NotNowError: numbers have been read in the old ones.
     """
-    now = {unit.key for unit in _unit_names(headers)}
-    changes = [unit for unit in new.units if unit.key in UNITS and unit.key not in now]
-    began = statements or any(isinstance(header, tree.Procedure) for header in headers)
+    current = {unit.key for unit in _unit_names(headers)}
+    changes = [unit for unit in new.units if unit.key in UNITS and unit.key not in current]
+    has_numbers = statements or any(isinstance(header, tree.Procedure) for header in headers)
     standard = {"M", "DEG"}
-    dimensions = {dimension(key) for key in now}
+    dimensions = {dimension(key) for key in current}
     changes = [change for change in changes if change.key not in standard or dimension(change.key) in dimensions]
-    if began and changes:
+    if has_numbers and changes:
         raise RedefinitionError(
             Diagnostic(
                 code="E224",

@@ -268,8 +268,8 @@ class _InputParser:
         """Whether what stands between two ``;`` is a value and no statement."""
         first, remaining = piece[0], [token for token in piece[1:] if token.key != ";"]
         if self._std is Standard.RLO_83:
-            known = first.kind is TokenKind.ARM or (first.kind is TokenKind.NAME and first.key in self._names)
-            return alone and known and not remaining
+            is_known = first.kind is TokenKind.ARM or (first.kind is TokenKind.NAME and first.key in self._names)
+            return alone and is_known and not remaining
         if first.kind is TokenKind.NAME:
             return self._is_value(first, _tokens_after_brackets(remaining))
         if first.kind is TokenKind.ARM:
@@ -279,9 +279,9 @@ class _InputParser:
     def _is_value(self, name: Token, remaining: Sequence[Token]) -> bool:
         """Whether a name with this behind it and its indices is a value."""
         if not remaining:
-            known = name.key in self._names
+            is_known = name.key in self._names
             words = VOCABULARIES[self._std].statements
-            return name.key not in self._procedures and (known or closest(name.text, words) is None)
+            return name.key not in self._procedures and (is_known or closest(name.text, words) is None)
         if remaining[0].key == "(":
             return name.key in FUNCTIONS and name.key not in self._procedures
         return remaining[0].key in _OPERATORS

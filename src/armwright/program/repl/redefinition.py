@@ -1,6 +1,6 @@
 """Names that are declared anew in a session: what was done with the old one keeps it, under another name."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import count
 from typing import Any
 
@@ -81,8 +81,8 @@ def redeclare(
             if key not in names:
                 remaining.append(header)
         elif isinstance(header, tree.Declaration):
-            own = tuple(_rename(name, new) for name in header.names if name.key not in names or name.key in new)
-            remaining += [attrs.evolve(header, names=own)] if own else []
+            in_use = tuple(_rename(name, new) for name in header.names if name.key not in names or name.key in new)
+            remaining += [attrs.evolve(header, names=in_use)] if in_use else []
         else:
             remaining.append(header)
     return RenamedProgram(
@@ -95,12 +95,12 @@ def redeclare(
 
 def _reachable_names(names: Collection[str], mentions: Mapping[str, Collection[str]]) -> set[str]:
     """Return the names that some names lead to, through the procedures among them."""
-    reached, waiting = set(names), list(names)
-    while waiting:
-        for name in mentions.get(waiting.pop(), ()):
+    reached, stack = set(names), list(names)
+    while stack:
+        for name in mentions.get(stack.pop(), ()):
             if name not in reached:
                 reached.add(name)
-                waiting.append(name)
+                stack.append(name)
     return reached
 
 
@@ -123,40 +123,40 @@ def local_names(procedure: tree.Procedure) -> set[str]:
 
 def used_names(node: object) -> set[str]:
     """Return the keys of the variables and procedures that a part of a program uses."""
-    match node:
-        case Span():
-            names_ = set()
-        case tree.Name(key=key):
-            names_ = {key}
-        case tree.Function(name=name, arguments=arguments):
-            names_ = set() if name.key in _WITH_AXIS else used_names(arguments)
-        case tree.Procedure(body=body):
-            names_ = used_names(body) - local_names(node)
-        case tuple():
-            names_ = set().union(*map(used_names, node))
-        case _:
-            names_ = set().union(*map(used_names, _child_fields(node).values()))
-    return names_
+    keys = set()
+
+    def collect(name: tree.Name) -> tree.Name:
+        keys.add(name.key)
+        return name
+
+    _map_names(node, collect)
+    return keys
 
 
 def rename_names(node: Any, new: Mapping[str, tree.Name]) -> Any:
     """Return a part of a program that uses other names; devices, axes and a procedure's own names stay."""
+    return _map_names(node, lambda name: _rename(name, new))
+
+
+def _map_names(node: Any, change: Callable[[tree.Name], tree.Name]) -> Any:
+    """Return a part of a program with every name of a variable or procedure changed that is not local to it."""
     changed = node
     match node:
         case Span():
             pass
         case tree.Name():
-            changed = _rename(node, new)
+            changed = change(node)
         case tree.Function(name=name, arguments=arguments):
             if name.key not in _WITH_AXIS:
-                changed = attrs.evolve(node, arguments=rename_names(arguments, new))
+                changed = attrs.evolve(node, arguments=_map_names(arguments, change))
         case tree.Procedure(name=name, body=body):
-            inner = {key: candidate for key, candidate in new.items() if key not in local_names(node)}
-            changed = attrs.evolve(node, name=_rename(name, new), body=rename_names(body, inner))
+            local = local_names(node)
+            body = _map_names(body, lambda name: name if name.key in local else change(name))
+            changed = attrs.evolve(node, name=change(name), body=body)
         case tuple():
-            changed = tuple(rename_names(item, new) for item in node)
+            changed = tuple(_map_names(item, change) for item in node)
         case _ if fields := _child_fields(node):
-            changed = attrs.evolve(node, **{name: rename_names(value, new) for name, value in fields.items()})
+            changed = attrs.evolve(node, **{name: _map_names(value, change) for name, value in fields.items()})
     return changed
 
 

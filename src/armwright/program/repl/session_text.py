@@ -61,11 +61,11 @@ def header_title(source: Source, node: tree.Header) -> str:
 
 def source_text(source: Source, node: tree.Procedure | tree.Statement) -> str:
     """Return a part of a session as it was entered, with the names that it uses now."""
-    pieces, done = [], node.span.start
+    pieces, end_of_copied = [], node.span.start
     for start, end, text in sorted(_name_changes(source, node)):
-        pieces += [source.text[done:start], text]
-        done = end
-    pieces.append(source.text[done : node.span.end])
+        pieces += [source.text[end_of_copied:start], text]
+        end_of_copied = end
+    pieces.append(source.text[end_of_copied : node.span.end])
     return "".join(pieces)
 
 

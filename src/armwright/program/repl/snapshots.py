@@ -101,9 +101,9 @@ def remove_unused(machine: Machine, names: Iterable[str]) -> None:
 def import_frames(machine: Machine, frames: Mapping[str, Node], span: Span) -> None:
     """Put frames of an imported file where they stand, those aside that have a place already."""
     nodes = dict(machine.state.tree.nodes)
-    waiting = {name: node for name, node in frames.items() if not machine.has_pose(name)}
-    while ready := [name for name, node in waiting.items() if node.parent == WORLD or node.parent in nodes]:
-        nodes.update((name, waiting.pop(name)) for name in ready)
+    remaining = {name: node for name, node in frames.items() if not machine.has_pose(name)}
+    while ready := [name for name, node in remaining.items() if node.parent == WORLD or node.parent in nodes]:
+        nodes.update((name, remaining.pop(name)) for name in ready)
     machine.cell = attrs.evolve(machine.cell, frames={**frames, **machine.cell.frames})
     machine.state.tree = FrameTree(nodes)
     for name in frames:

@@ -21,18 +21,18 @@ def undone_lines(before: Machine, after: Machine) -> list[str]:
         before: the state that holds again.
         after: what the statement had come to.
     """
-    done = [
+    undone = [
         effect.text for effect in after.state.effects[len(before.state.effects) :] if effect.kind not in SILENT_EFFECTS
     ]
-    count = len(done) - _MAX_LISTED
-    done = [*done[:_MAX_LISTED], f"{count} more"] if count > 1 else done
-    sentences = [f"effects before that were undone: {'; '.join(done)}"] if done else []
-    back = _moved_arms(before, after)
+    count = len(undone) - _MAX_LISTED
+    undone = [*undone[:_MAX_LISTED], f"{count} more"] if count > 1 else undone
+    sentences = [f"effects before that were undone: {'; '.join(undone)}"] if undone else []
+    restored = _moved_arms(before, after)
     if frames := [after.spelling(name) for name in _moved_frames(before, after)]:
-        back.append(f"{'frames' if len(frames) > 1 else 'frame'} {', '.join(frames)}")
+        restored.append(f"{'frames' if len(frames) > 1 else 'frame'} {', '.join(frames)}")
     if after.state.ticks > before.state.ticks:
-        back.append(f"the clock to {before.now:.3f} s")
-    return [*sentences, *([f"restored: {', '.join(back)}"] if back else [])]
+        restored.append(f"the clock to {before.now:.3f} s")
+    return [*sentences, *([f"restored: {', '.join(restored)}"] if restored else [])]
 
 
 def _moved_arms(before: Machine, after: Machine) -> list[str]:

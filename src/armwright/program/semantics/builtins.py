@@ -6,9 +6,16 @@ import attrs
 
 from armwright.program.language.units import Dimension
 from armwright.program.semantics import events
-from armwright.program.semantics.expression_types import FITTING, ExpressionType, bare, called, is_what, plain_keys
-from armwright.program.semantics.quantities import measure
-from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.expression_types import (
+    ACCEPTED_TYPES,
+    ExpressionType,
+    quote_expression,
+    type_phrase,
+    variable_keys,
+    without_article,
+)
+from armwright.program.semantics.quantities import check_unit
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.syntax import tree
 
 AXES = ("X", "Y", "Z")
@@ -26,74 +33,99 @@ class Signature:
         dimension: what a number with a unit must measure.
     """
 
-    takes: str
+    parameters: str
     count: int
-    sorts: frozenset[ExpressionType]
-    gives: ExpressionType
+    argument_types: frozenset[ExpressionType]
+    result: ExpressionType
     dimension: Dimension | None = None
 
 
-_SCALARS = FITTING[ExpressionType.SCALAR]
-_TURN = Signature(takes="one angle", count=1, sorts=_SCALARS, gives=ExpressionType.TRANS, dimension="angle")
+_SCALARS = ACCEPTED_TYPES[ExpressionType.SCALAR]
+_ROTATION = Signature(
+    parameters="one angle", count=1, argument_types=_SCALARS, result=ExpressionType.TRANS, dimension="angle"
+)
 FUNCTIONS: Mapping[str, Signature] = {
-    "XYZ": Signature(takes="three lengths", count=3, sorts=_SCALARS, gives=ExpressionType.TRANS, dimension="length"),
-    "ROTX": _TURN,
-    "ROTY": _TURN,
-    "ROTZ": _TURN,
-    "INV": Signature(
-        takes="one TRANS or FRAME",
-        count=1,
-        sorts=FITTING[ExpressionType.TRANS] | {ExpressionType.FRAME, ExpressionType.INVERSE},
-        gives=ExpressionType.TRANS,
+    "XYZ": Signature(
+        parameters="three lengths", count=3, argument_types=_SCALARS, result=ExpressionType.TRANS, dimension="length"
     ),
-    "DIST": Signature(takes="two FRAMEs", count=2, sorts=FITTING[ExpressionType.FRAME], gives=ExpressionType.SCALAR),
-    "FORCE": Signature(takes="one axis, X, Y or Z", count=1, sorts=frozenset(), gives=ExpressionType.SCALAR),
+    "ROTX": _ROTATION,
+    "ROTY": _ROTATION,
+    "ROTZ": _ROTATION,
+    "INV": Signature(
+        parameters="one TRANS or FRAME",
+        count=1,
+        argument_types=ACCEPTED_TYPES[ExpressionType.TRANS] | {ExpressionType.FRAME, ExpressionType.INVERSE},
+        result=ExpressionType.TRANS,
+    ),
+    "DIST": Signature(
+        parameters="two FRAMEs",
+        count=2,
+        argument_types=ACCEPTED_TYPES[ExpressionType.FRAME],
+        result=ExpressionType.SCALAR,
+    ),
+    "FORCE": Signature(
+        parameters="one axis, X, Y or Z", count=1, argument_types=frozenset(), result=ExpressionType.SCALAR
+    ),
 }
 _INVERSES = {ExpressionType.FRAME: ExpressionType.INVERSE, ExpressionType.INVERSE: ExpressionType.FRAME}
 
 
-def result(names: Names, node: tree.Function, sorts: Sequence[ExpressionType | None]) -> ExpressionType | None:
-    """Return what a function of the language gives; say what is wrong with its arguments.
+def result_type(
+    names: NameResolver, node: tree.Function, argument_types: Sequence[ExpressionType | None]
+) -> ExpressionType | None:
+    """Return the type of the result of a built-in function, and report what is wrong with its arguments.
 
     Args:
         names: for what is found.
         node: a call of one of ``FUNCTIONS``.
-        sorts: of the arguments; not asked for where the argument is an axis.
+        argument_types: types of the arguments; not used where the argument is an axis.
     """
     signature = FUNCTIONS[node.name.key]
     if len(node.arguments) != signature.count:
         plural = "s" * (len(node.arguments) != 1)
-        text = f"{node.name.key} takes {signature.takes}, not {len(node.arguments)} argument{plural}"
+        text = f"{node.name.key} takes {signature.parameters}, not {len(node.arguments)} argument{plural}"
         names.report("E220", text, node.span, f"{len(node.arguments)} argument{plural} here")
-        return signature.gives if node.name.key != "INV" else None
+        return signature.result if node.name.key != "INV" else None
     if node.name.key == "FORCE":
-        _axis(names, node.arguments[0])
-        return signature.gives
-    for argument, sort in zip(node.arguments, sorts, strict=True):
-        if sort is None:
+        _check_axis(names, node.arguments[0])
+        return signature.result
+    for argument, argument_type in zip(node.arguments, argument_types, strict=True):
+        if argument_type is None:
             continue
-        if sort not in signature.sorts:
-            _misfit(names, node, argument, sort)
+        if argument_type not in signature.argument_types:
+            _report_wrong_argument(names, node, argument, argument_type)
         elif signature.dimension is not None:
-            measure(names, argument, signature.dimension, f"{node.name.key} takes {signature.takes}")
+            check_unit(names, argument, signature.dimension, f"{node.name.key} takes {signature.parameters}")
     if node.name.key != "INV":
-        return signature.gives
-    return None if sorts[0] not in signature.sorts else _INVERSES.get(sorts[0], sorts[0])
-
-
-def _axis(names: Names, node: tree.Expression) -> None:
-    if isinstance(node, tree.Poison) or (isinstance(node, tree.Name) and node.key in AXES):
-        return
-    names.use(plain_keys(node))
-    names.report(
-        "E220", f"FORCE takes one axis, X, Y or Z, not {called(node)}", node.span, "no axis", advice="write `FORCE(Z)`"
+        return signature.result
+    return (
+        None
+        if argument_types[0] not in signature.argument_types
+        else _INVERSES.get(argument_types[0], argument_types[0])
     )
 
 
-def _misfit(names: Names, node: tree.Function, argument: tree.Expression, sort: ExpressionType) -> None:
-    if sort is ExpressionType.EVENT:
-        events.refuse(names, argument)
+def _check_axis(names: NameResolver, node: tree.Expression) -> None:
+    if isinstance(node, tree.Poison) or (isinstance(node, tree.Name) and node.key in AXES):
         return
-    what, takes = is_what(argument, sort), FUNCTIONS[node.name.key].takes
-    text = f"{node.name.key} takes {takes}, but {called(argument)} is {what}"
-    names.report("E220", text, argument.span, bare(what), secondary=names.where_declared(*plain_keys(argument)))
+    names.mark_used(variable_keys(node))
+    names.report(
+        "E220",
+        f"FORCE takes one axis, X, Y or Z, not {quote_expression(node)}",
+        node.span,
+        "no axis",
+        advice="write `FORCE(Z)`",
+    )
+
+
+def _report_wrong_argument(
+    names: NameResolver, node: tree.Function, argument: tree.Expression, argument_type: ExpressionType
+) -> None:
+    if argument_type is ExpressionType.EVENT:
+        events.report_event_as_value(names, argument)
+        return
+    what, takes = type_phrase(argument, argument_type), FUNCTIONS[node.name.key].parameters
+    text = f"{node.name.key} takes {takes}, but {quote_expression(argument)} is {what}"
+    names.report(
+        "E220", text, argument.span, without_article(what), secondary=names.declaration_labels(*variable_keys(argument))
+    )

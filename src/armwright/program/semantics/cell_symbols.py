@@ -31,7 +31,7 @@ class KnownCell:
 
 
 @attrs.frozen(kw_only=True)
-class Imported:
+class ImportedFrames:
     """What an IMPORT brings.
 
     Attributes:
@@ -44,7 +44,7 @@ class Imported:
 
 
 # How a checker gets at the file of an IMPORT; it raises an ArmwrightError when the file cannot be read.
-ReadImport: TypeAlias = Callable[[str], Imported]
+ReadImport: TypeAlias = Callable[[str], ImportedFrames]
 
 
 def known_cell(cell: Cell) -> KnownCell:
@@ -58,4 +58,4 @@ def known_cell(cell: Cell) -> KnownCell:
     )
 
 
-__all__ = ["STATION", "WORLD", "Imported", "KnownCell", "ReadImport", "known_cell"]
+__all__ = ["STATION", "WORLD", "ImportedFrames", "KnownCell", "ReadImport", "known_cell"]

@@ -3,10 +3,10 @@
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.words import Standard
 from armwright.program.semantics import control_flow, devices, frames, headers, move, output
-from armwright.program.semantics.calls import Calls
-from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadImport
+from armwright.program.semantics.calls import CallChecker
+from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport
 from armwright.program.semantics.context import Checks, Context
-from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
@@ -25,7 +25,7 @@ def check(
     *,
     std: Standard = Standard.RLO_2,
     read_import: ReadImport | None = None,
-) -> tuple[Symbols, list[Diagnostic], tuple[Imported, ...]]:
+) -> tuple[Symbols, list[Diagnostic], tuple[ImportedFrames, ...]]:
     """Check names, types, clauses and values.
 
     Args:
@@ -38,13 +38,13 @@ def check(
     Returns:
         The names of the program, what is wrong, and what was imported.
     """
-    names = Names(cell, std)
+    names = NameResolver(cell, std)
     procedures = headers.declare(names, program, read_import)
-    calls = Calls(names)
+    calls = CallChecker(names)
     for procedure in procedures:
-        with names.inside(procedure):
+        with names.enter_procedure(procedure):
             Context(CHECKS, names, calls, procedure).check(*procedure.node.body.statements)
     Context(CHECKS, names, calls).check(*program.statements)
-    calls.finish()
-    names.unused()
+    calls.report_fixed_arguments()
+    names.report_unused()
     return names.symbols, names.diagnostics, tuple(names.imports)

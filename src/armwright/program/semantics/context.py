@@ -6,8 +6,8 @@ from typing import Any, TypeAlias
 import attrs
 
 from armwright.program.language.source import Span
-from armwright.program.semantics.calls import Calls
-from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.calls import CallChecker
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
 
@@ -28,8 +28,8 @@ class Context:
     """
 
     checks: Checks
-    names: Names
-    calls: Calls
+    names: NameResolver
+    calls: CallChecker
     procedure: ProcedureSymbols | None = None
     recovering: bool = False
 
@@ -48,6 +48,6 @@ class Context:
         self.check(*statements)
         self.recovering = outside
 
-    def changes(self, node: tree.Expression, span: Span) -> None:
+    def note_change(self, node: tree.Expression, span: Span) -> None:
         """Note that a statement changes a variable, which may be a parameter."""
-        self.calls.changes(node, self.procedure, span)
+        self.calls.note_change(node, self.procedure, span)

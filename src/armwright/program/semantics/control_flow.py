@@ -2,10 +2,10 @@
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Checks, Context
-from armwright.program.semantics.expression_types import ExpressionType, a_type
-from armwright.program.semantics.quantities import in_range, measure
-from armwright.program.semantics.scopes import Names
-from armwright.program.semantics.type_check import condition, need, quantity, sort
+from armwright.program.semantics.expression_types import ExpressionType, declared_type_phrase
+from armwright.program.semantics.quantities import check_range, check_unit
+from armwright.program.semantics.scopes import NameResolver
+from armwright.program.semantics.type_check import infer_type, require_condition, require_quantity, require_type
 from armwright.program.syntax import tree
 
 
@@ -18,7 +18,7 @@ def if_(context: Context, node: tree.If) -> None:
     """Check conditions and statements of IF and the ELSE IFs behind it."""
     chain, otherwise = node.else_if_chain
     for choice in chain:
-        condition(context.names, choice.condition, "IF")
+        require_condition(context.names, choice.condition, "IF")
         context.check(choice.then)
     if otherwise is not None:
         context.check(otherwise)
@@ -26,30 +26,30 @@ def if_(context: Context, node: tree.If) -> None:
 
 def while_(context: Context, node: tree.While) -> None:
     """Check condition and body of WHILE."""
-    condition(context.names, node.condition, "WHILE")
+    require_condition(context.names, node.condition, "WHILE")
     context.check(node.body)
 
 
 def repeat(context: Context, node: tree.Repeat) -> None:
     """Check body and condition of REPEAT."""
     context.check(*node.body)
-    condition(context.names, node.condition, "UNTIL")
+    require_condition(context.names, node.condition, "UNTIL")
 
 
 def for_(context: Context, node: tree.For) -> None:
     """Check variable, bounds, step and body of a FOR."""
     names, variable = context.names, node.variable
     if isinstance(variable, tree.Poison):
-        names.use(variable.names)
+        names.mark_used(variable.names)
     else:
         kind = names.type(variable)
         if kind is not None and kind != VariableType(VariableKind.SCALAR):
             names.poison(variable.key)
-            message = f"FOR counts with a SCALAR, but `{variable.text}` is {a_type(kind)}"
-            names.report("E229", message, variable.span, str(kind), secondary=names.where_declared(variable.key))
+            message = f"FOR counts with a SCALAR, but `{variable.text}` is {declared_type_phrase(kind)}"
+            names.report("E229", message, variable.span, str(kind), secondary=names.declaration_labels(variable.key))
     for bound in (node.first, node.last, node.step):
         if bound is not None:
-            need(names, bound, ExpressionType.SCALAR, "E229", "the variable of FOR is a number")
+            require_type(names, bound, ExpressionType.SCALAR, "E229", "the variable of FOR is a number")
     if isinstance(node.step, tree.Number) and node.step.value == 0:
         text = "a FOR with STEP 0 would never end"
         names.report("E229", text, node.step.span, "goes nowhere", advice="leave STEP out to count by 1")
@@ -60,7 +60,7 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     """Check priorities and bodies of branches."""
     for branch in node.branches:
         if branch.priority is not None:
-            measure(context.names, branch.priority, None, "a priority has no unit")
+            check_unit(context.names, branch.priority, None, "a priority has no unit")
         context.check_concurrent(branch.body)
 
 
@@ -74,16 +74,16 @@ def wait(context: Context, node: tree.Wait) -> None:
     _event(context.names, node.event, "WAIT")
 
 
-def _event(names: Names, node: tree.Variable, who: str) -> None:
+def _event(names: NameResolver, node: tree.Variable, who: str) -> None:
     """Check what SIGNAL or WAIT is about."""
     advice = "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`"
-    need(names, node, ExpressionType.EVENT, "E223", f"{who} needs an EVENT", advice=lambda _: advice)
+    require_type(names, node, ExpressionType.EVENT, "E223", f"{who} needs an EVENT", advice=lambda _: advice)
 
 
 def pause(context: Context, node: tree.Pause) -> None:
     """Check the time of a PAUSE."""
-    if quantity(context.names, node.duration, "time", "PAUSE needs a time"):
-        in_range(context.names, node.duration, "a pause", zero=True)
+    if require_quantity(context.names, node.duration, "time", "PAUSE needs a time"):
+        check_range(context.names, node.duration, "a pause", zero=True)
 
 
 def lock(context: Context, node: tree.Lock) -> None:
@@ -92,7 +92,7 @@ def lock(context: Context, node: tree.Lock) -> None:
         if isinstance(target, tree.Name):
             context.names.type(target)
         else:
-            sort(context.names, target)
+            infer_type(context.names, target)
     context.check(node.body)
 
 
@@ -119,7 +119,7 @@ def call(context: Context, node: tree.Call) -> None:
 
 def mention(context: Context, node: tree.Poison) -> None:
     """Use the names of what could not be read."""
-    context.names.mention(node.names)
+    context.names.mark_skipped(node.names)
 
 
 CHECKS: Checks = {

@@ -29,89 +29,84 @@ class ExpressionType(enum.Enum):
     MATRIX = "a matrix"
     INVERSE = "the inverse of a FRAME"
 
-    @property
-    def word(self) -> str:
-        """What it is called without an article."""
-        return self.value.split(" ", 1)[1]
 
-
-OF_KIND = {kind: ExpressionType[kind.name] for kind in VariableKind}
+TYPE_OF_KIND = {kind: ExpressionType[kind.name] for kind in VariableKind}
 # What each kind of variable, parameter or operand takes.
-FITTING = {sort: frozenset({sort}) for sort in ExpressionType} | {
+ACCEPTED_TYPES = {expression_type: frozenset({expression_type}) for expression_type in ExpressionType} | {
     ExpressionType.FRAME: frozenset({ExpressionType.FRAME, ExpressionType.MATRIX}),
     ExpressionType.TRANS: frozenset({ExpressionType.TRANS, ExpressionType.MATRIX}),
 }
 
 
-def is_what(node: tree.Expression, sort: ExpressionType) -> str:
+def type_phrase(node: tree.Expression, expression_type: ExpressionType) -> str:
     """Return what an expression is, with its article: of arms and numbers in the words of users."""
     if isinstance(node, tree.ArmName):
         return "an arm"
-    return "a number" if isinstance(node, tree.Number) else sort.value
+    return "a number" if isinstance(node, tree.Number) else expression_type.value
 
 
-def a_type(kind: VariableType) -> str:
+def declared_type_phrase(kind: VariableType) -> str:
     """Return a type with its article, such as ``an ARRAY [2,3] OF FRAME``."""
     return f"{'an' if kind.sizes or kind.kind is VariableKind.EVENT else 'a'} {kind}"
 
 
-def bare(words: str) -> str:
+def without_article(words: str) -> str:
     """Return words without their article where they are a type: ``FRAME``, but ``an arm``."""
     last = words.split(" ", 1)[1]
     return last if last.isupper() else words
 
 
-def plain_keys(node: tree.Expression) -> tuple[str, ...]:
+def variable_keys(node: tree.Expression) -> tuple[str, ...]:
     """Return the key of a plain name; nothing for any other expression."""
     return (node.key,) if isinstance(node, tree.Name) else ()
 
 
-def called(node: tree.Expression) -> str:
+def quote_expression(node: tree.Expression) -> str:
     """Return how a message calls an expression: as it is written, when it is short."""
     if isinstance(node, tree.Matrix):
         return "this"
-    text = written(node)
+    text = expression_text(node)
     return f"`{text}`" if len(text) <= _MAX_SHOWN_LENGTH else "this"
 
 
-def written(node: tree.Expression) -> str:
+def expression_text(node: tree.Expression) -> str:
     """Return an expression as one would write it, with no more parentheses than it takes; of a long one the start."""
-    text = _written(node)[0]
+    text = _text_and_precedence(node)[0]
     return text if len(text) <= _MAX_WRITTEN_LENGTH else f"{text[:_MAX_WRITTEN_LENGTH].rpartition(' ')[0]} ..."
 
 
-def _written(node: tree.Expression) -> tuple[str, int]:
+def _text_and_precedence(node: tree.Expression) -> tuple[str, int]:
     """Return the text and how tightly its outermost operation binds."""
     match node:
         case tree.Unary(operation=operation, operand=operand):
             strength, gap = (PRECEDENCE_OF_NOT, " ") if operation == "NOT" else (_MINUS, "")
-            return f"{operation}{gap}{_inside(operand, strength)}", strength
+            return f"{operation}{gap}{_operand_text(operand, strength)}", strength
         case tree.Binary():
             first, chain = tree.operation_chain(node)
-            text, own = _written(first)
+            text, own = _text_and_precedence(first)
             for link in chain:
                 strength = PRECEDENCE[link.operation]
                 left_text = text if own >= strength + (link.operation in COMPARISONS) else f"({text})"
-                text, own = f"{left_text} {link.operation} {_inside(link.right, strength + 1)}", strength
+                text, own = f"{left_text} {link.operation} {_operand_text(link.right, strength + 1)}", strength
             return text, own
         case _:
-            return _atom(node), _ATOM
+            return _atom_text(node), _ATOM
 
 
-def _atom(node: tree.Expression) -> str:
+def _atom_text(node: tree.Expression) -> str:
     match node:
         case tree.Name(text=text) | tree.ArmName(text=text) | tree.Number(text=text):
             return text
         case tree.Index(name=name, indices=items):
-            return f"{name.text}[{','.join(map(written, items))}]"
+            return f"{name.text}[{','.join(map(expression_text, items))}]"
         case tree.Function(name=name, arguments=items):
-            return f"{name.text}({', '.join(map(written, items))})"
+            return f"{name.text}({', '.join(map(expression_text, items))})"
         case tree.Matrix(items=items):
-            return f"({', '.join(map(written, items))})"
+            return f"({', '.join(map(expression_text, items))})"
         case _:
             return "..."
 
 
-def _inside(node: tree.Expression, strength: int) -> str:
-    text, own = _written(node)
+def _operand_text(node: tree.Expression, strength: int) -> str:
+    text, own = _text_and_precedence(node)
     return text if own >= strength else f"({text})"

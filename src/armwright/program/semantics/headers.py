@@ -9,14 +9,14 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
-from armwright.program.semantics.scopes import Names
-from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, Table
+from armwright.program.semantics.scopes import NameResolver
+from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, SymbolTable
 from armwright.program.syntax import tree
 
 # More elements than this are a slip, and would take the memory of the machine.
 MAX_ELEMENTS = 1_000_000
 # How people call units, whose names in a program are shorter.
-_LONG_UNITS: Mapping[str, str] = {
+_UNIT_NAMES: Mapping[str, str] = {
     **dict.fromkeys(("MILLIMETRE", "MILLIMETRES", "MILLIMETER", "MILLIMETERS"), "MM"),
     **dict.fromkeys(("CENTIMETRE", "CENTIMETRES", "CENTIMETER", "CENTIMETERS"), "CM"),
     **dict.fromkeys(("METRE", "METRES", "METER", "METERS"), "M"),
@@ -26,30 +26,30 @@ _LONG_UNITS: Mapping[str, str] = {
 }
 
 
-def declare(names: Names, program: tree.Program, read_import: ReadImport | None) -> list[ProcedureSymbols]:
+def declare(names: NameResolver, program: tree.Program, read_import: ReadImport | None) -> list[ProcedureSymbols]:
     """Take up all that the headers declare, wherever they stand among each other.
 
     Returns:
         The procedures in the order of the text, those whose names are taken among them.
     """
-    _units(names, program)
+    _declare_units(names, program)
     for header in program.headers:
         if isinstance(header, tree.Import):
-            _import(names, header, read_import)
+            _declare_import(names, header, read_import)
     for declaration in program.declarations:
-        _variables(names, names.symbols, declaration)
-    return [_procedure(names, node) for node in program.procedures]
+        _declare_variables(names, names.symbols, declaration)
+    return [_declare_procedure(names, node) for node in program.procedures]
 
 
 # ---- variables -----------------------------------------------------------------------------------------------------
 
 
-def _variables(names: Names, table: Table, declaration: tree.Declaration) -> None:
+def _declare_variables(names: NameResolver, table: SymbolTable, declaration: tree.Declaration) -> None:
     """Take up the names of one declaration."""
-    kind = _type(names, declaration.type)
+    kind = _declared_type(names, declaration.type)
     for name in declaration.names:
         if name.key in table.declared:
-            _twice(names, name, table.declared[name.key])
+            _report_duplicate(names, name, table.declared[name.key])
         elif name.key == WORLD or (name.key in PREDECLARED and not _is_frame(declaration.type)):
             note = "the station may be declared again as a FRAME" if name.key == STATION else ""
             text = f"`{name.text}` is predeclared as a FRAME"
@@ -67,14 +67,14 @@ def _is_frame(written: tree.TypeName) -> bool:
     return written.key in (VariableKind.FRAME, None) and not written.sizes
 
 
-def _twice(names: Names, name: tree.Name, first: tree.Name) -> None:
+def _report_duplicate(names: NameResolver, name: tree.Name, first: tree.Name) -> None:
     text = f"`{name.text}` is declared twice"
     names.report("E203", text, name.span, "again here", secondary=(Label(first.span, "first declared here"),))
 
 
-def _type(names: Names, written: tree.TypeName) -> VariableType | None:
+def _declared_type(names: NameResolver, written: tree.TypeName) -> VariableType | None:
     """Return what a declaration declares; None where something was wrong with it."""
-    sizes = [_size(names, number) for number in written.sizes]
+    sizes = [_array_size(names, number) for number in written.sizes]
     if written.key is None or None in sizes:
         return None
     known = tuple(size for size in sizes if size is not None)
@@ -88,7 +88,7 @@ def _type(names: Names, written: tree.TypeName) -> VariableType | None:
     return VariableType(VariableKind(written.key), known)
 
 
-def _size(names: Names, number: tree.Number) -> int | None:
+def _array_size(names: NameResolver, number: tree.Number) -> int | None:
     if number.unit is not None:
         text = f"the size of an array has no unit, but `{number.text}` has"
         names.report("E224", text, number.span, "leave the unit out")
@@ -105,13 +105,13 @@ def _size(names: Names, number: tree.Number) -> int | None:
 # ---- units ---------------------------------------------------------------------------------------------------------
 
 
-def _units(names: Names, program: tree.Program) -> None:
+def _declare_units(names: NameResolver, program: tree.Program) -> None:
     """Read the UNITS lines; each dimension is settled once."""
     first: dict[str, tree.Name] = {}
     for header in program.headers:
         for unit in header.units if isinstance(header, tree.Units) else ():
             if unit.key not in DECLARABLE:
-                _no_unit(names, unit)
+                _report_unknown_unit(names, unit)
                 continue
             earlier = first.setdefault(dimension(unit.key), unit)
             if earlier is not unit:
@@ -125,13 +125,13 @@ def _units(names: Names, program: tree.Program) -> None:
     names.symbols.units = UnitSystem(length=chosen.get("length", "M"), angle=chosen.get("angle", "DEG"))
 
 
-def _no_unit(names: Names, unit: tree.Name) -> None:
+def _report_unknown_unit(names: NameResolver, unit: tree.Name) -> None:
     if unit.key in UNITS:
         what = {"time": "times are always in seconds", "force": "forces are always in newtons"}[dimension(unit.key)]
         text = f"UNITS sets the units of lengths and angles, but `{unit.text}` is a unit of {dimension(unit.key)}"
         names.report("E224", text, unit.span, "leave this out", note=what)
         return
-    near = _LONG_UNITS.get(unit.key) or names.near(unit.text, lambda: DECLARABLE)
+    near = _UNIT_NAMES.get(unit.key) or names.closest_name(unit.text, lambda: DECLARABLE)
     note = f"units are {', '.join(DECLARABLE)}"
     names.report("E224", f"unknown unit `{unit.text}`", unit.span, "unknown unit", note=note, advice=did_you_mean(near))
 
@@ -139,7 +139,7 @@ def _no_unit(names: Names, unit: tree.Name) -> None:
 # ---- imports -------------------------------------------------------------------------------------------------------
 
 
-def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -> None:
+def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadImport | None) -> None:
     path = header.path
     if read_import is None:
         names.open_import = True
@@ -168,17 +168,17 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
 # ---- procedures ----------------------------------------------------------------------------------------------------
 
 
-def _procedure(names: Names, node: tree.Procedure) -> ProcedureSymbols:
+def _declare_procedure(names: NameResolver, node: tree.Procedure) -> ProcedureSymbols:
     """Take up a procedure and its own names; where its name is taken it cannot be called, but is checked."""
     name = node.name
     parameters = tuple(parameter.key for declaration in node.parameters for parameter in declaration.names)
     procedure = ProcedureSymbols(node=node, parameters=parameters)
     for declaration in (*node.parameters, *node.declarations):
-        _variables(names, procedure, declaration)
+        _declare_variables(names, procedure, declaration)
     first = names.symbols.procedures.get(name.key)
     variable = names.symbols.declared.get(name.key)
     if first is not None or variable is not None:
-        _twice(names, name, variable or first.node.name)  # type: ignore[union-attr]
+        _report_duplicate(names, name, variable or first.node.name)  # type: ignore[union-attr]
     elif name.key in names.symbols.types:
         where = "an IMPORT brings" if name.key in names.symbols.imported else "is predeclared"
         names.report("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a procedure of the same name")

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from armwright.program.language.words import COMPARISONS
 from armwright.program.semantics import events
-from armwright.program.semantics.expression_types import ExpressionType, bare, is_what, written
-from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.expression_types import ExpressionType, expression_text, type_phrase, without_article
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.syntax import tree
 
 _PRODUCTS: Mapping[tuple[ExpressionType, ExpressionType], ExpressionType] = {
@@ -19,11 +19,11 @@ _PRODUCTS: Mapping[tuple[ExpressionType, ExpressionType], ExpressionType] = {
     (ExpressionType.INVERSE, ExpressionType.MATRIX): ExpressionType.TRANS,
 }
 _POSES = frozenset((ExpressionType.FRAME, ExpressionType.MATRIX))
-_STEPS = frozenset((ExpressionType.TRANS, ExpressionType.MATRIX))
+_TRANSFORMATIONS = frozenset((ExpressionType.TRANS, ExpressionType.MATRIX))
 
 
-def result(
-    names: Names, node: tree.Binary, left: ExpressionType | None, right: ExpressionType | None
+def result_type(
+    names: NameResolver, node: tree.Binary, left: ExpressionType | None, right: ExpressionType | None
 ) -> ExpressionType | None:
     """Return what an operation other than AND and OR gives; say that it has no meaning between these two."""
     operation = node.operation
@@ -36,50 +36,50 @@ def result(
     if operation == "*" and (left, right) in _PRODUCTS:
         return _PRODUCTS[left, right]
     if ExpressionType.EVENT in (left, right):
-        events.refuse(names, node.left if left is ExpressionType.EVENT else node.right)
+        events.report_event_as_value(names, node.left if left is ExpressionType.EVENT else node.right)
     else:
-        _refuse(names, node, left, right)
+        _report_wrong_operands(names, node, left, right)
     return ExpressionType.CONDITION if comparison else None
 
 
-def negative(names: Names, node: tree.Unary, sort: ExpressionType | None) -> ExpressionType | None:
+def negated_type(names: NameResolver, node: tree.Unary, operand_type: ExpressionType | None) -> ExpressionType | None:
     """Return what a minus in front of an expression gives: only numbers have one."""
-    if sort is ExpressionType.EVENT:
-        events.refuse(names, node.operand)
-    elif sort not in (None, ExpressionType.SCALAR):
-        what, is_pose = is_what(node.operand, sort), sort in _POSES | _STEPS
-        advice = f"for the inverse transformation write `INV({written(node.operand)})`" if is_pose else ""
-        _say(names, node, f"`-` takes a number, but this is {what}", bare(what), advice)
-    return sort if sort is ExpressionType.SCALAR else None
+    if operand_type is ExpressionType.EVENT:
+        events.report_event_as_value(names, node.operand)
+    elif operand_type not in (None, ExpressionType.SCALAR):
+        what, is_pose = type_phrase(node.operand, operand_type), operand_type in _POSES | _TRANSFORMATIONS
+        advice = f"for the inverse transformation write `INV({expression_text(node.operand)})`" if is_pose else ""
+        _report_once(names, node, f"`-` takes a number, but this is {what}", without_article(what), advice)
+    return operand_type if operand_type is ExpressionType.SCALAR else None
 
 
-def _refuse(names: Names, node: tree.Binary, left: ExpressionType, right: ExpressionType) -> None:
-    left_text, other = is_what(node.left, left), is_what(node.right, right)
+def _report_wrong_operands(names: NameResolver, node: tree.Binary, left: ExpressionType, right: ExpressionType) -> None:
+    left_text, other = type_phrase(node.left, left), type_phrase(node.right, right)
     message = f"`{node.operation}` has no meaning between {left_text} and {other}"
-    label = f"{bare(left_text)} {node.operation} {bare(other)}"
-    _say(names, node, message, label, _advice(node, left, right))
+    label = f"{without_article(left_text)} {node.operation} {without_article(other)}"
+    _report_once(names, node, message, label, _operand_advice(node, left, right))
 
 
-def _say(names: Names, node: tree.Unary | tree.Binary, message: str, label: str, help_: str) -> None:
+def _report_once(names: NameResolver, node: tree.Unary | tree.Binary, message: str, label: str, help_: str) -> None:
     """Speak of an operation, unless the same was said of the same variables."""
     operands = (node.operand,) if isinstance(node, tree.Unary) else (node.left, node.right)
     variables = [operand.key for operand in operands if isinstance(operand, tree.Name)]
-    if not names.first("E221", *variables):
+    if not names.is_first_report("E221", *variables):
         return
-    secondary = names.where_declared(*dict.fromkeys(variables))
+    secondary = names.declaration_labels(*dict.fromkeys(variables))
     names.report("E221", message, node.span, label, secondary=secondary, advice=help_)
 
 
-def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
+def _operand_advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
     """Return what was probably meant, empty where nobody knows."""
-    left_text, other = written(node.left), written(node.right)
+    left_text, other = expression_text(node.left), expression_text(node.right)
     if ExpressionType.CONDITION in (left, right):
         return "a condition is not a number; combine conditions with AND and OR"
     if node.operation in COMPARISONS:
         return f"for their distance write `DIST({left_text}, {other})`" if {left, right} <= _POSES else ""
     if node.operation in ("*", "/"):
-        return _advice_on_product(node, left, right)
-    if left in _POSES | _STEPS and right in _STEPS:
+        return _product_advice(node, left, right)
+    if left in _POSES | _TRANSFORMATIONS and right in _TRANSFORMATIONS:
         back = other if node.operation == "+" else f"INV({other})"
         return f"transformations are composed by `*`: write `{left_text} * {back}`"
     if {left, right} <= _POSES and node.operation == "-":
@@ -87,12 +87,12 @@ def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> s
     return ""
 
 
-def _advice_on_product(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
-    left_text, other = written(node.left), written(node.right)
+def _product_advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
+    left_text, other = expression_text(node.left), expression_text(node.right)
     if node.operation == "/":
         return (
             f"for the inverse transformation write `{left_text} * INV({other})`"
-            if right in _STEPS and left is not ExpressionType.SCALAR
+            if right in _TRANSFORMATIONS and left is not ExpressionType.SCALAR
             else ""
         )
     match left, right:

@@ -3,15 +3,15 @@
 from armwright.program.semantics import events
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType
-from armwright.program.semantics.type_check import sort
+from armwright.program.semantics.type_check import infer_type
 from armwright.program.syntax import tree
 
 
 def print_(context: Context, node: tree.Print) -> None:
     """Check what is printed: anything but an EVENT."""
     for item in node.items:
-        if not isinstance(item, tree.String) and sort(context.names, item) is ExpressionType.EVENT:
-            events.refuse(context.names, item, "printed")
+        if not isinstance(item, tree.String) and infer_type(context.names, item) is ExpressionType.EVENT:
+            events.report_event_as_value(context.names, item, "printed")
 
 
 CHECKS: Checks = {tree.Print: print_}

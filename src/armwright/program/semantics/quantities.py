@@ -1,13 +1,18 @@
 """Numbers as they are written: units that measure what is asked for, and values in range."""
 
 from armwright.program.language.units import Dimension, dimension
-from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.syntax import tree
 
-_WHAT: dict[Dimension, str] = {"length": "a length", "angle": "an angle", "time": "a time", "force": "a force"}
+_DIMENSION_PHRASES: dict[Dimension, str] = {
+    "length": "a length",
+    "angle": "an angle",
+    "time": "a time",
+    "force": "a force",
+}
 
 
-def measure(names: Names, node: tree.Expression, expected: Dimension | None, what: str) -> bool:
+def check_unit(names: NameResolver, node: tree.Expression, expected: Dimension | None, what: str) -> bool:
     """Whether a number, if the expression is one, has no unit or one of the right dimension; say so if not.
 
     Args:
@@ -18,12 +23,12 @@ def measure(names: Names, node: tree.Expression, expected: Dimension | None, wha
     """
     if not isinstance(node, tree.Number) or node.unit is None or dimension(node.unit) == expected:
         return True
-    is_what = _WHAT[dimension(node.unit)]
+    is_what = _DIMENSION_PHRASES[dimension(node.unit)]
     names.report("E224", f"{what}, but `{node.text}` is {is_what}", node.span, is_what)
     return False
 
 
-def in_range(names: Names, node: tree.Expression, what: str, *, zero: bool) -> None:
+def check_range(names: NameResolver, node: tree.Expression, what: str, *, zero: bool) -> None:
     """Say that a number, if the expression is one, is negative, or zero where that has no meaning either.
 
     Args:

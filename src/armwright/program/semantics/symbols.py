@@ -16,7 +16,7 @@ PREDECLARED: Mapping[str, VariableType] = {WORLD: FRAME, STATION: FRAME}
 
 
 @attrs.define(kw_only=True, eq=False)
-class Table:
+class SymbolTable:
     """The names that belong together: those of a program, or those of one procedure.
 
     Attributes:
@@ -33,7 +33,7 @@ class Table:
 
 
 @attrs.define(kw_only=True, eq=False)
-class ProcedureSymbols(Table):
+class ProcedureSymbols(SymbolTable):
     """A procedure with its parameters and own variables.
 
     Attributes:
@@ -46,7 +46,7 @@ class ProcedureSymbols(Table):
 
 
 @attrs.define(kw_only=True, eq=False)
-class Symbols(Table):
+class Symbols(SymbolTable):
     """The names of a program, those that are predeclared or imported among them.
 
     Attributes:
@@ -70,7 +70,7 @@ class Symbols(Table):
         return Scope(symbols=self, procedure=None if procedure is None else self.procedures[procedure])
 
 
-def bodies(program: tree.Program, symbols: Symbols) -> "list[tuple[Scope, tuple[tree.Statement, ...]]]":
+def scoped_bodies(program: tree.Program, symbols: Symbols) -> "list[tuple[Scope, tuple[tree.Statement, ...]]]":
     """Return the statements of the main program and of each procedure, with the names that they see."""
     procedures = symbols.procedures.items()
     inside = [(symbols.scope(key), procedure.node.body.statements) for key, procedure in procedures]
@@ -93,7 +93,7 @@ class Scope:
         """Whether a name is a parameter or own variable of the procedure."""
         return self.procedure is not None and key in self.procedure.types
 
-    def table(self, key: str) -> Table:
+    def table(self, key: str) -> SymbolTable:
         """Return the names among which a name is looked up."""
         local = self.procedure
         return local if local is not None and key in local.types else self.symbols
@@ -106,7 +106,7 @@ class Scope:
         """Return where a name was declared; None where it has no such place."""
         return self.table(key).declared.get(key)
 
-    def where_declared(self, key: str) -> tuple[Label, ...]:
+    def declaration_labels(self, key: str) -> tuple[Label, ...]:
         """Return a label on the declaration of a name, if it has one."""
         name = self.declared(key)
         return () if name is None else (Label(name.span, "declared here"),)
@@ -114,9 +114,3 @@ class Scope:
     def is_poisoned(self, key: str) -> bool:
         """Whether something has been said of a name, so that it is passed over in silence."""
         return key in self.table(key).poisoned
-
-    def frame(self, node: object) -> str | None:
-        """Return the canonical name of a single FRAME or an arm; None for anything else or what is unknown."""
-        if isinstance(node, tree.ArmName):
-            return node.key
-        return node.key if isinstance(node, tree.Name) and self.type(node.key) == FRAME else None

@@ -12,35 +12,35 @@ from armwright.program.semantics import array_elements, builtins, operators
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import (
-    FITTING,
+    ACCEPTED_TYPES,
     ExpressionType,
-    a_type,
-    bare,
-    called,
-    is_what,
-    plain_keys,
-    written,
+    declared_type_phrase,
+    expression_text,
+    quote_expression,
+    type_phrase,
+    variable_keys,
+    without_article,
 )
-from armwright.program.semantics.quantities import measure
-from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.quantities import check_unit
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.syntax import pose_literals, tree
 
 
-def sort(names: Names, node: tree.Expression) -> ExpressionType | None:
+def infer_type(names: NameResolver, node: tree.Expression) -> ExpressionType | None:
     """Return what an expression is; None where that is unknown, of which something has been said then.
 
     Args:
         names: what is known, and for what is found.
         node: any expression.
     """
-    return _SORTS[type(node)](names, node)
+    return _TYPE_RULES[type(node)](names, node)
 
 
-def declared(names: Names, node: tree.Expression) -> tuple[Label, ...]:
+def declaration_labels(names: NameResolver, node: tree.Expression) -> tuple[Label, ...]:
     """Return where a variable is declared."""
     if isinstance(node, tree.Index):
         node = node.name
-    return names.where_declared(*plain_keys(node))
+    return names.declaration_labels(*variable_keys(node))
 
 
 def is_world(node: tree.Expression) -> bool:
@@ -48,13 +48,13 @@ def is_world(node: tree.Expression) -> bool:
     return isinstance(node, tree.Name) and node.key == WORLD
 
 
-def refuse_world(names: Names, node: tree.Expression) -> None:
+def report_world_assignment(names: NameResolver, node: tree.Expression) -> None:
     """Say that the root of all frames cannot be assigned a value."""
-    names.report("E218", f"{called(node)} cannot be assigned a value", node.span, "the root of all frames")
+    names.report("E218", f"{quote_expression(node)} cannot be assigned a value", node.span, "the root of all frames")
 
 
-def need(
-    names: Names,
+def require_type(
+    names: NameResolver,
     node: tree.Expression,
     expected: ExpressionType,
     code: str,
@@ -77,11 +77,11 @@ def need(
     Returns:
         Whether it is what is wanted.
     """
-    return _fits(names, node, sort(names, node), expected, code, what, note, advice)
+    return _check_type(names, node, infer_type(names, node), expected, code, what, note, advice)
 
 
-def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
-    names: Names,
+def _check_type(  # noqa: PLR0917 - what ``need`` is given, and the sort
+    names: NameResolver,
     node: tree.Expression,
     actual: ExpressionType | None,
     expected: ExpressionType,
@@ -93,24 +93,24 @@ def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
     """Do what ``need`` does for an expression of which one knows what it is."""
     if actual is expected:
         return True
-    if actual is None or actual in FITTING[expected]:
+    if actual is None or actual in ACCEPTED_TYPES[expected]:
         return actual is not None
-    for key in plain_keys(node):
+    for key in variable_keys(node):
         names.poison(key)
-    is_one = is_what(node, actual)
+    is_one = type_phrase(node, actual)
     names.report(
         code,
-        f"{what}, but {called(node)} is {is_one}",
+        f"{what}, but {quote_expression(node)} is {is_one}",
         node.span,
-        bare(is_one),
-        secondary=names.where_declared(*plain_keys(node)),
+        without_article(is_one),
+        secondary=names.declaration_labels(*variable_keys(node)),
         note=note,
         advice=advice(actual) if advice else "",
     )
     return False
 
 
-def quantity(names: Names, node: tree.Expression, expected: Dimension, what: str) -> bool:
+def require_quantity(names: NameResolver, node: tree.Expression, expected: Dimension, what: str) -> bool:
     """Whether an expression is a number of the right dimension; say so if not.
 
     Args:
@@ -119,117 +119,118 @@ def quantity(names: Names, node: tree.Expression, expected: Dimension, what: str
         expected: what a number with a unit must measure.
         what: the first half of the message, such as ``PAUSE needs a time``.
     """
-    return need(names, node, ExpressionType.SCALAR, "E216", what) and measure(names, node, expected, what)
+    return require_type(names, node, ExpressionType.SCALAR, "E216", what) and check_unit(names, node, expected, what)
 
 
-def condition(names: Names, node: tree.Expression, who: str) -> None:
+def require_condition(names: NameResolver, node: tree.Expression, who: str) -> None:
     """Say that what should be a condition is none; a number is not one."""
-    _is_condition(names, node, sort(names, node), who)
+    _check_condition(names, node, infer_type(names, node), who)
 
 
-def _is_condition(names: Names, node: tree.Expression, actual: ExpressionType | None, who: str) -> None:
+def _check_condition(names: NameResolver, node: tree.Expression, actual: ExpressionType | None, who: str) -> None:
     def advice(actual: ExpressionType) -> str:
         if actual is ExpressionType.SCALAR and not isinstance(node, tree.Number):
-            return f"write `{written(node)} <> 0`"
+            return f"write `{expression_text(node)} <> 0`"
         return "a condition compares two numbers, such as `n > 0`"
 
-    _fits(names, node, actual, ExpressionType.CONDITION, "E219", f"{who} needs a condition", advice=advice)
+    _check_type(names, node, actual, ExpressionType.CONDITION, "E219", f"{who} needs a condition", advice=advice)
 
 
-def _number(_names: Names, node: tree.Number) -> ExpressionType | None:
+def _number(_names: NameResolver, node: tree.Number) -> ExpressionType | None:
     # A number that was reported before is NaN; it may have been meant as a name.
     return None if math.isnan(node.value) else ExpressionType.SCALAR
 
 
-def _name(names: Names, node: tree.Name) -> ExpressionType | None:
+def _name(names: NameResolver, node: tree.Name) -> ExpressionType | None:
     kind = names.type(node)
-    return None if kind is None else array_elements.single(names, node, kind)
+    return None if kind is None else array_elements.variable_type(names, node, kind)
 
 
-def _index(names: Names, node: tree.Index) -> ExpressionType | None:
-    return array_elements.element(names, node, [sort(names, index) for index in node.indices])
+def _index(names: NameResolver, node: tree.Index) -> ExpressionType | None:
+    return array_elements.element_type(names, node, [infer_type(names, index) for index in node.indices])
 
 
-def _poison(names: Names, node: tree.Poison) -> None:
-    names.use(node.names)
+def _poison(names: NameResolver, node: tree.Poison) -> None:
+    names.mark_used(node.names)
 
 
-def _function(names: Names, node: tree.Function) -> ExpressionType | None:
+def _function(names: NameResolver, node: tree.Function) -> ExpressionType | None:
     name = node.name
     if name.key in FUNCTIONS:
         # An axis has a name but is no variable.
         named = name.key == "FORCE"
-        sorts = [
-            None if named and isinstance(argument, tree.Name) else sort(names, argument) for argument in node.arguments
+        argument_types = [
+            None if named and isinstance(argument, tree.Name) else infer_type(names, argument)
+            for argument in node.arguments
         ]
-        return builtins.result(names, node, sorts)
+        return builtins.result_type(names, node, argument_types)
     for argument in node.arguments:
         # A procedure may be given a whole array, and this may have been meant as a call of one.
         if not isinstance(argument, tree.Name):
-            sort(names, argument)
+            infer_type(names, argument)
         else:
             names.type(argument)
-    _no_function(names, node)
+    _report_unknown_function(names, node)
     return None
 
 
-def _no_function(names: Names, node: tree.Function) -> None:
+def _report_unknown_function(names: NameResolver, node: tree.Function) -> None:
     name = node.name
-    if not names.first("E227", name.key):
+    if not names.is_first_report("E227", name.key):
         return
-    kind = names.peek(name.key)
-    if names.call(name.key) is not None:
+    kind = names.type_of_key(name.key)
+    if names.resolve_call(name.key) is not None:
         message, label = f"`{name.text}` is a procedure and has no value", "a procedure"
         help_ = "call it in a statement of its own, and let it set a parameter that is a FRAME"
     elif kind is not None:
-        names.use([name.key])
-        message, label = f"`{name.text}` is {a_type(kind)} and no function", "no function"
-        inner = ",".join(map(written, node.arguments))
+        names.mark_used([name.key])
+        message, label = f"`{name.text}` is {declared_type_phrase(kind)} and no function", "no function"
+        inner = ",".join(map(expression_text, node.arguments))
         help_ = f"write `{name.text}[{inner}]` for an element" if kind.sizes else ""
     else:
-        near = names.near(name.text, lambda: list(FUNCTIONS))
+        near = names.closest_name(name.text, lambda: list(FUNCTIONS))
         message, label = f"unknown function `{name.text}`", "unknown function"
         help_ = f"did you mean `{near}`?" if near else f"functions are {', '.join(FUNCTIONS)}"
     names.report("E227", message, name.span, label, advice=help_)
 
 
-def _unary(names: Names, node: tree.Unary) -> ExpressionType | None:
+def _unary(names: NameResolver, node: tree.Unary) -> ExpressionType | None:
     if node.operation == "NOT":
-        condition(names, node.operand, "NOT")
+        require_condition(names, node.operand, "NOT")
         return ExpressionType.CONDITION
-    return operators.negative(names, node, sort(names, node.operand))
+    return operators.negated_type(names, node, infer_type(names, node.operand))
 
 
-def _binary(names: Names, node: tree.Binary) -> ExpressionType | None:
+def _binary(names: NameResolver, node: tree.Binary) -> ExpressionType | None:
     first, chain = tree.operation_chain(node)
-    actual = sort(names, first)
+    actual = infer_type(names, first)
     for link in chain:
         if link.operation in ("AND", "OR"):
-            _is_condition(names, link.left, actual, link.operation)
-            condition(names, link.right, link.operation)
+            _check_condition(names, link.left, actual, link.operation)
+            require_condition(names, link.right, link.operation)
             actual = ExpressionType.CONDITION
         else:
-            actual = operators.result(names, link, actual, sort(names, link.right))
+            actual = operators.result_type(names, link, actual, infer_type(names, link.right))
     return actual
 
 
-def _matrix(names: Names, node: tree.Matrix) -> ExpressionType | None:
+def _matrix(names: NameResolver, node: tree.Matrix) -> ExpressionType | None:
     fault = pose_literals.check(node, names.symbols.units)
     if fault is not None:
         if len(node.items) == 3 and names.symbols.std is Standard.RLO_2:
-            fault = attrs.evolve(fault, helps=(f"for a translation write `XYZ{written(node)}`",))
+            fault = attrs.evolve(fault, helps=(f"for a translation write `XYZ{expression_text(node)}`",))
         names.diagnostics.append(fault)
     for position, item in enumerate(node.items):
         if not isinstance(item, tree.Number):
-            need(names, item, ExpressionType.SCALAR, "E216", "a matrix is made of numbers")
+            require_type(names, item, ExpressionType.SCALAR, "E216", "a matrix is made of numbers")
         elif item.unit is not None and fault is None:
             turns = position < 9
             what = "n, o, a of a matrix have no unit" if turns else "the last three numbers of a matrix are lengths"
-            measure(names, item, None if turns else "length", what)
+            check_unit(names, item, None if turns else "length", what)
     return None if fault is not None and fault.is_error else ExpressionType.MATRIX
 
 
-_SORTS: dict[type, Callable[..., ExpressionType | None]] = {
+_TYPE_RULES: dict[type, Callable[..., ExpressionType | None]] = {
     tree.Number: _number,
     tree.ArmName: lambda _names, _node: ExpressionType.FRAME,
     tree.Name: _name,

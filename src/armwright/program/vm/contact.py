@@ -8,7 +8,6 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.hardware import PeakContact
-from armwright.cell.model import base_name
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.controlled_stop import brake
 from armwright.motion.plan import hand_length
@@ -56,13 +55,13 @@ def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
     runs[-1] = attrs.evolve(last, duration=local)
     runs.append(TrajectorySegment(t0=machine.now, trajectory=braking, duration=braking.duration, tau=tau))
     if motion.stage_index >= 0:
-        done = join([last.trajectory.until(local), braking])
-        before = [] if last.tau is None else [last.tau[: round(local / period)]]
-        peak, when = peak_efforts(np.concatenate([*before, tau]), period)
+        executed = join([last.trajectory.until(local), braking])
+        efforts_before = [] if last.tau is None else [last.tau[: round(local / period)]]
+        peak, when = peak_efforts(np.concatenate([*efforts_before, tau]), period)
         machine.state.stages[motion.stage_index] = attrs.evolve(
             machine.state.stages[motion.stage_index],
-            motion=done,
-            length=hand_length(arm, done),
+            motion=executed,
+            length=hand_length(arm, executed),
             peak_effort=peak,
             peak_time=when,
             stopped=True,
@@ -100,12 +99,12 @@ def recompute_efforts(machine: Machine, arm: str, stage_index: int | None) -> No
     if not any(push.wrenches.any() for push in machine.state.tool_wrenches[arm]):
         return
     push, period, last = _record_wrenches(machine, arm), machine.cell.period, machine.state.segments[arm][-1]
-    done = round((machine.now - last.t0) / period)
-    if last.tau is None or done >= len(last.tau):
+    done_ticks = round((machine.now - last.t0) / period)
+    if last.tau is None or done_ticks >= len(last.tau):
         return
-    later = ToolWrenches(last.t0, np.concatenate([np.zeros((done, 6)), push.wrenches]))
-    tau = trajectory_efforts(machine.cell.arms[arm].arm, last.trajectory, period, later, len(last.tau) - 1)
-    tau[:done] = last.tau[:done]
+    remaining_wrenches = ToolWrenches(last.t0, np.concatenate([np.zeros((done_ticks, 6)), push.wrenches]))
+    tau = trajectory_efforts(machine.cell.arms[arm].arm, last.trajectory, period, remaining_wrenches, len(last.tau) - 1)
+    tau[:done_ticks] = last.tau[:done_ticks]
     machine.state.segments[arm][-1] = attrs.evolve(last, tau=tau)
     peak, when = peak_efforts(tau, period)
     if stage_index is not None:
@@ -156,15 +155,15 @@ def stop_too_deep(machine: Machine, process: Process, motion: Motion) -> NoRetur
     # On its path to rest it may come deeper; that is said now.
     motion.alarm_tick = None
     allowed = machine.cell.contact.max_depth
-    least = _minimum_depth(machine, motion)
+    min_depth = _minimum_depth(machine, motion)
     notes = [f"the arm brakes within its limits; at rest it is pressed {_depth_text(motion.deepest_contact)}"]
     helps = ["end the MOVE at a smaller force, or use a lower speed"]
-    if least is not None and least > allowed:
+    if min_depth is not None and min_depth > allowed:
         text = "at this speed that is unavoidable: even if it brakes from the first contact on, the depth is"
-        notes.append(f"{text} {least * 1e3:.3g} mm")
-        helps = _speed_advice(motion, allowed / least)
-    elif least is not None:
-        notes.append(f"if it brakes from the first contact on, the depth is {least * 1e3:.3g} mm")
+        notes.append(f"{text} {min_depth * 1e3:.3g} mm")
+        helps = _speed_advice(motion, allowed / min_depth)
+    elif min_depth is not None:
+        notes.append(f"if it brakes from the first contact on, the depth is {min_depth * 1e3:.3g} mm")
     into_plane = f"into the plane{_plane_height_text(machine)} deeper than {allowed * 1e3:g} mm"
     message = f"`{machine.spelling(motion.moved)}` presses {into_plane}"
     raise machine.error(process, "E404", message, motion.span, "this MOVE is stopped there", notes=notes, helps=helps)
@@ -187,7 +186,7 @@ def _minimum_depth(machine: Machine, motion: Motion) -> float | None:
     tick = min(math.ceil(local / period - _ROUNDING) * period, trajectory.duration)
     braking = brake(trajectory, tick, cell_arm.arm.limits.acceleration, period=period)
     q: Array = braking(np.arange(round(braking.duration / period) + 1) * period)
-    X_WT = machine.state.tree.world(base_name(motion.arm)) @ forward(cell_arm.arm, q) @ motion.X_HM
+    X_WT = machine.base_pose(motion.arm) @ forward(cell_arm.arm, q) @ motion.X_HM
     return machine.cell.contact.height - float(X_WT[:, 2, 3].min())
 
 

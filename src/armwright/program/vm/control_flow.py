@@ -29,15 +29,15 @@ def _jump_if_not(machine: Machine, process: Process, step: Instruction) -> None:
 
 def _for(machine: Machine, process: Process, step: Instruction) -> None:
     variable, count, *bounds = step.operands[:5]
-    done = machine.read_number(process, count, step)
-    first, last, step_ = (machine.read_number(process, bound, step) for bound in bounds)
-    if step_ == 0:
+    passes = machine.read_number(process, count, step)
+    first, last, increment = (machine.read_number(process, bound, step) for bound in bounds)
+    if increment == 0:
         raise machine.error(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
-    if done > (last - first) / step_ + _ROUNDING:
+    if passes > (last - first) / increment + _ROUNDING:
         process.pc = jump_target(step, 5)
         return
-    machine.write(process, variable, first + done * step_, step)
-    machine.write(process, count, done + 1, step)
+    machine.write(process, variable, first + passes * increment, step)
+    machine.write(process, count, passes + 1, step)
 
 
 # ---- procedures ----------------------------------------------------------------------------------------------------
@@ -104,7 +104,7 @@ def _leave_activation(machine: Machine, process: Process, span: Span) -> None:
 
 
 def _fork(machine: Machine, process: Process, step: Instruction) -> None:
-    now = process.activation
+    activation = process.activation
     _check_process_limit(machine, process, step)
     rank = machine.read_number(process, step.operands[1], step) if len(step.operands) > 1 else process.priority
     branch = Process(
@@ -115,9 +115,9 @@ def _fork(machine: Machine, process: Process, step: Instruction) -> None:
         stack=[
             Activation(
                 kind="main",
-                bindings=now.bindings,
-                temporaries=dict(now.temporaries),
-                temporary_spans=dict(now.temporary_spans),
+                bindings=activation.bindings,
+                temporaries=dict(activation.temporaries),
+                temporary_spans=dict(activation.temporary_spans),
             )
         ],
         parent=process,
@@ -132,11 +132,11 @@ def _check_process_limit(machine: Machine, process: Process, step: Instruction) 
     Raises:
         RunError: there are too many of them.
     """
-    most = machine.limits.processes
-    deep = len(process.path) >= most // 10
-    if not deep and len(machine.state.processes) + len(process.branches) < most:
+    limit = machine.limits.processes
+    is_too_deep = len(process.path) >= limit // 10
+    if not is_too_deep and len(machine.state.processes) + len(process.branches) < limit:
         return
-    text = f"COBEGINs are nested more than {most // 10} deep" if deep else f"more than {most} processes run"
+    text = f"COBEGINs are nested more than {limit // 10} deep" if is_too_deep else f"more than {limit} processes run"
     raise machine.error(process, "E505", text, step.span, "one more would begin here")
 
 

@@ -14,9 +14,9 @@ def _move_fingers(machine: Machine, process: Process, step: Instruction) -> None
     closed = step.op is Op.GRASP
     arm = machine.resolve_name(process, step.operands[0]) if step.operands else process.last_arm
     if arm is None:
-        known = min(machine.cell.arms, default="ARM_1")
+        example = min(machine.cell.arms, default="ARM_1")
         text = "GRASP names no arm, and no arm has been used before"
-        raise machine.error(process, "E307", text, step.span, "which arm?", helps=[f"write `GRASP {known}`"])
+        raise machine.error(process, "E307", text, step.span, "which arm?", helps=[f"write `GRASP {example}`"])
     machine.claim_arm(process, arm, step.span)
     width = machine.read_number(process, step.operands[1], step) if len(step.operands) > 1 else None
     metres = None if width is None else width * machine.code.units.metres

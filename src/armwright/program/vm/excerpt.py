@@ -29,9 +29,9 @@ class Excerpt(NamedTuple, Generic[T]):
         """Return what ``show`` makes of each."""
         return Excerpt([*map(show, self.first)], [*map(show, self.last)], self.omitted)
 
-    def join(self, *others: T) -> list[T]:
+    def join(self, *replacement: T) -> list[T]:
         """Return the items, with ``rest`` instead of those that are left out."""
-        return [*self.first, *(others if self.omitted else ()), *self.last]
+        return [*self.first, *(replacement if self.omitted else ()), *self.last]
 
 
 def excerpt(items: Sequence[T], max_count: int) -> Excerpt[T]:

@@ -45,14 +45,14 @@ def _element(machine: Machine, process: Process, step: Instruction) -> None:
         value = machine.read_number(process, operand, step)
         index = round(value) if math.isfinite(value) else 0
         if abs(value - index) > _INTEGER_TOLERANCE or not 1 <= index <= size:
-            which = f"index {number}" if len(sizes) > 1 else "the index"
-            text = f"{which} of `{machine.spelling(array)}` is {value:g}, not an integer from 1 to {size}"
+            index_name = f"index {number}" if len(sizes) > 1 else "the index"
+            text = f"{index_name} of `{machine.spelling(array)}` is {value:g}, not an integer from 1 to {size}"
             raise machine.error(process, "E222", text, step.span, "no such element")
         indices.append(index)
-    to = step.operands[0]
-    assert isinstance(to, str)  # noqa: S101 - the translator gives a value in passing
-    process.activation.temporaries[to] = ElementReference(f"{array}[{','.join(map(str, indices))}]")
-    process.activation.temporary_spans[to] = step.span
+    target = step.operands[0]
+    assert isinstance(target, str)  # noqa: S101 - the translator gives a value in passing
+    process.activation.temporaries[target] = ElementReference(f"{array}[{','.join(map(str, indices))}]")
+    process.activation.temporary_spans[target] = step.span
 
 
 def _force(machine: Machine, process: Process, step: Instruction) -> None:

@@ -46,17 +46,21 @@ def _unfix(machine: Machine, process: Process, step: Instruction) -> None:
         code, text = "E308" if is_arm(child) else "E309", f"`{spelled(child)}` cannot be unfixed"
         raise machine.error(process, code, text, step.span, "has no parent")
     machine.slot_value(child, step, process)
-    above = machine.state.tree.parent(child)
-    if len(step.operands) > 1 and (parent := machine.resolve_name(process, step.operands[1])) != above:
-        hangs = above is not None and above != WORLD
-        instead = f"write `UNFIX {spelled(child)} FROM {spelled(above or WORLD)}`" if hangs else "remove this UNFIX"
+    parent_name = machine.state.tree.parent(child)
+    if len(step.operands) > 1 and (parent := machine.resolve_name(process, step.operands[1])) != parent_name:
+        is_attached = parent_name is not None and parent_name != WORLD
+        advice = (
+            f"write `UNFIX {spelled(child)} FROM {spelled(parent_name or WORLD)}`"
+            if is_attached
+            else "remove this UNFIX"
+        )
         text = f"`{spelled(child)}` is not affixed to `{spelled(parent)}`"
-        label = f"is attached to {spelled(above or WORLD)}"
-        where = machine.origin_labels(child, "it got its pose here")
-        raise machine.error(process, "E306", text, step.span, label, secondary=where, helps=[instead])
+        label = f"is attached to {spelled(parent_name or WORLD)}"
+        origins = machine.origin_labels(child, "it got its pose here")
+        raise machine.error(process, "E306", text, step.span, label, secondary=origins, helps=[advice])
     machine.replace_tree(machine.state.tree.unfix(child), child, step.span)
     machine.record_effect(
-        process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data={"child": child, "parent": above}
+        process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data={"child": child, "parent": parent_name}
     )
 
 

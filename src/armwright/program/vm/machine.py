@@ -237,10 +237,14 @@ class Machine:
         """Let the frame table know where an arm is now, or will be at a later tick."""
         self.replace_tree(self.state.tree.set_pose(arm, self.gripper_pose(arm, tick)), arm, span)
 
+    def base_pose(self, arm: str) -> Array:
+        """Return the pose X_WB of the base of an arm in the world."""
+        return self.state.tree.world(base_name(arm))
+
     def gripper_pose(self, arm: str, tick: int | None = None) -> Array:
         """Return the pose of the gripper of an arm in the world, now or at a later tick."""
         q = self.hardware.configuration(arm, self.now if tick is None else tick * self.cell.period)
-        return self.state.tree.world(base_name(arm)) @ forward(self.cell.arms[arm].arm, q)
+        return self.base_pose(arm) @ forward(self.cell.arms[arm].arm, q)
 
     def carrier(self, name: str) -> str | None:
         """Return the arm that a frame is or hangs on; None where it hangs on none."""
@@ -298,8 +302,10 @@ class Machine:
             if not (owner.descends_from(process) or process.descends_from(owner)):
                 text = f"{arm} is used by {owner.title} and by {process.title} of one COBEGIN"
                 note = "each arm belongs to one process at a time"
-                hung = self._affix_labels(moved, arm)
-                raise self.error(process, "E503", text, span, f"belongs to {owner.title}", secondary=hung, notes=[note])
+                labels = self._affix_labels(moved, arm)
+                raise self.error(
+                    process, "E503", text, span, f"belongs to {owner.title}", secondary=labels, notes=[note]
+                )
         if process not in owners:
             owners.append(process)
 
@@ -307,8 +313,8 @@ class Machine:
         """Return where a frame, or what it hangs on, was hung on an arm."""
         if moved is None or moved == arm:
             return []
-        above = [moved, *self.state.tree.ancestors(moved)]
-        name = above[above.index(arm) - 1]
+        chain = [moved, *self.state.tree.ancestors(moved)]
+        name = chain[chain.index(arm) - 1]
         return self.origin_labels(name, f"{self.spelling(name)} was affixed to {arm} here")
 
     def schedule_effect(self, process: Process, seconds: float, pending: PendingEffect) -> None:

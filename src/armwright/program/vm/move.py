@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.model import base_name
 from armwright.errors import IncapableArmError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.plan import Manner, Obstacle, PlannedStage, StageError, StageGoal, plan
@@ -54,14 +53,14 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     machine.state.idle_steps += _STEPS_PER_MOVE
     stages = _plan_stages(machine, process, request, arm, moved)
     spelled = machine.spelling(moved)
-    who = arm if moved == arm else f"{arm} [{spelled}]"
-    manner = f"@{request.speed:g}" if request.duration is None else f"in {request.duration:g} s"
+    subject = arm if moved == arm else f"{arm} [{spelled}]"
+    speed_text = f"@{request.speed:g}" if request.duration is None else f"in {request.duration:g} s"
     process.motion = Motion(
         arm=arm,
         moved=moved,
         X_HM=machine.state.tree.relation(moved, arm),
         span=step.span,
-        text=f"{who} MOVE: {stages_text(request.form).replace(' / ', '; ')} {manner}",
+        text=f"{subject} MOVE: {stages_text(request.form).replace(' / ', '; ')} {speed_text}",
         goal=_goal_name(machine, process, request),
         implied_affix=implied,
         stages=stages,
@@ -195,7 +194,7 @@ def _plan_stages(
     cell, cell_arm = machine.cell, machine.cell.arms[arm]
     corner = cell.corner_deviation if machine.code.standard is Standard.RLO_2 else None
     plans = stages_of(request.form)
-    X_BW = inverse(machine.state.tree.world(base_name(arm)))
+    X_BW = inverse(machine.base_pose(arm))
     X_MH = inverse(machine.state.tree.relation(moved, arm))
     goals = [
         StageGoal(
@@ -227,17 +226,17 @@ def _slow_to_duration(
     machine: Machine, process: Process, request: MoveRequest, stages: Sequence[PlannedStage], duration: float
 ) -> list[PlannedStage]:
     """Return the stages slowed so that the whole MOVE takes as long as was asked for."""
-    least = sum(stage.trajectory.duration for stage in stages)
-    if duration < least - machine.cell.period:
+    shortest = sum(stage.trajectory.duration for stage in stages)
+    if duration < shortest - machine.cell.period:
         text = f"this MOVE is infeasible in {duration:g} s"
-        raise machine.error(process, "E405", text, request.span, f"it takes {least:.3f} s or more")
-    if not least:
+        raise machine.error(process, "E405", text, request.span, f"it takes {shortest:.3f} s or more")
+    if not shortest:
         # Nothing is to be moved: the arm stands still for so long.
-        still = hold(stages[0].trajectory(0.0), duration)
-        return [attrs.evolve(stages[0], trajectory=whole_ticks(still, machine.cell.period)), *stages[1:]]
+        rest = hold(stages[0].trajectory(0.0), duration)
+        return [attrs.evolve(stages[0], trajectory=whole_ticks(rest, machine.cell.period)), *stages[1:]]
     slow = slowed_together([stage.trajectory for stage in stages], duration, machine.cell.period)
     # What kept a stage slow does so no more where it is to take longer.
-    longer = duration > least + machine.cell.period
+    longer = duration > shortest + machine.cell.period
     return [_retime_stage(stage, trajectory, longer=longer) for stage, trajectory in zip(stages, slow, strict=True)]
 
 
@@ -272,12 +271,12 @@ def _fail_move(
 
 def _unit_advice(machine: Machine, process: Process, goal: Goal, arm: str) -> tuple[str, ...]:
     """Say what lengths are counted in, where a pose so far off can only be meant in another unit."""
-    X_BW = inverse(machine.state.tree.world(base_name(arm)))
-    away = np.linalg.norm((X_BW @ _goal_pose(machine, process, goal))[:3, 3])
-    if away <= _WRONG_UNIT_FACTOR * machine.cell.arms[arm].arm.reach:
+    X_BW = inverse(machine.base_pose(arm))
+    distance = np.linalg.norm((X_BW @ _goal_pose(machine, process, goal))[:3, 3])
+    if distance <= _WRONG_UNIT_FACTOR * machine.cell.arms[arm].arm.reach:
         return ()
     unit = {"M": "metres", "MM": "millimetres", "CM": "centimetres", "IN": "inches"}[machine.code.units.length]
-    return (f"`{goal.label}` is {away:.4g} m away: lengths in this program are {unit}",)
+    return (f"`{goal.label}` is {distance:.4g} m away: lengths in this program are {unit}",)
 
 
 # ---- meanwhile ----------------------------------------------------------------------------------------------------
@@ -323,22 +322,22 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     motion.stage_start_tick, motion.stage_end_tick = machine.state.ticks, machine.state.ticks + ticks
     if any(guard.reads_pose for guard in motion.guards):
         times = np.arange(counted + 1) * period
-        X_WB = machine.state.tree.world(base_name(motion.arm))
+        X_WB = machine.base_pose(motion.arm)
         motion.hand_poses = X_WB @ forward(arm, trajectory(times))
     process.wake_tick = machine.state.ticks if motion.guards else motion.stage_end_tick
 
 
 def _condition_holds(machine: Machine, process: Process, motion: Motion, guard: Guard) -> bool:
     """Whether the condition of a guard holds now, with the arm where it is now."""
-    tree, now = machine.state.tree, process.activation
+    tree, activation = machine.state.tree, process.activation
     if guard.reads_pose and len(motion.hand_poses):
         index = min(machine.state.ticks - motion.stage_start_tick, len(motion.hand_poses) - 1)
         machine.state.tree = tree.set_pose(motion.arm, motion.hand_poses[index])
-    process.stack.append(now.create_nested("condition"))
+    process.stack.append(activation.create_nested("condition"))
     evaluate_instructions(machine, process, machine.code.instructions, guard.condition)
     process.stack.pop()
     machine.state.tree = tree
-    return bool(now.temporaries[guard.result])
+    return bool(activation.temporaries[guard.result])
 
 
 def _finish_move(machine: Machine, process: Process, motion: Motion) -> None:

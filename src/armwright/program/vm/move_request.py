@@ -64,7 +64,7 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
     return MoveRequest(
         begin=begin,
         form=form,
-        goals={goal.label: goal for several in goals.values() for goal in several},
+        goals={goal.label: goal for goals_of_clause in goals.values() for goal in goals_of_clause},
         speed=numbers.get(Op.MVSPD, NORMAL_SPEED if duration is None else HIGHEST_SPEED),
         blend=numbers.get(Op.MVBLD),
         duration=duration,
@@ -77,19 +77,19 @@ def _goal(machine: Machine, process: Process, operand: Operand, step: Instructio
     span = step.span
     if isinstance(operand, str) and operand.startswith("%"):
         span = process.activation.temporary_spans[operand]
-    where = Instruction(op=step.op, operands=step.operands, span=span)
-    return Goal(machine.operand_text(process, operand), operand, where if step.op is not Op.MVBEG else step)
+    clause = Instruction(op=step.op, operands=step.operands, span=span)
+    return Goal(machine.operand_text(process, operand), operand, clause if step.op is not Op.MVBEG else step)
 
 
 def _make_labels_unique(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
     """Return the goals with a label of its own for each, also where a program names two poses alike."""
     operands: dict[str, Operand] = {}
-    for several in goals.values():
-        for index, goal in enumerate(several):
+    for goals_of_clause in goals.values():
+        for index, goal in enumerate(goals_of_clause):
             label = goal.label
             while operands.setdefault(label, goal.operand) != goal.operand:
                 label += "'"
-            several[index] = goal._replace(label=label)
+            goals_of_clause[index] = goal._replace(label=label)
     return goals
 
 
@@ -103,12 +103,12 @@ def _clause_value(machine: Machine, process: Process, part: Instruction) -> floa
             message = f"speed {name} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
             raise machine.error(process, "E207", message, part.span, "out of range")
         return value
-    what = "the blend" if part.op is Op.MVBLD else "the duration"
+    quantity = "the blend" if part.op is Op.MVBLD else "the duration"
     if part.op is Op.MVDUR and value > _MAX_DURATION:
-        text = f"{what} {name} s is not possible"
+        text = f"{quantity} {name} s is not possible"
         raise machine.error(process, "E231", text, part.span, f"expected {_MAX_DURATION:g} s or less")
     if value <= 0:
-        raise machine.error(process, "E231", f"{what} {name} is not above 0", part.span, "expected more than 0")
+        raise machine.error(process, "E231", f"{quantity} {name} is not above 0", part.span, "expected more than 0")
     return value * machine.code.units.metres if part.op is Op.MVBLD else value
 
 

@@ -79,9 +79,9 @@ def _distance(p: Array, q: Array) -> float:
 
     Where a gripper stands is worked out through joints and frames some metres long, each of which rounds.
     """
-    apart = float(np.linalg.norm(p - q))
+    distance = float(np.linalg.norm(p - q))
     scale = max(1.0, float(np.abs(p).max()), float(np.abs(q).max()))
-    return apart if apart > _ROUNDING * scale else 0.0
+    return distance if distance > _ROUNDING * scale else 0.0
 
 
 def pose_from_numbers(numbers: Sequence[float], units: UnitSystem) -> Array:

@@ -259,7 +259,7 @@ def sample_stream(
     arm, ticks = cell_arm.arm, round(duration / period) + 1
     q = np.empty((ticks, arm.n))
     qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
-    tau, known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
+    tau, is_known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
     first, configuration = 0, cell_arm.start
     for run in segments:
         # A run that was stopped by an obstacle ends between two ticks.
@@ -268,8 +268,8 @@ def sample_stream(
         local = np.arange(end - begin) * period
         q[begin:end], qd[begin:end], qdd[begin:end] = (run.trajectory(local, order) for order in range(3))
         if run.tau is not None:
-            done = min(end - begin, len(run.tau))
-            tau[begin : begin + done], known[begin : begin + done] = run.tau[:done], True
+            count = min(end - begin, len(run.tau))
+            tau[begin : begin + count], is_known[begin : begin + count] = run.tau[:count], True
         first, configuration = end, run.trajectory(run.duration)
     q[first:] = configuration
     t: Array = np.arange(ticks, dtype=np.float64) * period
@@ -277,8 +277,8 @@ def sample_stream(
     for push in tool_wrenches:
         begin = round(push.t0 / period)
         wrench[begin:] = push.sample(max(ticks - begin, 0))
-    unknown = np.flatnonzero(~known)
-    tau[unknown] = _efforts(arm, (q[unknown], qd[unknown], qdd[unknown]), wrench[unknown])
+    missing = np.flatnonzero(~is_known)
+    tau[missing] = _efforts(arm, (q[missing], qd[missing], qdd[missing]), wrench[missing])
     return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
 
 

@@ -60,8 +60,8 @@ def frames_with_depth(tree: FrameTree, sort: Callable[[Iterable[str]], list[str]
         if not name.endswith(".BASE"):
             parent = node.parent
             children.setdefault(tree.parent(parent) or WORLD if parent.endswith(".BASE") else parent, []).append(name)
-    waiting = [(WORLD, 0)]
-    while waiting:
-        name, depth = waiting.pop()
+    stack = [(WORLD, 0)]
+    while stack:
+        name, depth = stack.pop()
         yield name, depth
-        waiting += [(child, depth + 1) for child in reversed(sort(children.get(name, ())))]
+        stack += [(child, depth + 1) for child in reversed(sort(children.get(name, ())))]

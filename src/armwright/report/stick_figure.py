@@ -15,7 +15,7 @@ _CHART_ROWS = 1500
 _THICK, _THIN = 0.045, 0.016
 
 
-def joints_of(arm: Arm) -> list[JointInfo]:
+def joint_infos(arm: Arm) -> list[JointInfo]:
     """Return the joints of an arm for the page."""
     return [
         JointInfo(
@@ -31,7 +31,7 @@ def joints_of(arm: Arm) -> list[JointInfo]:
     ]
 
 
-def sticks(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
+def stick_figure(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
     """Draw an arm along its Denavit-Hartenberg transforms: first along z, then along x, so that offsets are visible.
 
     Args:
@@ -39,7 +39,7 @@ def sticks(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
         poses: (M, n + 2, 4, 4) poses of its frames in the world, by ``link_poses``.
         grip: (M,) opening of the fingers, 0 to 1.
     """
-    points = skeleton_of(arm, poses)
+    points = skeleton_points(arm, poses)
     origins, z_axes = poses[:, : arm.n, :3, 3], poses[:, : arm.n, :3, 2]
     reach = arm.reach if math.isfinite(arm.reach) else float(np.ptp(poses[..., :3, 3], axis=(0, 1)).max())
     return ArmFigure(
@@ -51,10 +51,10 @@ def sticks(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
     )
 
 
-def skeleton_of(arm: Arm, poses: Array) -> Array:
-    """Return the corners (M, K, 3) of the figure, from the floor to the tool; arguments as of ``sticks``."""
+def skeleton_points(arm: Arm, poses: Array) -> Array:
+    """Return the corners (M, K, 3) of the figure, from the floor to the tool; arguments as of ``stick_figure``."""
     origins, z_axes = poses[:, :, :3, 3], poses[:, :, :3, 2]
-    points = [_foot(origins[:, 0]), origins[:, 0]]
+    points = [_floor_points(origins[:, 0]), origins[:, 0]]
     for i in range(1, arm.n + 1):
         before, after, z = origins[:, i - 1], origins[:, i], z_axes[:, i - 1]
         along = np.sum((after - before) * z, axis=-1, keepdims=True)
@@ -63,13 +63,13 @@ def skeleton_of(arm: Arm, poses: Array) -> Array:
     return np.stack(points, axis=1)
 
 
-def thinned(count: int, most: int = _CHART_ROWS) -> npt.NDArray[np.intp]:
+def thinned_rows(count: int, most: int = _CHART_ROWS) -> npt.NDArray[np.intp]:
     """Return the indices of the rows that a chart shows of this many, at most so many and the last."""
     stride = max(1, math.ceil(count / most))
     return np.unique(np.append(np.arange(0, count, stride), count - 1))
 
 
-def _foot(origin: Array) -> Array:
+def _floor_points(origin: Array) -> Array:
     """Return the point on the floor below a raised base, from which the figure is drawn."""
     foot = origin.copy()
     foot[:, 2] = np.minimum(origin[:, 2], 0.0)

@@ -5,7 +5,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.report.sticks import skeleton_of
+from armwright.report.stick_figure import skeleton_points
 from oracles.arms import random_configurations
 
 ROUNDING = 1e-12
@@ -17,7 +17,7 @@ def test_links_follow_the_axes(name: str, rng: np.random.Generator) -> None:
     arm = load_arm(name)
     poses = link_poses(arm, random_configurations(arm, rng, 20))
 
-    corners = skeleton_of(arm, poses)
+    corners = skeleton_points(arm, poses)
 
     for i in range(arm.n):
         z = poses[:, i, :3, 2]

@@ -21,7 +21,7 @@ from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Effect, Recording, RunStage, motion_csv_lines
 from armwright.report.page import COLLISIONS, run_page
-from armwright.report.run_data import page_of
+from armwright.report.run_data import run_page_data
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -32,7 +32,7 @@ MOTION_ROWS = 1_000_000
 
 
 @attrs.frozen(kw_only=True)
-class Origin:
+class RunInputs:
     """The inputs of a run.
 
     Attributes:
@@ -54,7 +54,7 @@ class Origin:
     text: str | None = None
 
 
-def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnostic], origin: Origin) -> None:
+def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs) -> None:
     """Write the files of a run and its record into a folder, all of them or none.
 
     Args:
@@ -67,12 +67,12 @@ def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnost
         OutputError: the folder or a file cannot be written.
     """
     program = {} if origin.text is None else {origin.program.name: origin.text}
-    files = {**program, **result_files(recording, diagnostics, origin)}
+    files = {**program, **run_files(recording, diagnostics, origin)}
     write_folder(folder, files, run_record(recording, diagnostics, origin))
 
 
-def result_files(
-    recording: Recording, diagnostics: Sequence[Diagnostic], origin: Origin
+def run_files(
+    recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs
 ) -> dict[str, str | Iterable[str]]:
     """Return the files of a run by name, identical for identical runs; those of a failed run end at the failure.
 
@@ -83,15 +83,15 @@ def result_files(
     """
     return {
         "motion.csv": motion_csv_lines(recording.streams, _written_ticks(recording, origin.motion_rows)),
-        "events.jsonl": _events(recording),
-        "frames.json": _json(frames(recording)),
+        "events.jsonl": _event_lines(recording),
+        "frames.json": _json(frame_data(recording)),
         "report.html": run_page(
-            page_of(recording, diagnostics, origin.command, left_out(recording, origin.motion_rows))
+            run_page_data(recording, diagnostics, origin.command, omission_notes(recording, origin.motion_rows))
         ),
     }
 
 
-def frames(recording: Recording) -> dict[str, Any]:
+def frame_data(recording: Recording) -> dict[str, Any]:
     """Return the final frame tree: the parent of each frame, and its poses relative to the world and the parent."""
     tree = recording.tree
     table = {}
@@ -103,14 +103,14 @@ def frames(recording: Recording) -> dict[str, Any]:
         table[name] = {
             "spelling": recording.code.spelled(name),
             "parent": parent,
-            "world": _numbers(to_noap(tree.world(name))) if known else None,
-            "relation": _numbers(to_noap(tree.relation(name, parent))) if known else None,
+            "world": _rounded_list(to_noap(tree.world(name))) if known else None,
+            "relation": _rounded_list(to_noap(tree.relation(name, parent))) if known else None,
         }
-    configurations = {name: _numbers(q) for name, q in recording.configurations.items()}
+    configurations = {name: _rounded_list(q) for name, q in recording.configurations.items()}
     return {"units": "m, rad", "pose": "columns n, o, a, p", "frames": table, "configurations": configurations}
 
 
-def ending(recording: Recording) -> dict[str, Any]:
+def ending_data(recording: Recording) -> dict[str, Any]:
     """Return the exit status of a run, and the error of a failed run with its location and time."""
     failure = recording.failure
     if failure is None:
@@ -127,7 +127,7 @@ def ending(recording: Recording) -> dict[str, Any]:
     return {"ended": "failed", "exit_status": int(RunError.exit_status), "error": error}
 
 
-def summary(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str = EVENT_LOG_HINT) -> dict[str, Any]:
+def summary_data(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str = EVENT_LOG_HINT) -> dict[str, Any]:
     """Return a summary of a run as plain data in SI units.
 
     Args:
@@ -146,10 +146,10 @@ def summary(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str =
             for e in _contacts(recording).join()
         ],
         "collisions": COLLISIONS,
-        "stages": [_stage(stage, recording) for stage in recording.stages],
+        "stages": [_stage_data(stage, recording) for stage in recording.stages],
         "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics],
     }
-    return {name: rounded(value) for name, value in data.items()}
+    return {name: round_numbers(value) for name, value in data.items()}
 
 
 def _contacts(recording: Recording) -> Excerpt[Effect]:
@@ -157,7 +157,7 @@ def _contacts(recording: Recording) -> Excerpt[Effect]:
     return excerpt([e for e in recording.effects if e.kind == "MOVE" and "contact" in e.data], MAX_LIST_ITEMS)
 
 
-def _stage(run: RunStage, recording: Recording) -> dict[str, Any]:
+def _stage_data(run: RunStage, recording: Recording) -> dict[str, Any]:
     arm = recording.cell.arms[run.arm].arm
     motion = run.motion
     return {
@@ -173,48 +173,48 @@ def _stage(run: RunStage, recording: Recording) -> dict[str, Any]:
         "deviation": run.stage.deviation,
         "certificate": None if run.stage.certificate is None else run.stage.certificate.as_data(),
         "slowed": run.stage.slowed,
-        "detour": _detour(run.stage),
-        "peak_speed": _numbers(motion.peaks(1)),
-        "peak_acceleration": _numbers(motion.peaks(2)),
-        "peak_effort": _numbers(run.peak_effort),
-        "speed_of_limit": _numbers(motion.peaks(1) / arm.limits.speed),
-        "effort_of_limit": _numbers(run.peak_effort / arm.limits.effort),
+        "detour": _detour_data(run.stage),
+        "peak_speed": _rounded_list(motion.peaks(1)),
+        "peak_acceleration": _rounded_list(motion.peaks(2)),
+        "peak_effort": _rounded_list(run.peak_effort),
+        "speed_of_limit": _rounded_list(motion.peaks(1) / arm.limits.speed),
+        "effort_of_limit": _rounded_list(run.peak_effort / arm.limits.effort),
     }
 
 
-def _detour(stage: PlannedStage) -> dict[str, Any] | None:
+def _detour_data(stage: PlannedStage) -> dict[str, Any] | None:
     """Return the obstacle of a straight line with the detour of the stage and its cost; None without an obstacle."""
     obstacle, detour = stage.obstacle, stage.detour
     if obstacle is None or detour is None:
         return None
     return {
         "method": detour.method,
-        "via": None if detour.via is None else _numbers(to_noap(detour.via)),
+        "via": None if detour.via is None else _rounded_list(to_noap(detour.via)),
         "obstacle": obstacle.reason,
         "cause": obstacle.cause,
         "joint": obstacle.joint,
         "fraction": obstacle.fraction,
         "along": obstacle.along,
         "line": obstacle.length,
-        "position": _numbers(obstacle.place),
+        "position": _rounded_list(obstacle.place),
         "position_deviation": detour.price.distance,
         "rotation_deviation": detour.price.rotation,
         "extra_time": detour.price.time,
     }
 
 
-def rounded(value: Any) -> Any:
+def round_numbers(value: Any) -> Any:
     """Return plain data with rounded numbers: a number of ticks times the period may be 6.7490000000000006."""
     if isinstance(value, float):
         return round(value, _DIGITS) + 0.0  # adding 0 turns -0 into 0
     if isinstance(value, Mapping):
-        return {name: rounded(item) for name, item in value.items()}
+        return {name: round_numbers(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [rounded(item) for item in value]
+        return [round_numbers(item) for item in value]
     return value
 
 
-def _events(recording: Recording) -> Iterator[str]:
+def _event_lines(recording: Recording) -> Iterator[str]:
     for effect in recording.effects:
         source = recording.code.source
         event = {
@@ -229,10 +229,10 @@ def _events(recording: Recording) -> Iterator[str]:
             "source": " ".join(source.slice(effect.span).split()),
             **effect.data,
         }
-        yield json.dumps(rounded(event), ensure_ascii=False) + "\n"
+        yield json.dumps(round_numbers(event), ensure_ascii=False) + "\n"
 
 
-def left_out(recording: Recording, most_rows: int) -> tuple[str, ...]:
+def omission_notes(recording: Recording, most_rows: int) -> tuple[str, ...]:
     """Return notes on what the files of a run omit because of their limits; empty where they are complete.
 
     Args:
@@ -261,7 +261,7 @@ def _written_ticks(recording: Recording, most_rows: int) -> slice:
     return slice(max(0, len(recording.streams[0].t) - ticks), None)
 
 
-def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: Origin) -> dict[str, Any]:
+def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs) -> dict[str, Any]:
     """Return the record of a run for ``run.json``: its end, inputs, options, omissions, and the summary.
 
     Args:
@@ -271,28 +271,28 @@ def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: 
     """
     arms = {name: arm.arm.name for name, arm in recording.cell.arms.items()}
     return {
-        **ending(recording),
+        **ending_data(recording),
         "command": origin.command,
         "inputs": {
-            "program": _file(origin.program, origin.text),
-            "cell": None if origin.cell is None else _file(origin.cell),
-            "imports": [_file(path) for path in origin.imports],
+            "program": _file_record(origin.program, origin.text),
+            "cell": None if origin.cell is None else _file_record(origin.cell),
+            "imports": [_file_record(path) for path in origin.imports],
             "arms": arms,
             "gravity_m_per_s2": recording.cell.gravity.tolist(),
         },
         "options": dict(origin.options),
-        "left_out": list(left_out(recording, origin.motion_rows)),
+        "left_out": list(omission_notes(recording, origin.motion_rows)),
         "versions": {"armwright": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        **summary(recording, diagnostics),
+        **summary_data(recording, diagnostics),
     }
 
 
-def _file(path: Path, text: str | None = None) -> dict[str, str | None]:
+def _file_record(path: Path, text: str | None = None) -> dict[str, str | None]:
     digest = hash_of_read_file(path) or sha256(path) if text is None else hashlib.sha256(text.encode()).hexdigest()
     return {"path": str(path), "sha256": digest}
 
 
-def _numbers(values: Array) -> list[float]:
+def _rounded_list(values: Array) -> list[float]:
     rounded: list[float] = (np.round(values, _DIGITS) + 0.0).tolist()  # adding 0 turns -0 into 0
     return rounded
 

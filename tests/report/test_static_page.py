@@ -7,7 +7,7 @@ import pytest
 from armwright.files.result_table import ResultTable
 from armwright.report.elements import table
 from armwright.report.figures import Drawing
-from armwright.report.plain_page import plain_page
+from armwright.report.static_page import static_page
 
 NASTY = '</td><script>bite()</script>"&'
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
@@ -19,7 +19,7 @@ def page(**changes: object) -> str:
         "command": "armwright iso9283 <x>",
         "tables": [ResultTable(title="Errors", heads=("error", "mm"), rows=[("j1.d", "+0.12")], numbers=(1,))],
     }
-    return plain_page(**{**told, **changes})
+    return static_page(**{**told, **changes})
 
 
 def cards(text: str) -> list[str]:

@@ -1,10 +1,14 @@
-"""Requests about what a program that stands still looks like: stacks, variables, expressions."""
+"""Requests of an editor: breakpoints, and what a stopped program looks like: stacks, variables, expressions."""
 
+import os
 import re
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
+from armwright.errors import ArmwrightError
 from armwright.program.debugger.dap_messages import Arguments, RequestError
-from armwright.program.debugger.dap_session import EditorSession
+from armwright.program.debugger.dap_session import CODE_SOURCE_REFERENCE, EditorSession
 from armwright.program.debugger.expressions import visible_names
 from armwright.program.debugger.history import ProcessPath
 from armwright.program.debugger.variables import ArrayElements, Variable
@@ -17,6 +21,88 @@ _MAX_ELEMENTS = 1000
 # What gives a variable or an element a value.
 _ASSIGNMENT = re.compile(r"([A-Za-z][\w-]*(?:\s*\[[^\[\]]*\])?)\s*=\s*(.+)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
+
+
+# ---- breakpoints -----------------------------------------------------------------------------------------------------
+
+
+def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``setBreakpoints``: those of a file, instead of all it had."""
+    source = arguments.get_object("source")
+    requests = arguments.get_objects("breakpoints")
+    for request in requests:
+        request.get(int, "line")
+    if session.launch is not None and not _is_debugged(session, source):
+        message = "this is not the program that is debugged"
+        return {"breakpoints": [{"id": next(session.ids), "verified": False, "message": message} for _ in requests]}
+    if session.debugger is not None:
+        session.debugger.execution.breakpoints.clear()
+    session.breakpoints = [(next(session.ids), request) for request in requests]
+    return {"breakpoints": [session.set_breakpoint(*request) for request in session.breakpoints]}
+
+
+def _is_debugged(session: EditorSession, source: Arguments) -> bool:
+    """Whether a text is that of the program, which lies in a file of its own or in a file of code."""
+    if session.loaded is not None and session.loaded.is_code_file:
+        return source.get(int, "sourceReference", 0) == CODE_SOURCE_REFERENCE
+    path = source.get(str, "path", "")
+    return bool(path) and session.launch is not None and _is_same_file(path, session.launch.program)
+
+
+def _is_same_file(path: str, program: Path) -> bool:
+    try:
+        return os.path.realpath(path) == os.path.realpath(program)
+    except ValueError:  # a zero byte
+        return False
+
+
+def breakpoint_locations(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``breakpointLocations``: where statements begin."""
+    first = arguments.get(int, "line")
+    offset = 1 - session.first_line
+    statements = session.launched_debugger.execution.statements
+    starts = statements.in_lines(first + offset, arguments.get(int, "endLine", first) + offset)
+    return {"breakpoints": [session.location(start.span) for start in starts]}
+
+
+def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``dataBreakpointInfo``: what of all that is shown can be watched."""
+    name = arguments.get(str, "name")
+    debugger = session.stopped_debugger
+    try:
+        if arguments.get(int, "variablesReference", 0):
+            group, _, _ = session.variables(arguments)
+            slot = _slot_named(group, name)
+        else:
+            slot = debugger.evaluate(name, *session.frame(arguments)).slot
+    except ArmwrightError as error:
+        return {"dataId": None, "description": str(error)}
+    if slot is None or debugger.machine.type_of(slot).sizes:
+        return {"dataId": None, "description": f"{name} is neither a frame nor a variable"}
+    spelled = debugger.code.spelled(slot)
+    return {"dataId": slot, "description": spelled, "accessTypes": ["write"], "canPersist": "'" not in slot}
+
+
+def set_data_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``setDataBreakpoints``: all frames and variables that are watched, instead of those before."""
+    debugger = session.launched_debugger
+    requests = arguments.get_objects("breakpoints")
+    for request in requests:
+        request.get(str, "dataId")
+    session.data_breakpoints = [(next(session.ids), request) for request in requests]
+    debugger.execution.watches.clear()
+    return {"breakpoints": [session.set_data_breakpoint(*request) for request in session.data_breakpoints]}
+
+
+def set_exception_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``setExceptionBreakpoints``: which errors to stop at."""
+    session.exception_filters = frozenset(map(str, arguments.get(list, "filters", [])))
+    if session.debugger is not None:
+        session.debugger.execution.exception_filters = session.exception_filters
+    return {}
+
+
+# ---- inspection ------------------------------------------------------------------------------------------------------
 
 
 def threads(session: EditorSession, _: Arguments) -> dict[str, Any]:
@@ -97,7 +183,7 @@ def set_variable(session: EditorSession, arguments: Arguments) -> dict[str, Any]
     """Answer ``setVariable``: give what is shown another value."""
     name, debugger = arguments.get(str, "name"), session.stopped_debugger
     group, path, level = session.variables(arguments)
-    slot = next((variable.slot for variable in group if variable.name == name), None)
+    slot = _slot_named(group, name)
     if slot is None:
         raise RequestError(f"{name} cannot be assigned a value")
     return _variable_body(session, debugger.assign(slot, arguments.get(str, "value"), path, level), path, level)
@@ -152,6 +238,11 @@ def exception_info(session: EditorSession, _: Arguments) -> dict[str, Any]:
 def source(session: EditorSession, _: Arguments) -> dict[str, Any]:
     """Answer ``source``: the text as it was when it was loaded."""
     return {"content": session.launched_debugger.code.source.text}
+
+
+def _slot_named(group: Iterable[Variable], name: str) -> str | None:
+    """Return where the variable of a name is kept; None where there is none, or it is kept nowhere."""
+    return next((variable.slot for variable in group if variable.name == name), None)
 
 
 def _add_reference(session: EditorSession, variable: Variable, path: ProcessPath, level: int) -> int:

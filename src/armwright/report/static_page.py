@@ -9,7 +9,7 @@ from armwright.report.markup import page_html
 from armwright.version import __version__
 
 
-def plain_page(
+def static_page(
     *,
     title: str,
     command: str,
