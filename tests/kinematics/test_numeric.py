@@ -50,6 +50,9 @@ def test_short_arms_find_their_configuration_again(joints: int, sample: Sample) 
     """With fewer than six joints, skew and of both kinds, the only configuration of a pose is found without a hint."""
     for rng in sample.cases(20):
         arm = random_arm(rng, joints)
+        # Four prismatic joints move the tool in three directions: every configuration of theirs is singular.
+        while sum(joint.kind == "prismatic" for joint in arm.joints) > 3:
+            arm = random_arm(rng, joints)
         for q in random_configurations(arm, rng, 5):
             solution = inverse(arm, forward(arm, q))
 
