@@ -48,6 +48,8 @@ _ROUNDS, _CLOSER, _PARTS = 12, 1.1, 8
 _SHORT = 64
 # Where the tool does stay on its path a joint may have to be this much faster yet: only there is the tool slowed.
 _TRACKED = 1.5
+# So many knots at most are followed one by one for what stops the arm; steps between them are halved where needed.
+_DIAGNOSED = 300
 # Revolutions; a limit passed by this part of one is not passed.
 _TURN, _NONE = 2 * np.pi, 1e-9
 
@@ -178,8 +180,9 @@ def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
 
 def _diagnosed(task: Task, knots: Array, obstruction: Obstruction) -> Tracking | Obstruction:
     """Follow the path in small steps: return what stops the arm there, or follow it once more where nothing does."""
+    sparse = np.append(knots[: -1 : -(-len(knots) // _DIAGNOSED)], knots[-1])
     diagnosis = diagnose_obstruction(
-        task.solver, task.motion(knots), knots, task.q_start, task.diagnosis, clock=task.clock
+        task.solver, task.motion(sparse), sparse, task.q_start, task.diagnosis, clock=task.clock
     )
     if diagnosis is None:
         return obstruction
