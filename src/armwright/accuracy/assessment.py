@@ -60,21 +60,16 @@ class Assessment:
     @property
     def notes(self) -> list[str]:
         """What a reader must know beside the numbers."""
-        notes = []
-        if self.planar:
-            names = [f"{test.kind} {test.name}" for test in self.tests if test.size == 2]
-            more = f" and {len(names) - _MAX_NAMED_TESTS} more" if len(names) > _MAX_NAMED_TESTS else ""
-            which = "all tests" if len(names) == len(self.tests) else f"{', '.join(names[:_MAX_NAMED_TESTS])}{more}"
-            notes.append(
-                f"planar reduction: {which} measured in a plane, without z; distances are computed in that plane"
-            )
-        if self.few:
-            notes.append(
-                "fewer cycles than ISO 9283 requires, where n or the note says so: such a measure is an estimate"
-            )
-        if self.exceeded:
-            notes.append(f"limit exceeded: {', '.join(sorted({measure.symbol for measure in self.exceeded}))}")
-        return notes
+        names = [f"{test.kind} {test.name}" for test in self.tests if test.size == 2]
+        more = f" and {len(names) - _MAX_NAMED_TESTS} more" if len(names) > _MAX_NAMED_TESTS else ""
+        which = "all tests" if len(names) == len(self.tests) else f"{', '.join(names[:_MAX_NAMED_TESTS])}{more}"
+        exceeded = ", ".join(sorted({measure.symbol for measure in self.exceeded}))
+        notes = {
+            f"planar reduction: {which} measured in a plane, without z; distances are computed in that plane": names,
+            "fewer cycles than ISO 9283 requires, where n or the note says so: such a measure is an estimate": self.few,
+            f"limit exceeded: {exceeded}": exceeded,
+        }
+        return [note for note, applies in notes.items() if applies]
 
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data in SI units; what is infinite is none."""
@@ -169,46 +164,39 @@ def _test_results(
     if test.kind in {"settling", "posing"}:
         radius = _repeatability_band(test, tests) if band is None else band
         return ((settling if test.kind == "settling" else posing_time)(test.runs, radius, few=few),)
-    assert test.commanded is not None  # noqa: S101 - no test of the others is read without
+    path, runs, speed = test.commanded, test.runs, test.speed
+    assert path is not None  # noqa: S101 - no test of the others is read without
     if test.kind == "cornering":
-        return corner_deviations(test.commanded, test.runs, band=band, few=few)
+        return corner_deviations(path, runs, band=band, few=few)
     if test.kind == "weaving":
-        return (weaving_deviation(test.commanded, test.runs, _commanded_speed(test), few=few),)
-    results: list[Result] = []
-    if test.kind != "velocity":
-        results.append(path_deviation(test.commanded, test.runs, corners=corners, kind=test.kind, few=few))
-    if test.speed is not None:
-        results.append(path_velocity(test.commanded, test.runs, test.speed, few=few))
-    return tuple(results)
+        assert speed is not None  # noqa: S101 - nor is one of weaving read without a speed
+        return (weaving_deviation(path, runs, speed, few=few),)
+    deviations = (
+        () if test.kind == "velocity" else (path_deviation(path, runs, corners=corners, kind=test.kind, few=few),)
+    )
+    return deviations if speed is None else (*deviations, path_velocity(path, runs, speed, few=few))
 
 
 def _pose_results(test: PoseTest, *, few: bool) -> tuple[Result, ...]:
-    clouds = test.clouds
-    first = clouds[0]
+    # Drift is over time; the clouds of other tests have none, and stay in the order of the file.
+    clouds = sorted(test.clouds, key=lambda cloud: cloud.t or 0.0)
     positions, angles = [cloud.positions for cloud in clouds], [cloud.angles for cloud in clouds]
+    first = test.clouds[0]
+    goal = first.commanded_angles
     if test.kind == "pose":
-        goal = {"angles": first.angles, "commanded_angles": first.commanded_angles}
         return (
-            pose_accuracy(first.positions, _commanded_position(first), **goal, few=few),
-            pose_repeatability(first.positions, angles=first.angles, few=few),
+            pose_accuracy(positions[0], _commanded(first), angles=angles[0], commanded_angles=goal, few=few),
+            pose_repeatability(positions[0], angles=angles[0], few=few),
         )
     if test.kind == "distance":
-        goals = [_commanded_position(cloud) for cloud in clouds]
-        commanded = (clouds[0].commanded_angles, clouds[1].commanded_angles)
+        both, goals = (angles[0], angles[1]), (goal, clouds[1].commanded_angles)
         return (
-            distance_accuracy(*positions, *goals, angles=(angles[0], angles[1]), commanded_angles=commanded, few=few),
-            distance_repeatability(*positions, angles=(angles[0], angles[1]), few=few),
+            distance_accuracy(*positions, *map(_commanded, clouds), angles=both, commanded_angles=goals, few=few),
+            distance_repeatability(*positions, angles=both, few=few),
         )
     if test.kind == "drift":
-        by_time = sorted(clouds, key=lambda cloud: cloud.t or 0.0)
-        drift = pose_drift(
-            [cloud.t or 0.0 for cloud in by_time],
-            [cloud.positions for cloud in by_time],
-            _commanded_position(first),
-            angles=[cloud.angles for cloud in by_time],
-            commanded_angles=first.commanded_angles,
-            few=few,
-        )
+        times = [cloud.t or 0.0 for cloud in clouds]
+        drift = pose_drift(times, positions, _commanded(first), angles=angles, commanded_angles=goal, few=few)
         return (drift,)
     if test.kind == "compliance":
         return tuple(_compliance(cloud, test.size, few=few) for cloud in clouds)
@@ -226,14 +214,9 @@ def _compliance(cloud: Cloud, size: int, *, few: bool) -> StaticCompliance:
     return static_compliance(cloud.loads, cloud.positions, direction, few=few)
 
 
-def _commanded_position(cloud: Cloud) -> Array:
+def _commanded(cloud: Cloud) -> Array:
     assert cloud.commanded is not None  # noqa: S101 - no such test is read without
     return cloud.commanded
-
-
-def _commanded_speed(test: PathTest) -> float:
-    assert test.speed is not None  # noqa: S101 - no such test is read without
-    return test.speed
 
 
 def _repeatability_band(test: PathTest, tests: Sequence[AnyTest]) -> float:

@@ -1,7 +1,7 @@
 """The numbers of ISO 9283, each with its symbol, its unit, its cycles and the limit it should keep."""
 
 from collections.abc import Callable, Iterator
-from typing import Any, TypeAlias
+from typing import Any, Protocol
 
 import attrs
 import numpy as np
@@ -27,22 +27,15 @@ _DISPLAY_UNITS = {
     "m/N": ("mm/N", 1e3),
     "": ("%", 100.0),
 }
-Result: TypeAlias = (
-    PoseAccuracy
-    | PoseRepeatability
-    | Variation
-    | PoseDrift
-    | DistanceAccuracy
-    | DistanceRepeatability
-    | Settling
-    | PosingTime
-    | PathDeviation
-    | PathVelocity
-    | CornerDeviation
-    | StaticCompliance
-    | WeavingDeviation
-)
 _AXES = "xyz"
+
+
+class Result(Protocol):
+    """What a function of this folder returns for a test."""
+
+    @property
+    def cycles(self) -> int:
+        """The smallest number of cycles that it was made of."""
 
 
 @attrs.frozen(kw_only=True)
@@ -138,24 +131,23 @@ def _angle_fields(test: AnyTest, symbol: str, what: str, values: Array, **more: 
         yield {"symbol": f"{symbol}_{angle}", "what": f"{what} about {angle}", "value": value, "unit": "rad", **more}
 
 
-def _pose_accuracy_fields(test: AnyTest, result: PoseAccuracy) -> Iterator[dict[str, Any]]:
+def _pose_accuracy_fields(test: PoseTest, result: PoseAccuracy) -> Iterator[dict[str, Any]]:
     yield {"symbol": "AP", "what": "pose accuracy", "value": result.position, "unit": "m"}
     yield from _axis_fields("AP", "pose accuracy", result.components)
     yield from _angle_fields(test, "AP", "pose accuracy", result.angles)
 
 
-def _pose_repeatability_fields(test: AnyTest, result: PoseRepeatability) -> Iterator[dict[str, Any]]:
+def _pose_repeatability_fields(test: PoseTest, result: PoseRepeatability) -> Iterator[dict[str, Any]]:
     yield {"symbol": "RP", "what": "pose repeatability", "value": result.radius, "unit": "m"}
     yield from _angle_fields(test, "RP", "pose repeatability", result.angles, either_way=True)
 
 
-def _variation_fields(test: AnyTest, result: Variation) -> Iterator[dict[str, Any]]:
+def _variation_fields(test: PoseTest, result: Variation) -> Iterator[dict[str, Any]]:
     symbol, what, required, parts = "vAP", "multi-directional variation", DIRECTIONS, "directions of approach"
     if test.kind == "exchangeability":
         symbol, what, required, parts = "E", "exchangeability", ROBOTS, "robots"
-    labels = [cloud.label for cloud in test.clouds] if isinstance(test, PoseTest) else []
     few = _shortage_note(len(result.barycentres), required, parts)
-    note = f"between {' and '.join(labels[i] for i in result.pair)}{few}"
+    note = f"between {' and '.join(test.clouds[i].label for i in result.pair)}{few}"
     yield {"symbol": symbol, "what": what, "value": result.position, "unit": "m", "note": note, "lacking": bool(few)}
     yield from _angle_fields(test, symbol, what, result.angles, lacking=bool(few))
 
@@ -242,7 +234,7 @@ def _compliance_fields(_test: AnyTest, result: StaticCompliance) -> Iterator[dic
     yield from _axis_fields("C", what, result.components, **more)
 
 
-_FIELDS_OF: dict[type, Callable[[AnyTest, Any], Iterator[dict[str, Any]]]] = {
+_FIELDS_OF: dict[type, Callable[[Any, Any], Iterator[dict[str, Any]]]] = {
     PoseAccuracy: _pose_accuracy_fields,
     PoseRepeatability: _pose_repeatability_fields,
     Variation: _variation_fields,

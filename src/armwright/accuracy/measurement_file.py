@@ -1,6 +1,7 @@
 """Tests out of tables: rows that belong together, what was commanded beside what was attained."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
@@ -130,45 +131,28 @@ def read_measurements(
     if not files:
         raise InvalidValueError("measurements: expected at least one file, got none")
     groups: dict[tuple[str, ...], list[Row]] = {}
+    parts, most = set[tuple[Any, ...]](), limit("entries")
     for table in read_tables(files, columns=columns, skip_incomplete=skip_incomplete):
         for row in table.rows():
             # A distance takes two poses.
-            name = "" if row.test == "distance" else row.name
-            groups.setdefault((row.test, name, row.word("condition")), []).append(row)
-    _refuse_too_many_parts(groups)
-    return tuple(_pose_test(rows) if rows[0].test in POSE_KINDS else _path_test(rows) for rows in groups.values())
-
-
-def _refuse_too_many_parts(groups: Mapping[tuple[str, ...], Sequence[Row]]) -> None:
-    """Refuse more tests, and poses, instants and runs in them, than a laboratory measures: each is an object.
-
-    Raises:
-        FileFormatError: there are more.
-    """
-    parts: set[tuple[Any, ...]] = set()
-    most = limit("entries")
-    for group, rows in groups.items():
-        for row in rows:
+            group = (row.test, "" if row.test == "distance" else row.name, row.word("condition"))
+            groups.setdefault(group, []).append(row)
+            # A laboratory measures fewer poses, instants and runs: each is an object.
             parts.add((group, _part_key(row) if row.test in POSE_KINDS else row.cycle))
             if len(parts) > most:
                 raise row.error("test", f"too many tests, and poses and runs in them: {limit_message('entries')}")
+    return tuple(_pose_test(rows) if rows[0].test in POSE_KINDS else _path_test(rows) for rows in groups.values())
 
 
 def _pose_test(rows: list[Row]) -> PoseTest:
-    _refuse_mixed_columns(rows)
-    first = rows[0]
+    first, clouds = rows[0], _attained_parts(rows, _part_key)
     commanded: dict[str, Row] = {}
     for row in (row for row in rows if row.cycle is None):
-        if row.name in commanded:
-            raise row.error("cycle", f"a second commanded pose, after the one in line {commanded[row.name].line}")
-        commanded[row.name] = row
-    clouds: dict[tuple[str, float | None], list[Row]] = {}
-    for row in (row for row in rows if row.cycle is not None):
-        clouds.setdefault(_part_key(row), []).append(row)
+        earlier = commanded.setdefault(row.name, row)
+        if earlier is not row:
+            raise row.error("cycle", f"a second commanded pose, after the one in line {earlier.line}")
     for cloud in clouds.values():
         _refuse_repeated_cycles(cloud)
-    if not clouds:
-        raise rows[0].error("cycle", "the test has commanded rows, but no attained ones")
     parts = tuple(_cloud(part, commanded) for part in clouds.values())
     names = list(dict.fromkeys(row.name for row in rows))
     if first.test == "distance":
@@ -180,6 +164,26 @@ def _pose_test(rows: list[Row]) -> PoseTest:
         clouds=parts,
         angle_names=first.angle_names,
     )
+
+
+def _attained_parts(rows: Sequence[Row], part_key: Callable[[Row], Any]) -> dict[Any, list[Row]]:
+    """Return the attained rows of a test by the part to which each belongs.
+
+    Raises:
+        FileFormatError: there are none, or some are in a plane and some in space, or have other angles.
+    """
+    first, *others = rows
+    for row in others:
+        if (len(row.position), row.angle_names) != (len(first.position), first.angle_names):
+            message = f"{first.path}:{first.line} has other coordinates or angles of the same {first.test} test"
+            raise row.error("x", message)
+    parts: dict[Any, list[Row]] = {}
+    for row in rows:
+        if row.cycle is not None:
+            parts.setdefault(part_key(row), []).append(row)
+    if not parts:
+        raise first.error("cycle", "the test has commanded rows, but no attained ones")
+    return parts
 
 
 def _part_key(row: Row) -> tuple[str, float | None]:
@@ -240,17 +244,10 @@ def _pair_cycles(rows: list[Row], clouds: tuple[Cloud, ...], names: list[str]) -
 
 
 def _path_test(rows: list[Row]) -> PathTest:
-    _refuse_mixed_columns(rows)
-    first = rows[0]
+    first, runs = rows[0], _attained_parts(rows, lambda row: row.cycle)
     path = [row for row in rows if row.cycle is None]
-    runs: dict[int, list[Row]] = {}
-    for row in rows:
-        if row.cycle is not None:
-            runs.setdefault(row.cycle, []).append(row)
-    if not runs:
-        raise rows[0].error("cycle", "the test has commanded rows, but no attained ones")
     if not path and first.test in _KINDS_WITH_COMMAND:
-        raise rows[0].error("cycle", f"{first.name} has no commanded path: expected rows with cycle commanded")
+        raise first.error("cycle", f"{first.name} has no commanded path: expected rows with cycle commanded")
     if path and first.test == "settling":
         raise path[0].error("cycle", "a settling test must not have a commanded row: its pose is the end of the run")
     commanded = _trace(path, timed=False) if path else None
@@ -260,9 +257,9 @@ def _path_test(rows: list[Row]) -> PathTest:
             _refuse_different_units(run[0], commanded.positions, trace.positions)
     speeds = {row.number("speed") for row in rows} - {None}
     if len(speeds) > 1:
-        raise rows[0].error("speed", f"{first.test} {first.name} has different commanded speeds")
+        raise first.error("speed", f"{first.test} {first.name} has different commanded speeds")
     if not speeds and first.test in {"velocity", "weaving"}:
-        raise rows[0].error("speed_mm_per_s", f"a test of {first.test} has the commanded speed in one of its rows")
+        raise first.error("speed_mm_per_s", f"a test of {first.test} has the commanded speed in one of its rows")
     return PathTest(
         kind=first.test,
         name=first.name,
@@ -297,12 +294,10 @@ def _times(rows: list[Row]) -> list[float] | None:
     """Return the times of a run; None where it has none."""
     if rows[0].number("t") is None:
         return None
-    times: list[float] = []
-    for row in rows:
-        t = row.number("t") or 0.0
-        if times and not t > times[-1]:
-            raise row.error("t_s", f"samples must be in order of time, but {t:g} s follows {times[-1]:g} s")
-        times.append(t)
+    times = [row.number("t") or 0.0 for row in rows]
+    for row, (before, t) in zip(rows[1:], pairwise(times), strict=True):
+        if not t > before:
+            raise row.error("t_s", f"samples must be in order of time, but {t:g} s follows {before:g} s")
     return times
 
 
@@ -310,13 +305,3 @@ def _refuse_different_units(row: Row, commanded: Array, attained: Array) -> None
     question = length_unit_question(commanded, attained)
     if question:
         raise row.error("cycle", question)
-
-
-def _refuse_mixed_columns(rows: Iterable[Row]) -> None:
-    """Refuse rows of one test of which some are in a plane and some in space, or have other angles."""
-    first, *others = rows
-    for row in others:
-        if (len(row.position), row.angle_names) != (len(first.position), first.angle_names):
-            raise row.error(
-                "x", f"{first.path}:{first.line} has other coordinates or angles of the same {first.test} test"
-            )
