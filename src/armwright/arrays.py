@@ -3,7 +3,7 @@
 import operator
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from decimal import Decimal
 from numbers import Real
@@ -169,6 +169,43 @@ def one_per_joint(q: ArrayLike, joints: int, what: str = "q") -> Array:
     if array.ndim != 1:
         raise ShapeError(f"{what}: expected shape ({joints},), got {array.shape}")
     return array
+
+
+def one_or_each(value: ArrayLike, count: int, what: str, of: str, largest: float = LARGEST) -> Array:
+    """Return ``count`` numbers (count,), one for each ``of``; a single number stands for all of them.
+
+    Raises:
+        KindError: the value is not real numbers.
+        ShapeError: it is neither one number nor (count,).
+        InvalidValueError: a number is NaN or larger than ``largest``.
+    """
+    array = floats(value, what, largest)
+    if array.shape not in ((), (count,)):
+        raise ShapeError(f"{what}: expected one number, or {count}, one per {of}, got shape {array.shape}")
+    return np.array(np.broadcast_to(array, (count,)))
+
+
+def broadcast_rows(title: str, *arrays: Array) -> list[Array]:
+    """Return arrays (..., k), each with its own k, broadcast to the same leading axes.
+
+    Raises:
+        ShapeError: the leading axes do not broadcast together; the message begins with ``title``.
+    """
+    lead = leading_axes(title, arrays, [array.shape[:-1] for array in arrays])
+    return [np.broadcast_to(array, (*lead, array.shape[-1])) for array in arrays]
+
+
+def leading_axes(title: str, arrays: Sequence[Array], leads: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
+    """Return the shape to which the leading axes ``leads`` of arrays broadcast.
+
+    Raises:
+        ShapeError: they do not broadcast together; the message begins with ``title`` and has the shapes of the arrays.
+    """
+    try:
+        return np.broadcast_shapes(*leads)
+    except ValueError as error:
+        got = ", ".join(str(array.shape) for array in arrays)
+        raise ShapeError(f"{title}: leading axes must broadcast together, got {got}") from error
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

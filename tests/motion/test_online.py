@@ -252,7 +252,7 @@ def test_from_beyond_a_limit_back() -> None:
         ({"jerk": 0}, InvalidValueError, "jerk: expected more than 0, got 0"),
         ({"jerk": 1e9}, InvalidValueError, r"jerk: joint 1 .* at most 7\.85e\+05 rad/s³, got 1e\+09"),
         ({"jerk": 1e-90}, OnlineError, "Ruckig found no motion .* check their units"),
-        ({"jerk": [1, 2]}, ShapeError, "jerk: expected 6 numbers"),
+        ({"jerk": [1, 2]}, ShapeError, "jerk: expected one number, or 6, one per joint"),
         ({"period": -1.0}, InvalidValueError, "period: expected more than 0 s, got -1"),
         ({"period": 0.01, "synchronised": False}, InvalidValueError, "synchronised=False: joints that arrive"),
         ({"arm": "puma560-seed"}, KindError, "arm: expected an Arm"),

@@ -7,7 +7,7 @@ from numba import njit
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline_online import begin, finish, push, xspline_kernel
+from armwright.motion.xspline_online import begin, finish, xspline_kernel
 from armwright.motion.xspline_path import xspline
 
 # Fused operations round once where plain ones round twice.
@@ -24,10 +24,11 @@ def test_segments_are_those_of_the_whole(rng: np.random.Generator) -> None:
     h, q = walk(rng, 20, 6)
     start, end = rng.normal(size=(2, 6))
     segments = []
+    push = xspline_kernel(6).function("push")
 
     state = begin(q[0], q[1], h[0], start)
     for knot, step in zip(q[2:], h[1:], strict=True):
-        state, segment = push(state, knot, step)
+        state, segment = push(state, knot, [step])
         segments.append(segment)
     segments.append(finish(state, end))
 
@@ -49,9 +50,9 @@ def test_two_knots(rng: np.random.Generator) -> None:
 def test_memory_is_constant(rng: np.random.Generator) -> None:
     """A planner of n joints is 3 n + 1 numbers, however many knots went through it."""
     h, q = walk(rng, 50, 4)
-    state = begin(q[0], q[1], h[0])
+    state, push = begin(q[0], q[1], h[0]), xspline_kernel(4).function("push")
     for knot, step in zip(q[2:], h[1:], strict=True):
-        state, _ = push(state, knot, step)
+        state, _ = push(state, knot, [step])
         assert state.shape == (13,)
 
 
@@ -77,18 +78,17 @@ def test_pushed_from_a_compiled_loop(joints: int, rng: np.random.Generator) -> N
 
 
 def test_compiled_from_python(rng: np.random.Generator) -> None:
-    """The function of the kernel is called like the plain one, for one planner or for rows of them."""
+    """The function of the kernel takes one planner or rows of them; the segment is that of a spline through all."""
     h, q = walk(rng, 3, 6)
-    fast = xspline_kernel(6).function("push")
+    push = xspline_kernel(6).function("push")
     states = np.stack([begin(q[0], q[1], step) for step in (0.1, 0.2, 0.3)])
 
-    after, segments = fast(states, q[2], [h[1]])
+    after, segments = push(states, q[2], [h[1]])
 
     for i, state in enumerate(states):
-        plain, segment = push(state, q[2], h[1])
-        np.testing.assert_allclose(after[i], plain, rtol=ROUNDING, atol=1e-12)
-        np.testing.assert_allclose(segments[i], segment, rtol=ROUNDING, atol=1e-9)
-        one, of_one = fast(state, q[2], [h[1]])
+        whole = xspline([0.0, state[-1], state[-1] + h[1]], q)
+        np.testing.assert_allclose(segments[i], whole.coefficients[0], rtol=ROUNDING, atol=1e-9)
+        one, of_one = push(state, q[2], [h[1]])
         np.testing.assert_array_equal(one, after[i])
         np.testing.assert_array_equal(of_one, segments[i])
 
@@ -108,21 +108,21 @@ def test_status_of_bad_knots() -> None:
 
 def test_bad_knots_are_refused() -> None:
     """Steps that do not rise, knots of other joints, planners that are none: each with what came."""
-    state = begin([0.0, 0.0], [1.0, 2.0], 0.1)
+    state, push = begin([0.0, 0.0], [1.0, 2.0], 0.1), xspline_kernel(2).function("push")
     with pytest.raises(InvalidValueError, match="step: expected more than 0 s, got 0"):
-        push(state, [1.0, 2.0], 0.0)
+        push(state, [1.0, 2.0], [0.0])
     with pytest.raises(InvalidValueError, match="step: expected more than 0 s, got nan"):
         begin([0.0], [1.0], np.nan)
-    with pytest.raises(ShapeError, match="knot: expected 2 numbers"):
-        push(state, [1.0, 2.0, 3.0], 0.1)
+    with pytest.raises(ShapeError, match="knot: expected"):
+        push(state, [1.0, 2.0, 3.0], [0.1])
     with pytest.raises(ShapeError, match=r"state: expected a planner, shape \(3 n \+ 1,\), got \(6,\)"):
-        push(state[:-1], [1.0, 2.0], 0.1)
+        finish(state[:-1])
     with pytest.raises(InvalidValueError, match="knot: every number must be finite, got nan"):
-        push(state, [1.0, np.nan], 0.1)
+        push(state, [1.0, np.nan], [0.1])
     with pytest.raises(InvalidValueError, match="the last step: expected more than 0 s, got -1"):
         finish(np.append(state[:-1], -1.0))
     with pytest.raises(InvalidValueError, match="step: expected more than 0 s, got -1"):
-        xspline_kernel(2).function("push")(state, [1.0, 2.0], [-1.0])
+        push(state, [1.0, 2.0], [-1.0])
     with pytest.raises(InvalidValueError, match="joints: expected an integer of at least 1, got 0"):
         xspline_kernel(0)
     with pytest.raises(KindError, match=r"joints: expected an integer, got 2\.5"):

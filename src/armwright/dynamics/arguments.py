@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions
-from armwright.arrays import LARGEST, Array, ArrayLike, joint_array, of_shape
-from armwright.errors import ShapeError, UnsupportedArmError
+from armwright.arrays import LARGEST, Array, ArrayLike, broadcast_rows, joint_array, of_shape
+from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import per_joint, stack
 from armwright.tracing.scalar import Scalar
 
@@ -51,19 +49,13 @@ def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> 
     checked: list[Array] = []
     for name, value in arrays.items():
         checked.append(positions(arm, value, callers=2) if name == "q" else joint_array(value, n, name))
-    outside = None if wrench is None else of_shape(wrench, (6,), "wrench", LARGEST)
-    everything = [*checked, *([] if outside is None else [outside])]
-    try:
-        lead = np.broadcast_shapes(*(array.shape[:-1] for array in everything))
-    except ValueError as error:
-        names = ", ".join([*arrays, *([] if outside is None else ["wrench"])])
-        shapes = ", ".join(str(array.shape) for array in everything)
-        raise ShapeError(f"{names}: leading axes must broadcast together, got {shapes}") from error
-    return Batch(
-        lead=lead,
-        scalars=[per_joint(np.broadcast_to(array, (*lead, arm.n))) for array in checked],
-        wrench=NO_WRENCH if outside is None else per_joint(np.broadcast_to(outside, (*lead, 6))),
-    )
+    names = [*arrays]
+    if wrench is not None:
+        checked.append(of_shape(wrench, (6,), "wrench", LARGEST))
+        names.append("wrench")
+    rows = broadcast_rows(", ".join(names), *checked)
+    scalars = [per_joint(row) for row in rows]
+    return Batch(rows[0].shape[:-1], scalars[: len(arrays)], NO_WRENCH if wrench is None else scalars[-1])
 
 
 def weighed(arm: Arm) -> Arm:

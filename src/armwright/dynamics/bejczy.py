@@ -14,13 +14,12 @@ import numpy as np
 
 from armwright.arm.model import STANDARD_GRAVITY, Arm
 from armwright.arm.positions import known_arm, positions
-from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.arrays import Array, ArrayLike, broadcast_rows, joint_array
 from armwright.dynamics.bodies import body_of, shifted
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import ShapeError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import per_joint, stack
-from armwright.kinematics.jacobians import together
 from armwright.tracing.scalar import Scalar, cos, sin
 
 _KINDS = [True, True, False, True, True, True]  # which joints of a Stanford arm are revolute
@@ -70,23 +69,9 @@ class Coefficients:
 
 
 PRINTED = Coefficients(
-    b1=1.423,
-    b2=2.51,
-    b3=-5.49,
-    b4=7.257,
-    b5=0.232,
-    slide=7.257,
-    b13=4.72,
-    b14=0.107,
-    b15=0.015,
-    b17=0.099,
-    b18=0.013,
-    b19=0.02,
-    b20=0.013,
-    k1=-2.788,
-    k2=7.257,
-    k3=0.116,
-)
+    b1=1.423, b2=2.51, b3=-5.49, b4=7.257, b5=0.232, slide=7.257, b13=4.72, b14=0.107, b15=0.015,
+    b17=0.099, b18=0.013, b19=0.02, b20=0.013, k1=-2.788, k2=7.257, k3=0.116,
+)  # fmt: skip
 
 
 def bejczy_inertias(c: Coefficients, q: Sequence[Scalar]) -> list[Scalar]:
@@ -152,7 +137,7 @@ def bejczy_efforts(
     Source:
         TR-83-008, appendix III; Bejczy (1974).
     """
-    configurations, accelerations = together(joint_array(q, 6), joint_array(qdd, 6, "qdd"), "q", "qdd")
+    configurations, accelerations = broadcast_rows("q, qdd", joint_array(q, 6), joint_array(qdd, 6, "qdd"))
     lead = configurations.shape[:-1]
     q_, qdd_ = per_joint(configurations), per_joint(accelerations)
     holding = bejczy_gravity(coefficients, q_, gravity)

@@ -7,9 +7,9 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import positions
-from armwright.arrays import LARGEST, Array, ArrayLike, number, of_shape, read_only, reduce_by_fields
+from armwright.arrays import LARGEST, Array, ArrayLike, broadcast_rows, number, of_shape, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError
-from armwright.kinematics.jacobians import Axes, jacobian, known_axes, together
+from armwright.kinematics.jacobians import Axes, jacobian, known_axes
 from armwright.kinematics.manipulability_index import scaled_rows
 
 
@@ -75,7 +75,7 @@ def damped_rates(
         raise InvalidValueError(
             f"damping: expected a singular value above 0, below which damping begins, got {damping}"
         )
-    q, twist = together(positions(arm, q), of_shape(twist, (6,), "twist", LARGEST), "q", "twist")
+    q, twist = broadcast_rows("q, twist", positions(arm, q), of_shape(twist, (6,), "twist", LARGEST))
     J = jacobian(arm, q, frame)
     weight = np.repeat((1.0, length), 3)
     U, sigma, Vt = np.linalg.svd(scaled_rows(J, length), full_matrices=False)

@@ -15,12 +15,12 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions
-from armwright.arrays import LARGEST, Array, ArrayLike, of_shape, read_only, reduce_by_fields
+from armwright.arrays import LARGEST, Array, ArrayLike, broadcast_rows, of_shape, read_only, reduce_by_fields
 from armwright.errors import ArmwrightError, UnsupportedArmError, one_of
 from armwright.kinematics.forward_kinematics import link_frames, per_joint, stack, tool_frame
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, rotation_about_z_then_y
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
-from armwright.kinematics.jacobians import Axes, known_axes, together
+from armwright.kinematics.jacobians import Axes, known_axes
 from armwright.kinematics.singularity_analysis import determinant_factors
 from armwright.tracing.scalar import Scalar, cos, select, sin
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, product, subtract, transpose
@@ -121,7 +121,7 @@ def differential_inverse(
     geometry = puma_geometry(arm, "differential inverse in closed form", "damped_rates")
     one_of("method", method, get_args(Method))
     known_axes(frame)
-    q, twist = together(positions(arm, q), of_shape(twist, (6,), "twist", LARGEST), "q", "twist")
+    q, twist = broadcast_rows("q, twist", positions(arm, q), of_shape(twist, (6,), "twist", LARGEST))
     lead = q.shape[:-1]
     joints, twists = per_joint(q), per_joint(twist)
     angles = geometry.angles(joints)

@@ -9,8 +9,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import positions
-from armwright.arrays import Array, ArrayLike, joint_array
-from armwright.errors import InvalidValueError, ShapeError, shown
+from armwright.arrays import Array, ArrayLike, broadcast_rows, joint_array
+from armwright.errors import InvalidValueError, shown
 from armwright.kinematics.forward_kinematics import link_frames, per_joint, stack, tool_frame
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, scale, subtract, transpose
@@ -130,7 +130,7 @@ def jacobian_rate(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -
         The Jacobian of Whitney (1972), differentiated; tool axes by d/dt (Rᵀ x) = Rᵀ (dx/dt - w × x).
     """
     known_axes(frame)
-    q, qd = together(positions(arm, q), joint_array(qd, arm.n, "qd"), "q", "qd")
+    q, qd = broadcast_rows("q, qd", positions(arm, q), joint_array(qd, arm.n, "qd"))
     scalars, rates = per_joint(q), per_joint(qd)
     columns = jacobian_rate_columns(arm, scalars, rates)
     if frame == "tool":
@@ -162,7 +162,7 @@ def tool_twist(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -> A
         InvalidValueError: a number is NaN or infinite, or ``frame`` is neither ``base`` nor ``tool``.
     """
     known_axes(frame)
-    q, qd = together(positions(arm, q), joint_array(qd, arm.n, "qd"), "q", "qd")
+    q, qd = broadcast_rows("q, qd", positions(arm, q), joint_array(qd, arm.n, "qd"))
     return np.asarray((jacobian(arm, q, frame) @ qd[..., None])[..., 0])
 
 
@@ -174,21 +174,6 @@ def known_axes(frame: str) -> None:
     """
     if not isinstance(frame, str) or frame not in {"base", "tool"}:
         raise InvalidValueError(f"frame: expected 'base' or 'tool', got {shown(frame)}")
-
-
-def together(a: Array, b: Array, name_a: str, name_b: str) -> tuple[Array, Array]:
-    """Return two arrays (..., k) and (..., l) with the same leading axes, repeated where one has fewer.
-
-    Raises:
-        ShapeError: the leading axes do not fit together.
-    """
-    try:
-        lead = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    except ValueError as error:
-        raise ShapeError(
-            f"{name_a}, {name_b}: leading axes must broadcast together, got shapes {a.shape} and {b.shape}"
-        ) from error
-    return np.broadcast_to(a, (*lead, a.shape[-1])), np.broadcast_to(b, (*lead, b.shape[-1]))
 
 
 def _tool_turned_back(arm: Arm, q: Sequence[Scalar]) -> Matrix:

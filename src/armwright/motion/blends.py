@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_or_each
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.motion.knots import NOWHERE, limit_per_joint, timed_points
 from armwright.motion.polynomials import evaluate, turning_times
@@ -202,10 +202,7 @@ def blend_plan(times: ArrayLike, points: ArrayLike, blend: ArrayLike, ends: Ends
     one_of("kind of ends", ends, ("rest", "running"))
     if t[0] != 0:
         raise InvalidValueError(f"blends: times must increase from 0, got {t[0]:g} s at point 1")
-    b = floats(blend, "blend", LARGEST)
-    if b.shape not in ((), t.shape):
-        raise ShapeError(f"blend: expected one number, or {len(t)}, one per point, got shape {b.shape}")
-    b = np.array(np.broadcast_to(b, t.shape))
+    b = one_or_each(blend, len(t), "blend", "point")
     centres = t.copy()
     if ends == "running":
         b[[0, -1]] = 0.0

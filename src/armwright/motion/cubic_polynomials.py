@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from armwright.arrays import LARGEST, ArrayLike, exact_shape, one_per_joint
-from armwright.motion.knots import check_duration, timed_points, two_ends
+from armwright.arrays import LARGEST, ArrayLike, exact_shape
+from armwright.motion.knots import check_duration, rate_or_rest, timed_points, two_ends
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.scalar import Scalar
 
@@ -41,12 +41,8 @@ def cubic(
     """
     duration = check_duration(duration)
     here, goal = two_ends(q_start, q_goal)
-    rates = [
-        np.zeros(len(here)) if rate is None else one_per_joint(rate, len(here), what)
-        for rate, what in ((start, "start"), (end, "end"))
-    ]
-    coefficients = np.stack(hermite(here, rates[0], goal, rates[1], duration))
-    return Trajectory(times=(0.0, duration), coefficients=coefficients[None])
+    first, last = rate_or_rest(start, len(here), "start"), rate_or_rest(end, len(here), "end")
+    return Trajectory(times=(0.0, duration), coefficients=np.stack(hermite(here, first, goal, last, duration))[None])
 
 
 def cubic_through(times: ArrayLike, points: ArrayLike, rates: ArrayLike | None = None) -> Trajectory:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, one_per_joint
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, one_or_each, one_per_joint
 from armwright.errors import InvalidValueError, ShapeError
 
 # A motion shorter than a billionth of a second is a slip of the unit; powers of its time would not be numbers [s].
@@ -85,13 +85,21 @@ def limit_per_joint(value: ArrayLike, joints: int, what: str) -> Array:
         ShapeError: it is neither one number nor (n,).
         InvalidValueError: a limit is NaN, 0 or below.
     """
-    values = floats(value, what, np.inf)
-    limits = np.full(joints, values) if values.ndim == 0 else values
-    if limits.shape != (joints,):
-        raise ShapeError(f"{what}: expected one number, or {joints}, one per joint, got shape {values.shape}")
+    limits = one_or_each(value, joints, what, "joint", np.inf)
     for j in np.flatnonzero(~(limits > 0)):
         raise InvalidValueError(f"{what}: expected more than 0, got {limits[j]:g} for joint {j + 1}")
     return limits
+
+
+def rate_or_rest(rate: ArrayLike | None, joints: int, what: str) -> Array:
+    """Return the joint rates (n,) at an end of a motion; 0 when they are left out.
+
+    Raises:
+        KindError: the rates are something else than real numbers.
+        ShapeError: they are not (n,).
+        InvalidValueError: a rate is NaN or infinite.
+    """
+    return np.zeros(joints) if rate is None else one_per_joint(rate, joints, what)
 
 
 def divided(times: Array, parts: npt.NDArray[np.intp]) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
-from armwright.arrays import Array, ArrayLike, floats, of_shape
+from armwright.arrays import Array, ArrayLike, floats, of_shape, one_or_each
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
 from armwright.kinematics.inverse_kinematics.candidates import typed_poses
 from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, mid_range
@@ -296,10 +296,7 @@ def _timing(times: ArrayLike, blend: ArrayLike | None, count: int) -> tuple[Arra
         raise ShapeError(f"times: expected {count}, one per pose, got shape {t.shape}")
     if blend is None:
         return t, np.full(count, _BLEND * max(float(np.diff(t).min()), 0.0))
-    b = floats(blend, "blend")
-    if b.shape not in ((), (count,)):
-        raise ShapeError(f"blend: expected one number, or {count}, one per pose, got shape {b.shape}")
-    return t, np.array(np.broadcast_to(b, (count,)))
+    return t, one_or_each(blend, count, "blend", "pose")
 
 
 def _tool_times(arm: Arm, X: Array) -> Array:

@@ -14,12 +14,13 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, not_negative, one_per_joint, positive
+from armwright.arrays import Array, ArrayLike, not_negative, one_or_each, one_per_joint, positive
 from armwright.errors import ArmwrightError, InvalidValueError
 from armwright.extras import import_extra
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.deviation import turning_positions
 from armwright.motion.efforts import checked
+from armwright.motion.knots import NOWHERE, rate_or_rest
 from armwright.motion.trajectory import Trajectory, hold, join
 
 # By default a joint has its full acceleration after this time [s].
@@ -34,8 +35,6 @@ _GAVE_UP = (
     "Ruckig found no motion to the new goal: a distance, a limit or a jerk differs from the others by orders of "
     "magnitude; check their units"
 )
-# A path of no joint farther than this, from rest, is none [rad] or [m].
-_NOWHERE = 1e-12
 
 
 class OnlineError(ArmwrightError, ValueError):
@@ -101,7 +100,7 @@ def retarget(
     start, goal = single_configuration(arm, q, "q"), single_configuration(arm, q_goal, "q_goal")
     n = arm.n
     qd, qdd = one_per_joint(qd, n, "qd"), one_per_joint(qdd, n, "qdd")
-    task = _Task(arm, start, qd, qdd, goal, np.zeros(n) if qd_goal is None else one_per_joint(qd_goal, n, "qd_goal"))
+    task = _Task(arm, start, qd, qdd, goal, rate_or_rest(qd_goal, n, "qd_goal"))
     _check_goal(task)
     jerk_limits = _jerk_limits(task, jerk, brake=brake)
     if not synchronised and (task.qd_goal.any() or period is not None):
@@ -111,7 +110,7 @@ def retarget(
         )
     if period is not None:
         period = positive(period, "period", "s")
-    if not (task.qd.any() or task.qdd.any() or task.qd_goal.any()) and np.abs(goal - start).max() <= _NOWHERE:
+    if not (task.qd.any() or task.qdd.any() or task.qd_goal.any()) and np.abs(goal - start).max() <= NOWHERE:
         return hold(start, 0.0)
     motion = _motion(task, *_phases(task, jerk_limits, synchronised=synchronised, period=period))
     _check_range(task, motion)
@@ -193,13 +192,12 @@ def _check_goal(task: _Task) -> None:
 
 def _jerk_limits(task: _Task, limits: ArrayLike | None, *, brake: bool) -> Array:
     """Return the largest jerks (n,) to plan with; refuse a state that they cannot keep inside the limits."""
-    arm, n = task.arm, task.arm.n
+    arm = task.arm
     speed, acceleration = arm.limits.speed, arm.limits.acceleration
     if limits is None:
         jerk = acceleration / JERK_TIME
     else:
-        jerks = floats(limits, "jerk", LARGEST)
-        jerk = np.full(n, jerks) if jerks.ndim == 0 else np.array(one_per_joint(jerks, n, "jerk"))
+        jerk = one_or_each(limits, arm.n, "jerk", "joint")
         if not (jerk > 0).all():
             raise InvalidValueError(f"jerk: expected more than 0, got {jerk.min():g}")
         for j in np.flatnonzero(jerk * _SHORTEST_RISE > acceleration).tolist():

@@ -21,11 +21,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_per_joint
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_or_each
+from armwright.errors import InvalidValueError
 from armwright.motion.continuity_report import continuity
 from armwright.motion.cubic_polynomials import hermite
-from armwright.motion.knots import divided, limit_per_joint, timed_points
+from armwright.motion.knots import divided, limit_per_joint, rate_or_rest, timed_points
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.scalar import Scalar
 
@@ -104,7 +104,7 @@ def xspline(
     """
     t, q = timed_points("X-spline", times, knots, "knots")
     joints = q.shape[1]
-    ends = _end_rate(start, joints, "start"), _end_rate(end, joints, "end")
+    ends = rate_or_rest(start, joints, "start"), rate_or_rest(end, joints, "end")
     h = np.diff(t)
     m = _rates(h, q, ends, *_parameters(h, a, b))
     return Trajectory(times=t, coefficients=np.stack(hermite(q[:-1], m[:-1], q[1:], m[1:], h[:, None]), axis=1))
@@ -163,29 +163,18 @@ def xspline_along(
     )
 
 
-def _end_rate(rate: ArrayLike | None, joints: int, what: str) -> Array:
-    return np.zeros(joints) if rate is None else one_per_joint(rate, joints, what)
-
-
 def _parameters(h: Array, a: ArrayLike | None, b: ArrayLike | None) -> tuple[Array, Array]:
     """Return a and b of every inner knot, (k-2,) each, with which there is one spline."""
     inner = len(h) - 1
-    given_b = np.zeros(inner) if b is None else _of_inner_knots(b, inner, "b")
-    given_a = usual_weight((h[:-1], h[1:]), given_b) if a is None else _of_inner_knots(a, inner, "a")
-    sums = np.abs(given_a) + np.abs(given_b)
+    weight_b = np.zeros(inner) if b is None else one_or_each(b, inner, "b", "inner knot")
+    weight_a = usual_weight((h[:-1], h[1:]), weight_b) if a is None else one_or_each(a, inner, "a", "inner knot")
+    sums = np.abs(weight_a) + np.abs(weight_b)
     for i in np.flatnonzero(sums >= 1):
         raise InvalidValueError(
             f"X-spline: |a| + |b| must be below 1 for the spline to exist and be unique, got {sums[i]:g} at knot "
-            f"{i + 1} (a = {given_a[i]:g}, b = {given_b[i]:g})"
+            f"{i + 1} (a = {weight_a[i]:g}, b = {weight_b[i]:g})"
         )
-    return np.asarray(given_a), given_b
-
-
-def _of_inner_knots(value: ArrayLike, inner: int, what: str) -> Array:
-    array = floats(value, what, LARGEST)
-    if array.shape not in ((), (inner,)):
-        raise ShapeError(f"{what}: expected one number, or {inner}, one per inner knot, got shape {array.shape}")
-    return np.array(np.broadcast_to(array, (inner,)))
+    return np.asarray(weight_a), weight_b
 
 
 def _rates(h: Array, q: Array, ends: tuple[Array, Array], a: Array, b: Array) -> Array:

@@ -9,11 +9,11 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, joint_array
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_or_each
 from armwright.dynamics.arguments import weighed
 from armwright.dynamics.newton_euler import dry_friction, newton_euler
 from armwright.dynamics.shares import gravity_shares
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError
 
 # Where the arm should be: (n,) positions at a time, or their derivative of an order 1 or 2. A trajectory is one.
 Reference: TypeAlias = Callable[[float, int], Array]
@@ -128,11 +128,7 @@ def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
 
 
 def _gains(arm: Arm, value: ArrayLike, name: str) -> Array:
-    n = known_arm(arm).n
-    values = floats(value, name, LARGEST)
-    gains = joint_array(np.broadcast_to(values, (n,)) if values.ndim == 0 else values, n, name)
-    if gains.ndim != 1:
-        raise ShapeError(f"{name}: expected one gain per joint, shape ({n},), got {gains.shape}")
+    gains = one_or_each(value, known_arm(arm).n, name, "joint")
     if (gains < 0).any():
         raise InvalidValueError(f"{name}: expected 0 or more for every joint, got {gains.tolist()}")
     return gains

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import LARGEST, Array, ArrayLike, cores, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, cores, floats, leading_axes
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.assignments import LARGEST_ANGLE
 from armwright.tracing.cache import compiled
@@ -181,11 +181,7 @@ class Kernel:
         leads = [x.shape[: x.ndim - len(shape)] for x, shape in zip(arrays, shapes.values(), strict=True)]
         if leads.count(leads[0]) == len(leads):
             return arrays, leads[0]
-        try:
-            return arrays, np.broadcast_shapes(*leads)
-        except ValueError as error:
-            got = ", ".join(str(array.shape) for array in arrays)
-            raise ShapeError(f"{title}: leading axes must broadcast together, got {got}") from error
+        return arrays, leading_axes(title, arrays, leads)
 
     def _results(self, lead: Shape, out: Any) -> list[Array]:
         """Return the arrays to fill: new ones, or the caller's where they are fit for it."""

@@ -8,8 +8,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions, single_configuration
-from armwright.arrays import Array, ArrayLike, Flags
-from armwright.errors import ShapeError
+from armwright.arrays import Array, ArrayLike, Flags, leading_axes
 from armwright.kinematics.forward_kinematics import per_joint, stack
 from armwright.kinematics.inverse_kinematics.branches import BRANCHES, Branches, branches, merged, single_branch
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, exact_pose, rank, typed_poses
@@ -110,12 +109,7 @@ def label(geometry: ClosedFormGeometry, signs: tuple[Sign, Sign, Sign], angles: 
 
 def _branches(arm: Arm, geometry: ClosedFormGeometry, X_BT: Array, near: Array) -> tuple[tuple[int, ...], Branches]:
     """Return the leading axes that poses (..., 4, 4) and joint positions (..., 6) share, and the branches."""
-    try:
-        lead = np.broadcast_shapes(X_BT.shape[:-2], near.shape[:-1])
-    except ValueError as error:
-        raise ShapeError(
-            f"pose, near: leading axes must broadcast together, got shapes {X_BT.shape} and {near.shape}"
-        ) from error
+    lead = leading_axes("pose, near", (X_BT, near), (X_BT.shape[:-2], near.shape[:-1]))
     X_BT, near = np.broadcast_to(X_BT, (*lead, 4, 4)), np.broadcast_to(near, (*lead, arm.n))
     R = [per_joint(X_BT[..., i, :3]) for i in range(3)]
     return lead, branches(arm, geometry, R, per_joint(X_BT[..., :3, 3]), per_joint(near))
