@@ -158,32 +158,15 @@ def passages(
         )
     common = np.flatnonzero(passed.all(axis=0))
     return planes_at(legs, stations[common]), [
-        _interpolate_passages(run, _select_passages([by_plane[i] for i in common], _arc_lengths(run)))
-        for by_plane, run in zip(candidates, runs, strict=True)
+        _select_passages(run, [by_plane[i] for i in common]) for by_plane, run in zip(candidates, runs, strict=True)
     ]
 
 
 def _corner_hint(legs: Legs, station: float) -> str:
     """Say how far the nearest corner is, if there is one."""
-    sharp = legs.stations[legs.corners]
-    if not len(sharp):
-        return ""
-    return (
-        f"; the nearest corner is {np.abs(sharp - station).min() * 1e3:.4g} mm away: exclude the sections near corners"
-    )
-
-
-def _interpolate_passages(run: Trace, samples: Array) -> Passages:
-    return Passages(
-        positions=_interpolate(run.positions, samples),
-        times=None if run.times is None else _interpolate(run.times, samples),
-        angles=_interpolate(unwrap_angles(run.angles, len(run.positions)), samples),
-    )
-
-
-def _arc_lengths(run: Trace) -> Array:
-    """Return the distance covered until every sample (n,) [m]."""
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.positions, axis=0), axis=1)))
+    distance = np.abs(legs.stations[legs.corners] - station).min(initial=np.inf) * 1e3
+    hint = f"; the nearest corner is {distance:.4g} mm away: exclude the sections near corners"
+    return hint if np.isfinite(distance) else ""
 
 
 def _candidates(legs: Legs, planes: Planes, run: Trace) -> list[tuple[Array, Array]]:
@@ -232,8 +215,10 @@ def _interpolate(values: Array, samples: Array) -> Array:
     return np.asarray((1 - part) * values[before] + part * values[before + 1])
 
 
-def _select_passages(candidates: list[tuple[Array, Array]], along: Array) -> Array:
-    """Return the sample of one passage per plane, those with the least sum of squares."""
+def _select_passages(run: Trace, candidates: list[tuple[Array, Array]]) -> Passages:
+    """Return one passage per plane, those with the least sum of squares."""
+    # The distance covered until every sample.
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.positions, axis=0), axis=1)))
     best, last, origins = np.zeros(1), np.zeros(1), []
     for samples, squares in candidates:
         s = _interpolate(along, samples)
@@ -245,4 +230,8 @@ def _select_passages(candidates: list[tuple[Array, Array]], along: Array) -> Arr
     for i in range(len(candidates) - 1, -1, -1):
         chosen[i] = candidates[i][0][k]
         k = int(origins[i][k])
-    return chosen
+    return Passages(
+        positions=_interpolate(run.positions, chosen),
+        times=None if run.times is None else _interpolate(run.times, chosen),
+        angles=_interpolate(unwrap_angles(run.angles, len(run.positions)), chosen),
+    )

@@ -27,8 +27,7 @@ def as_positions(value: ArrayLike, what: str = "positions") -> Array:
     array = floats(value, what, LARGEST)
     if array.ndim != 2 or array.shape[1] not in {2, 3} or not len(array):
         raise ShapeError(f"{what}: expected shape (n, 2) in a plane or (n, 3) in space, got {array.shape}")
-    array.setflags(write=False)
-    return array
+    return read_only(array)
 
 
 def as_position(value: ArrayLike, size: int, what: str = "commanded position") -> Array:
@@ -40,8 +39,7 @@ def as_position(value: ArrayLike, size: int, what: str = "commanded position") -
     array = floats(value, what, LARGEST)
     if array.shape != (size,):
         raise ShapeError(f"{what}: expected {size} numbers, as for the measured positions, got shape {array.shape}")
-    array.setflags(write=False)
-    return array
+    return read_only(array)
 
 
 def as_angles(value: ArrayLike | None, rows: int, what: str = "angles") -> Array:
@@ -53,8 +51,7 @@ def as_angles(value: ArrayLike | None, rows: int, what: str = "angles") -> Array
     array = np.empty((rows, 0)) if value is None else floats(value, what, LARGEST)
     if array.ndim != 2 or len(array) != rows or array.shape[1] > len(ANGLES):
         raise ShapeError(f"{what}: expected shape ({rows}, k) with k up to 3, one row per position, got {array.shape}")
-    array.setflags(write=False)
-    return array
+    return read_only(array)
 
 
 def as_commanded_angles(value: ArrayLike | None, count: int) -> Array:
@@ -63,12 +60,10 @@ def as_commanded_angles(value: ArrayLike | None, count: int) -> Array:
     Raises:
         ShapeError: they are not ``count``, the number of measured angles.
     """
-    array = np.empty(0) if value is None else floats(value, "commanded angles")
-    if array.shape != (count,):
-        raise ShapeError(
-            f"commanded angles: expected {count} numbers, as many as were measured, got shape {array.shape}"
-        )
-    return array
+    angles = np.empty(0) if value is None else floats(value, "commanded angles")
+    if angles.shape != (count,):
+        raise ShapeError(f"commanded angles: expected {count} numbers, as many as were measured, got {angles.shape}")
+    return angles
 
 
 def refuse_mixed_dimensions(parts: Sequence[Array], what: str) -> None:
@@ -86,27 +81,19 @@ def _trace_positions(value: ArrayLike) -> Array:
     return as_positions(value, "trace: positions")
 
 
-def _trace_angles(value: ArrayLike | None) -> Array | None:
-    if value is None:
-        return None
-    array = floats(value, "trace: angles", LARGEST)
-    array.setflags(write=False)
-    return array
+def _trace_angles(value: ArrayLike) -> Array:
+    return read_only(floats(value, "trace: angles", LARGEST))
 
 
-def _trace_times(value: ArrayLike | None) -> Array | None:
-    if value is None:
-        return None
-    array = floats(value, "trace: times", LARGEST)
-    if array.ndim != 1:
-        raise ShapeError(f"trace: times: expected shape (n,), got {array.shape}")
-    if not (np.diff(array) > 0).all():
-        wrong = int(np.argmax(np.diff(array) <= 0)) + 1
-        raise InvalidValueError(
-            f"trace: times: each must be later than the one before, got {array[wrong]:g} after {array[wrong - 1]:g}"
-        )
-    array.setflags(write=False)
-    return array
+def _trace_times(value: ArrayLike) -> Array:
+    t = floats(value, "trace: times", LARGEST)
+    if t.ndim != 1:
+        raise ShapeError(f"trace: times: expected shape (n,), got {t.shape}")
+    later = np.diff(t) > 0
+    if not later.all():
+        before, after = t[int(np.argmin(later)) :][:2]
+        raise InvalidValueError(f"trace: times: each must be later than the one before, got {after:g} after {before:g}")
+    return read_only(t)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -120,8 +107,8 @@ class Trace:
     """
 
     positions: Array = attrs.field(converter=_trace_positions)
-    times: Array | None = attrs.field(default=None, converter=_trace_times)
-    angles: Array | None = attrs.field(default=None, converter=_trace_angles)
+    times: Array | None = attrs.field(default=None, converter=attrs.converters.optional(_trace_times))
+    angles: Array | None = attrs.field(default=None, converter=attrs.converters.optional(_trace_angles))
 
     def __attrs_post_init__(self) -> None:
         """Refuse times and angles that do not have one row per sample."""
