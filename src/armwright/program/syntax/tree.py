@@ -1,0 +1,409 @@
+"""The syntax tree: what a program says, and where it says it."""
+
+from typing import TypeAlias
+
+import attrs
+
+from armwright.program.language.source import Span
+from armwright.program.syntax.nodes import (
+    ArmName,
+    Binary,
+    Expression,
+    Function,
+    Index,
+    Matrix,
+    Mobile,
+    Name,
+    Node,
+    Number,
+    Poison,
+    String,
+    Unary,
+    Variable,
+    dump,
+    operation_chain,
+    walk,
+)
+
+# What the nodes of values are called here too.
+__all__ = ["ArmName", "Binary", "Expression", "Function", "Index", "Matrix", "Mobile", "Name", "Node", "Number"]
+__all__ += ["Poison", "String", "Unary", "Variable", "dump", "operation_chain", "walk"]
+
+
+@attrs.frozen
+class Assign(Node):
+    """``variable = value``."""
+
+    target: Variable | ArmName
+    value: Expression
+
+
+@attrs.frozen
+class Affix(Node):
+    """``AFFIX child TO parent [AT step] [RIGIDLY]``; ``link`` reaches from AFFIX to the parent."""
+
+    link: Span
+    child: Mobile
+    parent: Mobile
+    at: Expression | None
+    rigid: bool = False
+
+
+@attrs.frozen
+class Unfix(Node):
+    """``UNFIX child FROM parent``; the parent is missing where it was left out."""
+
+    child: Mobile
+    parent: Mobile | None
+
+
+FrameStatement: TypeAlias = Assign | Affix | Unfix
+
+
+@attrs.frozen
+class Open(Node):
+    """``OPEN arm [TO width]``."""
+
+    arm: Mobile
+    width: Expression | None = None
+
+
+@attrs.frozen
+class Grasp(Node):
+    """``GRASP [arm]``."""
+
+    arm: Mobile | None
+
+
+@attrs.frozen
+class Operate(Node):
+    """``OPERATE device [ON | OFF]``."""
+
+    device: Mobile
+    on: bool = True
+
+
+@attrs.frozen
+class ReadVisions(Node):
+    """``READ VISIONS (frame, frame)``."""
+
+    targets: tuple[Mobile, ...]
+
+
+@attrs.frozen
+class ReadSystem(Node):
+    """``READ SYSTEM (arm)``."""
+
+    arm: Mobile
+
+
+DeviceStatement: TypeAlias = Open | Grasp | Operate | ReadVisions | ReadSystem
+
+
+@attrs.frozen
+class Directly(Node):
+    """The shortest path for the joints."""
+
+
+@attrs.frozen
+class Straightly(Node):
+    """One straight line."""
+
+
+@attrs.frozen
+class Via(Node):
+    """``VIA (points)``."""
+
+    points: tuple[Expression, ...]
+
+
+@attrs.frozen
+class Approach(Node):
+    """``WITH APPROACH = point``."""
+
+    point: Expression
+
+
+@attrs.frozen
+class Departure(Node):
+    """``WITH DEPARTURE = point``."""
+
+    point: Expression
+
+
+@attrs.frozen
+class Speed(Node):
+    """``WITH SPEED = value``."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Blend(Node):
+    """``WITH BLEND = distance``: how far from a via point its corner may be rounded."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Duration(Node):
+    """``WITH DURATION = seconds``."""
+
+    value: Expression
+
+
+@attrs.frozen
+class On(Node):
+    """``ON condition DO action``; ``head`` reaches from ON to the end of the condition."""
+
+    head: Span
+    condition: Expression
+    action: "Statement"
+
+
+Clause: TypeAlias = Directly | Straightly | Via | Approach | Departure | Speed | Blend | Duration | On
+
+
+def clause_word(kind: type) -> str:
+    """Return the word by which the clauses of a kind begin, behind WITH."""
+    return kind.__name__.upper()
+
+
+@attrs.frozen
+class Move(Node):
+    """``MOVE moved TO goal clauses``."""
+
+    moved: Mobile
+    goal: Expression
+    clauses: tuple[Clause, ...]
+
+
+@attrs.frozen
+class Block(Node):
+    """``BEGIN statements END``; ``end`` is its END."""
+
+    statements: tuple["Statement", ...]
+    end: Span
+
+
+@attrs.frozen
+class If(Node):
+    """``IF condition THEN statement [ELSE statement]``; ``head`` reaches up to THEN."""
+
+    head: Span
+    condition: Expression
+    then: "Statement"
+    otherwise: "Statement | None"
+
+    @property
+    def else_if_chain(self) -> tuple[list["If"], "Statement | None"]:
+        """This IF and all that follow it with ELSE IF, and the statement behind the last ELSE."""
+        conditionals, last = [self], self.otherwise
+        while isinstance(last, If):
+            conditionals.append(last)
+            last = last.otherwise
+        return conditionals, last
+
+    @property
+    def statements(self) -> "tuple[Statement, ...]":
+        """The statements of its chain of which one is done."""
+        conditionals, last = self.else_if_chain
+        return (*(conditional.then for conditional in conditionals), *(() if last is None else (last,)))
+
+
+@attrs.frozen
+class While(Node):
+    """``WHILE condition DO statement``; ``head`` reaches up to DO."""
+
+    head: Span
+    condition: Expression
+    body: "Statement"
+
+
+@attrs.frozen
+class Repeat(Node):
+    """``REPEAT statements UNTIL condition``; ``tail`` reaches from UNTIL to the end."""
+
+    body: tuple["Statement", ...]
+    tail: Span
+    condition: Expression
+
+
+@attrs.frozen
+class For(Node):
+    """``FOR variable = first TO last [STEP step] DO statement``; ``head`` reaches up to DO."""
+
+    head: Span
+    variable: Name | Poison
+    first: Expression
+    last: Expression
+    step: Expression | None
+    body: "Statement"
+
+
+@attrs.frozen
+class Branch(Node):
+    """``[PRIORITY number :] BEGIN ... END``; ``head`` is its first line's words up to BEGIN."""
+
+    head: Span
+    priority: Number | None
+    body: Block
+
+
+@attrs.frozen
+class Cobegin(Node):
+    """``COBEGIN branches COEND``; ``end`` is its COEND."""
+
+    branches: tuple[Branch, ...]
+    end: Span
+
+
+@attrs.frozen
+class Signal(Node):
+    """``SIGNAL event``."""
+
+    event: Variable
+
+
+@attrs.frozen
+class Wait(Node):
+    """``WAIT event``."""
+
+    event: Variable
+
+
+@attrs.frozen
+class Pause(Node):
+    """``PAUSE seconds``."""
+
+    duration: Expression
+
+
+@attrs.frozen
+class Lock(Node):
+    """``LOCK (variables) DO statement``; ``head`` reaches up to DO."""
+
+    head: Span
+    targets: tuple[Variable, ...]
+    body: "Statement"
+
+
+@attrs.frozen
+class Try(Node):
+    """``TRY statements RECOVER statements END``; ``recover`` and ``end`` are its words, or where they are missing."""
+
+    body: tuple["Statement", ...]
+    recover: Span
+    recovery: tuple["Statement", ...]
+    end: Span
+
+
+@attrs.frozen
+class Retry(Node):
+    """``RETRY``."""
+
+
+@attrs.frozen
+class Halt(Node):
+    """``HALT``."""
+
+
+@attrs.frozen
+class Call(Node):
+    """``name (arguments)``."""
+
+    name: Name
+    arguments: tuple[Expression, ...]
+
+
+ControlStatement: TypeAlias = (
+    Block | If | While | Repeat | For | Cobegin | Signal | Wait | Pause | Lock | Try | Retry | Halt | Call
+)
+
+
+@attrs.frozen
+class Print(Node):
+    """``PRINT (values and strings)``."""
+
+    items: tuple[Expression | String, ...]
+
+
+Statement: TypeAlias = FrameStatement | DeviceStatement | Move | ControlStatement | Print | Poison
+
+
+@attrs.frozen
+class TypeName(Node):
+    """The type of a declaration.
+
+    Attributes:
+        span: where it stands.
+        text: as written.
+        key: SCALAR, TRANS, FRAME or EVENT; None when it is none of them.
+        sizes: of an array, one for each index; empty for a single thing.
+    """
+
+    text: str
+    key: str | None
+    sizes: tuple[Number, ...] = ()
+
+
+@attrs.frozen
+class Declaration(Node):
+    """``a, b : TYPE``, in a VAR part or as a parameter."""
+
+    names: tuple[Name, ...]
+    type: TypeName
+
+
+@attrs.frozen
+class Import(Node):
+    """``IMPORT "file"``."""
+
+    path: String
+
+
+@attrs.frozen
+class Units(Node):
+    """``UNITS unit, unit``."""
+
+    units: tuple[Name, ...]
+
+
+@attrs.frozen
+class Procedure(Node):
+    """``PROCEDURE name (parameters) ; VAR ... BEGIN ... END``; ``head`` reaches up to the closing parenthesis."""
+
+    head: Span
+    name: Name
+    parameters: tuple[Declaration, ...]
+    declarations: tuple[Declaration, ...]
+    body: Block
+
+
+Header: TypeAlias = Declaration | Import | Units | Procedure
+
+
+@attrs.frozen
+class Program(Node):
+    """A whole program.
+
+    Attributes:
+        span: from the first token to the last.
+        headers: declarations, imports, units and procedures, in the order of the text.
+        statements: in order.
+        end: the closing END.
+    """
+
+    headers: tuple[Header, ...]
+    statements: tuple[Statement, ...]
+    end: Span
+
+    @property
+    def declarations(self) -> tuple[Declaration, ...]:
+        """The declarations of the VAR parts."""
+        return tuple(header for header in self.headers if isinstance(header, Declaration))
+
+    @property
+    def procedures(self) -> tuple[Procedure, ...]:
+        """The procedures."""
+        return tuple(header for header in self.headers if isinstance(header, Procedure))
