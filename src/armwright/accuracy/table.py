@@ -171,19 +171,14 @@ def read_tables(
 
 def _read_table(header: Header, *, skip_incomplete: bool) -> Table:
     name, nominal = _name_column(header), header.columns_present(f"{name}_nominal" for name in (*_COORDINATES, *ANGLES))
-    identifiers = header.columns_present(("test", "cycle"))
     header.require(("x", "y") if nominal else ("test", "cycle", "x", "y"))
     measured = header.columns_present((*_COORDINATES, *ANGLES))
     if nominal:
-        header.require(
-            (f"{name}_nominal" for name in measured), "either all measured columns have nominal columns, or none has"
-        )
+        because = "either all measured columns have nominal columns, or none has"
+        header.require((f"{name}_nominal" for name in measured), because)
         header.require((name.removesuffix("_nominal") for name in nominal), "it is nominal")
-    columns = header.rows(
-        filled=(*identifiers, name, *measured, *nominal),
-        required=_required_cells(),
-        skip_incomplete=skip_incomplete,
-    )
+    filled = (*header.columns_present(("test", "cycle")), name, *measured, *nominal)
+    columns = header.rows(filled=filled, required=_required_cells(), skip_incomplete=skip_incomplete)
     for row in range(len(columns)) if "test" in columns else ():
         columns.choice("test", row, tuple(_KINDS))
     return Table(
@@ -223,9 +218,8 @@ def _name_column(header: Header) -> str:
     name = header.either_column("pose", "path")
     nominal = header.columns_present(f"{name}_nominal" for name in _COORDINATES)
     if name == "path" and nominal:
-        raise header.error(
-            nominal[0], f"only poses have nominal columns; a path is commanded by rows of cycle {COMMANDED}"
-        )
+        message = f"only poses have nominal columns; a path is commanded by rows of cycle {COMMANDED}"
+        raise header.error(nominal[0], message)
     return name
 
 

@@ -256,43 +256,25 @@ def _replace(folder: Path, new: Path, names: list[str], left: Mapping[str, str])
     if not folder.exists():
         new.replace(folder)
         return
-    with _lock_folder(folder):
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with contextlib.suppress(OSError):  # no other process moves results into the folder meanwhile
+            fcntl.flock(handle, fcntl.LOCK_EX)
         named = recorded_hashes(folder)
-        _refuse_what_cannot_be_replaced(folder, names)
-        _refuse_what_others_made(folder, names, {*named, *left})
         # What somebody has changed since is theirs.
         gone = {
             name
             for name, digest in (*named.items(), *left.items())
             if name not in names and _RESULT_NAMES.fullmatch(name) and sha256(folder / name) == digest
         }
-        _refuse_sources(folder, {*names, *gone})
+        _refuse_to_replace(folder, names, gone, {*named, *left})
         kept = new.with_name(BACKUP)
         kept.mkdir()
         exchange_files(folder, new, kept, names, gone)
-        _sync_folder(folder)
-
-
-@contextlib.contextmanager
-def _lock_folder(folder: Path) -> Iterator[None]:
-    """Let no other process move results into a folder meanwhile."""
-    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        with contextlib.suppress(OSError):
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
+        with contextlib.suppress(OSError):  # the moves outlive a power cut
+            os.fsync(handle)
     finally:
-        os.close(lock)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Let the moves outlive a power cut."""
-    with contextlib.suppress(OSError):
-        place = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(place)
-        finally:
-            os.close(place)
+        os.close(handle)
 
 
 def _read_record(folder: Path) -> dict[str, Any] | None:
@@ -366,33 +348,29 @@ def _remove_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _refuse_what_cannot_be_replaced(folder: Path, files: Iterable[str]) -> None:
-    """Fail before the first file is moved in, not between two."""
-    if not folder.is_dir():
-        raise NotADirectoryError(0, "it is a file; expected a folder")
+def _refuse_to_replace(folder: Path, names: Collection[str], gone: Collection[str], known: Collection[str]) -> None:
+    """Fail before the first file is moved in, not between two.
+
+    Args:
+        folder: of the results.
+        names: of the files that are moved in.
+        gone: names of files that are taken away.
+        known: names of files that a run has written.
+
+    Raises:
+        OSError: the folder cannot be written to; it has a folder of such a name, a file of the user's, or one that was
+            read for the results.
+    """
     if not os.access(folder, os.W_OK):
         raise PermissionError(0, "permission denied")
-    for name in files:
+    ours = {*known, RECORD} if _read_record(folder) is not None else known
+    for name in names:
         if (folder / name).is_dir():
             raise IsADirectoryError(0, f"it contains a folder '{name}'")
-
-
-def _refuse_what_others_made(folder: Path, files: Iterable[str], known: Collection[str]) -> None:
-    """Fail where a file of the user's, which no run has written, has the name of one of the results."""
-    ours = {*known, RECORD} if _read_record(folder) is not None else known
-    for name in files:
         if name not in ours and os.path.lexists(folder / name):
-            raise FileExistsError(
-                errno.EEXIST,
-                f"it contains '{name}', which is not a result of armwright and would be overwritten: move it, or "
-                "name another folder",
-            )
-
-
-def _refuse_sources(folder: Path, names: Iterable[str]) -> None:
-    """Fail where a file that was read for the results would give way to them."""
-    for name in sorted(names):
+            why = "is not a result of armwright and would be overwritten: move it, or name another folder"
+            raise FileExistsError(errno.EEXIST, f"it contains '{name}', which {why}")
+    for name in sorted({*names, *gone}):
         if is_source(folder / name):
-            raise FileExistsError(
-                errno.EEXIST, f"it contains the input '{name}', which would be overwritten: name another folder"
-            )
+            why = "which would be overwritten: name another folder"
+            raise FileExistsError(errno.EEXIST, f"it contains the input '{name}', {why}")

@@ -62,41 +62,25 @@ def read_rows(path: Path | str) -> CsvTable:
             asked for, that a row is no CSV or not as wide as the head, or that there are more than the limit.
     """
     path = Path(path)
-    lines = read_lines(path)
-    skipped = 0
-    for text in lines:
-        if text.strip(_BLANKS_AND_SEPARATORS):
-            break
-        skipped += 1
-    else:
-        raise _empty_file_error(path)
+    lines = enumerate(read_lines(path))
+    skipped, text = next(((i, text) for i, text in lines if text.strip(_BLANKS_AND_SEPARATORS)), (0, ""))
     # Most columns win: the name of a column may have a sign in it that separates cells elsewhere.
     begin = text[: csv.field_size_limit()]
     separator = max(_SEPARATORS, key=lambda sign: len(next(csv.reader([begin], delimiter=sign))))
-    cells = _nonempty_rows(path, itertools.chain([text], lines), separator, skipped)
+    cells = _nonempty_rows(path, itertools.chain([text], (text for _, text in lines)), separator, skipped)
     head = next(cells, None)
     if head is None:
-        raise _empty_file_error(path)
-    if len(head.cells) > limit("table_columns"):
-        raise FileFormatError(
-            path, head.line, "", f"too many columns: {limit_message('table_columns', len(head.cells))}"
-        )
+        raise FileFormatError(path, None, "", "the file is empty; expected column names in its first line")
+    count = len(head.cells)
+    if count > limit("table_columns"):
+        raise FileFormatError(path, head.line, "", f"too many columns: {limit_message('table_columns', count)}")
     first = next(cells, None)
     if first is None:
         raise FileFormatError(path, None, "", "no rows after the column names")
-    rows = _check_widths(path, head, itertools.chain([first], cells), separator)
     # Some programs write a separator after the last cell, too.
-    names = CsvRow(head.line, head.cells[: _column_count(head)])
-    return CsvTable(names, rows, separator)
-
-
-def _column_count(head: CsvRow) -> int:
-    """Return the number of columns up to the last that has a name."""
-    return max(i for i, name in enumerate(head.cells, 1) if name)
-
-
-def _empty_file_error(path: Path) -> FileFormatError:
-    return FileFormatError(path, None, "", "the file is empty; expected column names in its first line")
+    width = max(i for i, name in enumerate(head.cells, 1) if name)
+    rows = _check_widths(path, head, width, itertools.chain([first], cells), separator)
+    return CsvTable(CsvRow(head.line, head.cells[:width]), rows, separator)
 
 
 def _nonempty_rows(path: Path, lines: Iterable[str], separator: str, skipped: int) -> Iterator[CsvRow]:
@@ -107,33 +91,26 @@ def _nonempty_rows(path: Path, lines: Iterable[str], separator: str, skipped: in
         for row in reader:
             cells = tuple(cell.strip() for cell in row)
             if any(cells):
+                line = skipped + reader.line_num
                 if count > most:
-                    raise FileFormatError(
-                        path, skipped + reader.line_num, "", f"too many rows: {limit_message('table_rows')}"
-                    )
+                    raise FileFormatError(path, line, "", f"too many rows: {limit_message('table_rows')}")
                 count += 1
-                yield CsvRow(skipped + reader.line_num, cells)
+                yield CsvRow(line, cells)
     except csv.Error as error:
         raise FileFormatError(path, skipped + reader.line_num, "", f"not valid CSV: {error}") from error
 
 
-def _check_widths(path: Path, head: CsvRow, rows: Iterable[CsvRow], separator: str) -> Iterator[CsvRow]:
+def _check_widths(path: Path, head: CsvRow, width: int, rows: Iterable[CsvRow], separator: str) -> Iterator[CsvRow]:
     """Give the rows, each with as many cells as there are columns, without empty cells under empty names at the end.
 
     Raises:
         FileFormatError: a row is longer or shorter, or has a value under an empty name at the end.
     """
-    width = _column_count(head)
     for row in rows:
-        if len(row.cells) != len(head.cells):
-            decimal = separator == "," and len(row.cells) > len(head.cells)
-            hint = "; does a number contain a comma?" if decimal else ""
-            raise FileFormatError(
-                path,
-                row.line,
-                "",
-                f"expected {width} values, one per column, got {len(row.cells)}{hint}",
-            )
+        count = len(row.cells)
+        if count != len(head.cells):
+            hint = "; does a number contain a comma?" if separator == "," and count > len(head.cells) else ""
+            raise FileFormatError(path, row.line, "", f"expected {width} values, one per column, got {count}{hint}")
         if any(row.cells[width:]):
             message = f"the last column has no name, but a value in line {row.line}"
             raise FileFormatError(path, head.line, "''", message)
@@ -163,9 +140,8 @@ class NumberFormat:
             raise FileFormatError(self._path, line, header, f"expected a number, got {shown(text)}{hint}")
         if not abs(value) <= LARGEST:
             got = text if len(text) < _MAX_SHOWN_LENGTH else f"{value:g}"
-            raise FileFormatError(
-                self._path, line, header, f"every number must be finite and no larger than {LARGEST:g}, got {got}"
-            )
+            message = f"every number must be finite and no larger than {LARGEST:g}, got {got}"
+            raise FileFormatError(self._path, line, header, message)
         return value
 
     def _with_point(self, line: int, header: str, text: str) -> str:
@@ -178,14 +154,9 @@ class NumberFormat:
         if not self._mark:
             self._mark, self._line = mark, line
         if mark != self._mark:
-            expected = "point" if mark == "," else "comma"
-            raise FileFormatError(
-                self._path,
-                line,
-                header,
-                f"expected a decimal {expected}, as in line {self._line}, got {shown(text)}; "
-                "thousands separators are not allowed",
-            )
+            expected = f"a decimal {'point' if mark == ',' else 'comma'}, as in line {self._line}"
+            message = f"expected {expected}, got {shown(text)}; thousands separators are not allowed"
+            raise FileFormatError(self._path, line, header, message)
         return text.replace(",", ".")
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, IncompleteRowsWarning, closest, counted, shortened, shown
 from armwright.files.column_names import WORD, Heading, Schema, normalised_name, resolve_headings
-from armwright.files.rows import CsvRow, NumberFormat, read_rows
+from armwright.files.rows import CsvTable, NumberFormat, read_rows
 
 # Of the lines in which a column is empty a message names this many.
 _MAX_LINES = 20
@@ -109,17 +109,14 @@ class Header:
 
     Attributes:
         path: the file.
-        line: of the names.
         headings: its columns, by their names in the schema.
         schema: the columns that there may be.
     """
 
     path: Path
-    line: int
     headings: Mapping[str, Heading]
     schema: Schema
-    _rows: Iterator[CsvRow]
-    _separator: str
+    _table: CsvTable
 
     def __contains__(self, name: str) -> bool:
         """Whether there is a column of this name."""
@@ -136,7 +133,7 @@ class Header:
 
     def error(self, name: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a column."""
-        return FileFormatError(self.path, self.line, _column_text(self.headings, name), message)
+        return FileFormatError(self.path, self._table.head.line, _column_text(self.headings, name), message)
 
     def require(self, names: Iterable[str], because: str = "") -> None:
         """Refuse a file that lacks a column.
@@ -190,18 +187,17 @@ class Header:
         """
         needed = [self.headings[name] for name in filled]
         lines, known = array("q"), dict[str, str]()
-        numbers: dict[str, array[float]] = {}
-        words: dict[str, list[str]] = {}
-        for name, heading in self.headings.items():
-            if heading.column.quantity is WORD:
-                words[name] = []
-            else:
-                numbers[name] = array("d")
-        incomplete, written = _IncompleteRows(), NumberFormat(self.path, self._separator)
-        number_columns = [(self.headings[name], self.headings[name].scale, numbers[name]) for name in numbers]
+        words = {name: list[str]() for name, heading in self.headings.items() if heading.column.quantity is WORD}
+        numbers = {name: array("d") for name in self.headings if name not in words}
+        incomplete, written = _IncompleteRows(), NumberFormat(self.path, self._table.separator)
+        number_columns = [(self.headings[name], self.headings[name].scale, values) for name, values in numbers.items()]
         word_columns = [(self.headings[name].cell_index, texts) for name, texts in words.items()]
-        for line, cells in self._rows:
-            empty = [(heading.text, _expected_content(heading)) for heading in needed if not cells[heading.cell_index]]
+        for line, cells in self._table.rows:
+            empty = [
+                (heading.text, "a name" if heading.column.quantity is WORD else "a number")
+                for heading in needed
+                if not cells[heading.cell_index]
+            ]
             if required:
                 empty += self._empty_cells(line, cells, required)
             if empty:
@@ -270,45 +266,32 @@ def read_headers(
         FileFormatError: as ``read_header``; a name of ``columns`` is in none of the files.
     """
     files = [(Path(path), read_rows(path)) for path in paths]
+    first, head = files[0][0], files[0][1].head
+
+    def error(name: str, message: str) -> FileFormatError:
+        return FileFormatError(first, head.line, shown(name).strip("'\""), message)
+
     mapping: dict[str, tuple[str, str]] = {}
     for name, target in (columns or {}).items():
         twin, _ = mapping.setdefault(normalised_name(name), (name, target))
         if twin != name:
-            path, rows = files[0]
-            message = f"this name in the column map differs from {shown(twin)} only in case or blanks"
-            raise FileFormatError(path, rows.head.line, shown(name).strip("'\""), message)
-    headers = {normalised_name(text): text for _, rows in files for text in rows.head.cells}
+            raise error(name, f"this name in the column map differs from {shown(twin)} only in case or blanks")
+    headers = {normalised_name(text): text for _, table in files for text in table.head.cells}
     for key, (name, target) in mapping.items():
         if key not in headers:
             near = closest(key, headers)
             hint = f"; did you mean '{headers[near]}'?" if near else "."
-            path, rows = files[0]
-            there = ", ".join(rows.head.cells)
-            raise FileFormatError(
-                path,
-                rows.head.line,
-                shown(name).strip("'\""),
-                f"no such column to map to {target}{hint} There are {there}",
-            )
+            raise error(name, f"no such column to map to {target}{hint} There are {', '.join(head.cells)}")
     return [
         Header(
-            path=path,
-            line=rows.head.line,
-            headings=resolve_headings(path, rows.head, schema, mapping, units),
-            schema=schema,
-            rows=rows.rows,
-            separator=rows.separator,
+            path=path, headings=resolve_headings(path, table.head, schema, mapping, units), schema=schema, table=table
         )
-        for path, rows in files
+        for path, table in files
     ]
 
 
 def _column_text(headings: Mapping[str, Heading], name: str) -> str:
     return headings[name].text if name in headings else name
-
-
-def _expected_content(heading: Heading) -> str:
-    return "a name" if heading.column.quantity is WORD else "a number"
 
 
 class _IncompleteRows:
@@ -339,24 +322,21 @@ class _IncompleteRows:
             return
         line, column, expected = self._first
         where = "; ".join(f"{text} in {lines_text(lines, count)}" for text, (count, lines) in self._columns.items())
+        rows = counted(self._rows, "row")
         if skip and complete:
-            text = f"{path}: {counted(self._rows, 'row')} omitted because of empty cells, {complete} read: {where}"
+            text = f"{path}: {rows} omitted because of empty cells, {complete} read: {where}"
             warnings.warn(shortened(text), IncompleteRowsWarning, stacklevel=2)
             return
         if skip:
             raise FileFormatError(path, line, "", f"every row has empty cells: {where}")
         if self._rows == 1 and len(self._columns) == 1:
-            raise FileFormatError(
-                path, line, column, f"empty; expected {expected}, or --skip-incomplete to omit the row"
-            )
-        raise FileFormatError(
-            path, line, "", f"cells are empty: {where}; --skip-incomplete omits {counted(self._rows, 'row')}"
-        )
+            message = f"empty; expected {expected}, or --skip-incomplete to omit the row"
+            raise FileFormatError(path, line, column, message)
+        raise FileFormatError(path, line, "", f"cells are empty: {where}; --skip-incomplete omits {rows}")
 
 
 def lines_text(lines: Sequence[int], count: int | None = None) -> str:
     """Name lines of a file, of which there may be more than are named: ``lines 3, 4 and 7 more``."""
-    more = (count or len(lines)) - len(lines)
-    return (
-        f"line{'s' if len(lines) + more > 1 else ''} {', '.join(map(str, lines))}{f' and {more} more' if more else ''}"
-    )
+    count = count or len(lines)
+    more = f" and {count - len(lines)} more" if count > len(lines) else ""
+    return f"line{'s' if count > 1 else ''} {', '.join(map(str, lines))}{more}"
