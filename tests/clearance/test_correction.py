@@ -316,3 +316,9 @@ def test_no_round_that_makes_it_worse(monkeypatch: pytest.MonkeyPatch) -> None:
     assert correction.best == 0
     np.testing.assert_array_equal(correction.nodes, PickAndPlace().nodes)
     np.testing.assert_array_equal(correction.after, correction.before)
+
+
+def test_negative_rounds(five_bar: Linkage) -> None:
+    """A path cannot be moved fewer than no times."""
+    with pytest.raises(InvalidValueError, match="rounds: expected 0 to 100, got -1"):
+        correct_nodes(five_bar, PickAndPlace(), [5e-4] * 3, rounds=-1)

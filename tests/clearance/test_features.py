@@ -123,3 +123,10 @@ def test_empty_windows_are_refused(window: tuple[float, float]) -> None:
     """A line needs two samples, and the message states their number."""
     with pytest.raises(InvalidValueError, match=r"window: expected two samples or more from .* of 2501 up to 0.25 s"):
         error_curve_features(TIME, along(TIME), window)
+
+
+def test_spectrum_of_the_fastest_wave() -> None:
+    """A curve that goes up and down by a from one sample to the next is a wave of amplitude a."""
+    curve = 0.3 * (-1.0) ** np.arange(64) + 2.0
+
+    np.testing.assert_allclose(spectrum(curve)[[0, -1]], [4.0, 0.3], atol=1e3 * ROUNDING)

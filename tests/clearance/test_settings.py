@@ -118,3 +118,9 @@ def test_paths_without_time(duration: float) -> None:
     crank = load_linkage("slider-crank")
     with pytest.raises(InvalidValueError, match="expected a duration from 1e-09 s, got "):
         prepare_scenario(crank, constant_speed_path("short", 0.0, 30.0, duration))
+
+
+def test_one_gain_is_refused() -> None:
+    """A controller has two gains: a kernel that was handed one would read beside it."""
+    with pytest.raises(InvalidValueError, match="gains: expected stiffness and damping, got 1"):
+        Settings(control="pd+ff", gains=(200.0,))  # type: ignore[arg-type]

@@ -1,5 +1,6 @@
 """Linkages with play as they are simulated: against published numbers, beside those without play, and many at once."""
 
+import json
 from typing import Any
 
 import attrs
@@ -7,13 +8,14 @@ import numpy as np
 import pytest
 
 from armwright.clearance import simulation
+from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.contact import stiffness
 from armwright.clearance.equations import FrictionModel
 from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.paths import constant_speed_path, thesis_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import Scenario, prepare_scenario
-from armwright.clearance.settings import Settings
+from armwright.clearance.settings import Settings, check_step, contact_stiffness
 from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import InvalidValueError, ShapeError
 from clearance.mechanisms import block, imbalance, left_alone, pendulum, still, thrown
@@ -316,3 +318,27 @@ def test_called_off(five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
     assert simulate(task).status == Status.DIVERGED
+
+
+class TestDiverging:
+    """A run that diverges is reported as such, in numbers that JSON knows."""
+
+    def test_numbers(self, five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
+        """With a step ten times too long a run diverges without a warning; what is shown of it is finite."""
+        monkeypatch.setattr(simulation, "check_step", lambda *_: None)
+        run = simulate(prepare_scenario(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=2e-4)), [1e-4] * 3)
+        data = ClearanceRun.of(run).as_data()
+
+        assert run.status == Status.DIVERGED
+        assert data["sound_until"] < 0.25
+        json.dumps(data, allow_nan=False)
+
+    def test_advice(self, five_bar: Linkage) -> None:
+        """The step that is advised instead of one that is too long is one that is accepted."""
+        for clearance in np.geomspace(1e-6, 1e-2, 9):
+            task = prepare_scenario(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=0.1))
+            with pytest.raises(InvalidValueError, match="too long") as error:
+                simulate(task, [clearance] * 3)
+            advised = float(str(error.value).split("at most ")[1].split(" ")[0])
+
+            check_step(five_bar, Settings(step=advised), contact_stiffness(five_bar, np.full(3, clearance)))

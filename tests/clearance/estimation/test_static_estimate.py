@@ -14,8 +14,10 @@ from armwright.clearance.estimation.static_estimate import (
     rest_matrix,
     rest_offsets,
 )
+from armwright.clearance.ideal import tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS
+from armwright.clearance.reader import load_linkage
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 from clearance.arms import ARM_A, ARM_B, STARTS, accuracy
 
@@ -231,3 +233,35 @@ def test_nothing_is_told_from_none(five_bar: Linkage, rng: np.random.Generator) 
         assert identified[-1] == (estimate.values[2] > max(estimate.deviations[2], 2e-7))
 
     assert 2 <= sum(identified) <= 20
+
+
+class TestIndeterminate:
+    """Where a pin carries no force, or a linkage is singular, no number comes out, and no traceback."""
+
+    def test_weightless(self, five_bar: Linkage) -> None:
+        """Without gravity and load nothing presses a journal to its wall: the tip at rest determines nothing."""
+        floating = attrs.evolve(five_bar, gravity=(0.0, 0.0), loads=())
+
+        with pytest.raises(InvalidValueError, match="pin J2 of five-bar carries no force at rest"):
+            rest_matrix(floating, closed_at_poses(floating, STARTS))
+        with pytest.raises(InvalidValueError, match="carries no force"):
+            estimate_at_rest(floating, STARTS, np.zeros((3, 2)))
+
+    def test_singular(self, five_bar: Linkage) -> None:
+        """Both rods in one line hold the tip nowhere: how it shifts with the gaps is not told."""
+        q = np.zeros(len(five_bar.coordinates))
+
+        with pytest.raises(InvalidValueError, match="singular"):
+            tip_sensitivity(five_bar, q)
+
+    @pytest.mark.parametrize(("name", "freedoms"), [("four-bar", "1 freedom,"), ("slider-crank", "1 freedom,")])
+    def test_freedoms(self, name: str, freedoms: str) -> None:
+        """A linkage of one freedom cannot follow a position in the plane, and hears how many freedoms it has."""
+        with pytest.raises(InvalidValueError, match=f"with its pins closed it has {freedoms}"):
+            rest_matrix(load_linkage(name), closed_at_poses(load_linkage(name), STARTS))
+
+    @pytest.mark.parametrize("noise", [0.0, -1e-6, np.inf, np.nan])
+    def test_noise(self, five_bar: Linkage, noise: float) -> None:
+        """A measurement has a noise above 0 that is a number."""
+        with pytest.raises(InvalidValueError, match="noise"):
+            estimate_at_rest(five_bar, STARTS, np.zeros((3, 2)), noise)

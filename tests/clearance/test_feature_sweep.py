@@ -9,11 +9,12 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.clearance.feature_sweep import FeatureSweep, feature_vector, is_random
+from armwright.clearance.feature_sweep import FeatureSweep, feature_vector, is_random, is_sweep_of
 from armwright.clearance.features import Features, simulation_features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.clearance.predictability import MAX_DISTANCE, perturb_clearances
+from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.simulation import simulate
 from armwright.errors import InvalidValueError, UnknownNameError
@@ -239,3 +240,14 @@ def test_unknown_path(five_bar: Linkage) -> None:
         FeatureSweep(linkage=five_bar, paths=())
     with pytest.raises(InvalidValueError, match="replicates: expected 0 to 15, got 16"):
         FeatureSweep(linkage=five_bar, paths=("y1",), replicates=16)
+
+
+def test_a_sweep_belongs_to_its_linkage(five_bar: Linkage) -> None:
+    """A sweep is one of the linkage it was made of, whatever its own clearances, and of no other."""
+    stored = json.loads(json.dumps(FeatureSweep(linkage=five_bar, paths=("y1",)).settings))
+
+    assert is_sweep_of(stored, five_bar)
+    assert is_sweep_of(stored, five_bar.with_clearances({"J2": 0.1e-3}))
+    assert not is_sweep_of(stored, load_linkage("four-bar"))
+    assert not is_sweep_of(stored, attrs.evolve(five_bar, loads=()))
+    assert not is_sweep_of({}, five_bar)

@@ -16,7 +16,7 @@ from armwright.clearance.estimation.measurement_file import (
 from armwright.clearance.estimation.static_estimate import rest_offsets
 from armwright.clearance.features import error_curve_features
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.paths import named_path
+from armwright.clearance.paths import named_path, thesis_path
 from armwright.clearance.reader import load_linkage
 from armwright.errors import FileFormatError, IncompleteRowsWarning
 from clearance.arms import ARM_A, STARTS, accuracy
@@ -300,3 +300,47 @@ def test_unknown_noise_is_what_is_left(rng: np.random.Generator) -> None:
     assert result.noise_freedom == 21
     low, high = result.interval(0.999).T
     assert np.all((low <= true) & (true <= high))
+
+
+def test_rest_behind_the_path_changes_no_feature(tmp_path: Path) -> None:
+    """How long a tip rests after its path changes no feature, and half of a path is none."""
+    way, file = thesis_path("y1"), tmp_path / "paths.csv"
+
+    def written(end: float) -> Path:
+        times = np.arange(0.0, end, 1e-3)
+        positions = way.evaluate(times).position * 1e3 + times[:, None]
+        rows = (f"y1,{t:.4f},{x:.9f},{y:.9f}" for t, (x, y) in zip(times, positions, strict=True))
+        file.write_text("\n".join(["path,t_s,x_mm,y_mm", *rows]), encoding="utf-8")
+        return file
+
+    short, long = (read_clearance_measurements(written(end)) for end in (0.2505, 2.0))
+    assert isinstance(short, PathMeasurement)
+    assert isinstance(long, PathMeasurement)
+    assert len(short.times["y1"]) == 251
+    np.testing.assert_array_equal(long.features()["y1"], short.features()["y1"])
+    with pytest.raises(FileFormatError, match=r"path y1 takes 0\.25 s; got 0 to 0\.229 s"):
+        read_clearance_measurements(written(0.23))
+
+
+def test_number_too_large_to_square(tmp_path: Path) -> None:
+    """A number whose square no computer holds is no play, and no warning either."""
+    file = tmp_path / "rest.csv"
+    file.write_text("pose,commanded_x_mm,commanded_y_mm,x_mm,y_mm\na,0,-700,1e307,-700\n", encoding="utf-8")
+
+    with pytest.raises(FileFormatError, match="every number must be finite and no larger than"):
+        read_clearance_measurements(file)
+
+
+def test_noise_of_uneven_readings(tmp_path: Path) -> None:
+    """The means of poses are as sure as that of the pose with the fewest readings: of one, no surer than a reading."""
+    rng = np.random.default_rng(3)
+    lines = ["pose,commanded_x_mm,commanded_y_mm,x_mm,y_mm"]
+    for name, count in (("a", 1), ("b", 2000), ("c", 2000)):
+        lines += [f"{name},0,-700,{x:.9f},{y:.9f}" for x, y in (0.01 * rng.standard_normal((count, 2)) + (0, -700))]
+    file = tmp_path / "rest.csv"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    measurement = read_clearance_measurements(file)
+
+    assert isinstance(measurement, RestMeasurement)
+    # The deviation of 8000 numbers is told to about a hundredth.
+    assert measurement.noise == pytest.approx(1e-5, rel=0.05)
