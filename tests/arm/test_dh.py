@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from armwright.arm.dh import about_com, carry, from_modified, to_modified, turn, twist
+from armwright.arm.dh import about_com, carry, from_modified, to_modified, twist
 from armwright.arm.load import read_arm
 from armwright.arm.model import Arm, Link
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.spatial.poses import inverse
+from armwright.spatial.rotations import elementary_rotation
 from oracles.arms import random_arm, random_configurations, random_link, random_pose
 
 ROUNDING = 1e-12  # matrices multiplied in another order
@@ -121,19 +122,21 @@ def test_a_rod_about_its_end() -> None:
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_turn(axis: int, rng: np.random.Generator) -> None:
-    """A turn about an axis is that of SciPy, and one by a right angle has only zeros and ones in it."""
+def test_elementary_rotation(axis: int, rng: np.random.Generator) -> None:
+    """A rotation about an axis is that of SciPy, and one by a right angle has only zeros and ones in it."""
     angle = rng.uniform(-4, 4)
 
-    np.testing.assert_allclose(turn(axis, angle), Rotation.from_euler("xyz"[axis], angle).as_matrix(), atol=ROUNDING)
+    np.testing.assert_allclose(
+        elementary_rotation(axis, angle), Rotation.from_euler("xyz"[axis], angle).as_matrix(), atol=ROUNDING
+    )
     for quarters in (-3, -2, -1, 0, 1, 2, 3, 4):
-        assert set(turn(axis, quarters * np.pi / 2).ravel()) <= {-1.0, 0.0, 1.0}
+        assert set(elementary_rotation(axis, quarters * np.pi / 2).ravel()) <= {-1.0, 0.0, 1.0}
 
 
 def test_a_body_without_mass_moves_too() -> None:
     """A link with a moment and no mass keeps its moment when it is seen from a turned frame."""
     link = Link(inertia=np.diag([0, 0, 0.35]))
     X = np.eye(4)
-    X[:3, :3] = turn(0, np.pi / 2)
+    X[:3, :3] = elementary_rotation(0, np.pi / 2)
 
     np.testing.assert_array_equal(carry(link, X).inertia, np.diag([0, 0.35, 0]))

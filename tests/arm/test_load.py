@@ -13,6 +13,7 @@ from armwright.arm import load
 from armwright.arm.load import arm_names, load_arm, read_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Limits, Link, Motor
 from armwright.errors import FileFormatError, UnknownNameError
+from armwright.spatial.rotations import exact_cosine, exact_sine
 
 ROUNDING = 1e-15  # a unit more or less in the last digit, where a unit is converted
 
@@ -87,7 +88,8 @@ def test_right_angles_are_exact(read: Callable[[str], Arm]) -> None:
 
     assert set(arm.base.ravel()) <= {-1.0, 0.0, 1.0}
     joint = arm.joints[0]
-    assert (joint.cos_alpha, joint.sin_alpha, joint.cos_theta, joint.sin_theta) == (0, -1, 0, -1)
+    for angle in (joint.alpha, joint.theta):
+        assert (exact_cosine(angle), exact_sine(angle)) == (0, -1)
 
 
 def test_turn_of_a_pose(read: Callable[[str], Arm], rng: np.random.Generator) -> None:

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import arm_names, load_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, exact_cosine, exact_sine
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
 from armwright.dynamics.payloads import payload
 from armwright.errors import InvalidValueError, KindError, ShapeError
+from armwright.spatial.rotations import exact_cosine, exact_sine
 from oracles.arms import random_arm
 
 
@@ -155,8 +156,8 @@ def test_an_arm_of_geometry_alone() -> None:
 def test_right_angles_are_exact(turns: int) -> None:
     """The cosine of a whole number of right angles is 0, 1 or -1, not nearly so."""
     assert exact_cosine(turns * math.pi / 2) == (1, 0, -1, 0)[turns % 4]
-    joint = Joint(kind="revolute", alpha=math.radians(90 * turns), theta=math.radians(90 * turns))
-    assert {joint.cos_alpha, joint.sin_alpha, joint.cos_theta, joint.sin_theta} <= {0.0, 1.0, -1.0}
+    angle = math.radians(90 * turns)
+    assert {exact_cosine(angle), exact_sine(angle)} <= {0.0, 1.0, -1.0}
     assert (exact_cosine(1e-3), exact_sine(1e-3)) == (math.cos(1e-3), math.sin(1e-3))
 
 
@@ -188,14 +189,14 @@ REFUSED = {
     "a moment above the two others together": (
         lambda: Link(mass=2, inertia=np.diag([1, 1, 3])),
         (
-            "link of 2 kg: a body cannot have the principal moments 1, 1, 3 kg m² of its inertia [[1.0, 0.0, 0.0], "
-            "[0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]: none may be negative, or exceed the sum of the other two. Specify the "
-            "tensor about the centre of mass"
+            "link of 2 kg with the inertia [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]: a body cannot have the "
+            "principal moments 1, 1, 3 kg m² about its centre of mass: none may be negative, or exceed the sum of the "
+            "other two. Specify the tensor about the centre of mass"
         ),
     ),
     "a moment below none": (
         lambda: Link(mass=2, inertia=[[1, 2, 0], [2, 1, 0], [0, 0, 1]]),
-        "a body cannot have the principal moments -1, 1, 3 kg m² of its inertia",
+        "a body cannot have the principal moments -1, 1, 3 kg m² about its centre of mass",
     ),
     "a tensor beyond measure": (lambda: Link(inertia=1e200 * np.eye(3)), "inertia: expected numbers no larger than"),
     "mass beyond measure": (lambda: Link(mass=1e200), "link: mass must not be larger than 1e+100, got 1e+200"),

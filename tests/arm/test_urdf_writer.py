@@ -151,8 +151,8 @@ def test_kinds_of_joints() -> None:
         "prismatic",
     ]
     assert [line.strip() for line in lines if "<limit" in line] == [
-        '<limit lower="-1.0" upper="1e+30" effort="1e+30" velocity="1e+30"/>',
-        '<limit lower="-1e+30" upper="1e+30" effort="1e+30" velocity="1e+30"/>',
+        '<limit lower="-1.0" upper="1e+30" effort="1e+30" velocity="1e+30" />',
+        '<limit lower="-1e+30" upper="1e+30" effort="1e+30" velocity="1e+30" />',
     ]
 
 

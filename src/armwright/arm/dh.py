@@ -15,23 +15,15 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.arm.model import Joint, Link, exact_cosine, exact_sine
+from armwright.arm.model import Joint, Link
 from armwright.arrays import Array
 from armwright.spatial.poses import homogeneous, inverse
-
-
-def turn(axis: int, angle: float) -> Array:
-    """Return the turn (3, 3) about x, y or z by an angle [rad]; right angles are exact."""
-    c, s = exact_cosine(angle), exact_sine(angle)
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    R = np.eye(3)
-    R[j, j], R[j, k], R[k, j], R[k, k] = c, 0.0 - s, s, c
-    return R
+from armwright.spatial.rotations import elementary_rotation
 
 
 def twist(alpha: float, a: float) -> Array:
     """Return the pose Tx(a) Rx(alpha), (4, 4); the two may be swapped."""
-    return homogeneous(turn(0, alpha), (a, 0.0, 0.0))
+    return homogeneous(elementary_rotation(0, alpha), (a, 0.0, 0.0))
 
 
 def from_modified(joints: Sequence[Joint], links: Sequence[Link]) -> tuple[Array, list[Joint], list[Link]]:

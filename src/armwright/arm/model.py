@@ -12,14 +12,14 @@ All quantities are SI and radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sized
+from collections.abc import Callable, Iterable, Sized
 from functools import cached_property
 from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
 import attrs
 import numpy as np
 
-from armwright.arm.tensors import ROUNDING, impossible_moments
+from armwright.arm.tensors import ROUNDING, impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.units import PRISMATIC, REVOLUTE, JointUnits
 from armwright.arrays import (
@@ -36,6 +36,7 @@ from armwright.arrays import (
 from armwright.errors import InvalidValueError, KindError, ShapeError, counted, shown
 from armwright.notebook import html_table
 from armwright.spatial.poses import one_pose
+from armwright.spatial.rotations import exact_cosine, exact_sine
 
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
 # Who says which way an arm's gravity points: nobody, its file or its maker, the root of a URDF file, or the cell it
@@ -47,6 +48,14 @@ _Part = TypeVar("_Part")
 STANDARD_GRAVITY = 9.80665
 # What an arm that stands upright feels of it, along the axes of its base, or the world [m/s²].
 UPRIGHT_GRAVITY = read_only(np.array((0.0, 0.0, -STANDARD_GRAVITY)))
+
+
+# What the numbers of a part must be, in words.
+_RANGES: dict[str, Callable[[float], bool]] = {
+    "finite": math.isfinite,
+    "above 0": lambda x: x > 0,
+    "0 or more": lambda x: 0 <= x < math.inf,
+}
 
 
 def _com(value: ArrayLike) -> Array:
@@ -80,42 +89,15 @@ def _inertia(value: ArrayLike) -> Array:
     return read_only((tensor + tensor.T) / 2)  # to the last bit, so that six numbers tell it
 
 
-def _as_floats(value: Any, what: str, names: Iterable[str]) -> None:
-    """Make floats of fields that must be numbers, while their owner is being built."""
+def _check_numbers(part: Any, what: str, names: Iterable[str], must: str = "") -> None:
+    """Make floats of fields that must be numbers, of one of ``_RANGES`` if any, while their part is being built."""
     for name in names:
-        given = number(getattr(value, name), f"{what}: {name}")
-        if LARGEST < abs(given) < math.inf:
-            raise InvalidValueError(f"{what}: {name} must not be larger than {LARGEST:g}, got {given:g}")
-        object.__setattr__(value, name, given)
-
-
-def _parts(value: Iterable[_Part], kind: type[_Part], what: str) -> tuple[_Part, ...]:
-    """Return parts of an arm as a tuple, all of which must be of one kind."""
-    try:
-        parts = tuple(value)
-    except TypeError as error:
-        raise KindError(f"{what}: expected a list of {kind.__name__}, got {shown(value)}") from error
-    for i, part in enumerate(parts, 1):
-        if not isinstance(part, kind):
-            raise KindError(f"{what}: expected each to be a {kind.__name__}, got {shown(part)} as number {i}")
-    return parts
-
-
-def exact_cosine(angle: float) -> float:
-    """Return cos(angle), exactly 0 or ±1 at the multiples of a right angle.
-
-    Twist angles of real arms are right angles; the zeros they leave are structure, not rounding.
-    """
-    return _exact(math.cos(angle))
-
-
-def exact_sine(angle: float) -> float:
-    """Return sin(angle), exactly 0 or ±1 at the multiples of a right angle."""
-    return _exact(math.sin(angle))
-
-
-def _exact(value: float) -> float:
-    return round(value) + 0.0 if abs(value - round(value)) < 1e-15 else value
+        value = number(getattr(part, name), f"{what}: {name}")
+        if LARGEST < abs(value) < math.inf:
+            raise InvalidValueError(f"{what}: {name} must not be larger than {LARGEST:g}, got {value:g}")
+        if must and not _RANGES[must](value):
+            raise InvalidValueError(f"{what}: {name} must be {must}, got {value:g}")
+        object.__setattr__(part, name, value)
 
 
 @attrs.frozen(kw_only=True)
@@ -138,13 +120,10 @@ class Limits:
 
     def __attrs_post_init__(self) -> None:
         """Refuse limits that nothing can satisfy."""
-        magnitudes = ("speed", "acceleration", "effort")
-        _as_floats(self, "limits", ("lower", "upper", *magnitudes))
+        _check_numbers(self, "limits", ("lower", "upper"))
+        _check_numbers(self, "limits", ("speed", "acceleration", "effort"), "above 0")
         if not self.lower < self.upper:
             raise InvalidValueError(f"limits: lower {self.lower:g} must be below upper {self.upper:g}")
-        for name in magnitudes:
-            if not getattr(self, name) > 0:
-                raise InvalidValueError(f"limits: {name} must be above 0, got {getattr(self, name):g}")
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -200,15 +179,11 @@ class Joint:
             raise InvalidValueError(f"joint: expected kind revolute or prismatic, got {shown(self.kind)}")
         if not isinstance(self.limits, Limits):
             raise KindError(f"joint: expected limits to be Limits, got {shown(self.limits)}")
-        geometry = ("theta", "d", "a", "alpha")
-        _as_floats(self, "joint", geometry)
-        for name in geometry:
-            if not math.isfinite(getattr(self, name)):
-                raise InvalidValueError(f"joint: {name} must be finite, got {getattr(self, name)}")
+        _check_numbers(self, "joint", ("theta", "d", "a", "alpha"), "finite")
 
     @property
     def revolute(self) -> bool:
-        """Whether the joint turns."""
+        """Whether the joint rotates."""
         return self.kind == "revolute"
 
     @property
@@ -218,8 +193,8 @@ class Joint:
 
     @property
     def behind(self) -> Array:
-        """Pose (4, 4) of frame i behind the turn about z and the shift along it: F Tx(a) Rx(alpha)."""
-        c, s = self.cos_alpha, self.sin_alpha
+        """Pose (4, 4) of frame i behind the rotation about z and the shift along it: F Tx(a) Rx(alpha)."""
+        c, s = exact_cosine(self.alpha), exact_sine(self.alpha)
         X = np.array(((1.0, 0.0, 0.0, self.a), (0.0, c, -s, 0.0), (0.0, s, c, 0.0), (0.0, 0.0, 0.0, 1.0)))
         return X if self.fixed is None else np.asarray(self.fixed @ X)
 
@@ -227,26 +202,6 @@ class Joint:
         """Return how far apart the frames before and behind may be, the joint so far out [m]."""
         along = abs(self.d) + slide
         return math.hypot(self.a, along) if self.fixed is None else along + float(np.linalg.norm(self.behind[:3, 3]))
-
-    @property
-    def cos_theta(self) -> float:
-        """Cosine of the fixed part of the angle, exact at right angles."""
-        return exact_cosine(self.theta)
-
-    @property
-    def sin_theta(self) -> float:
-        """Sine of the fixed part of the angle, exact at right angles."""
-        return exact_sine(self.theta)
-
-    @property
-    def cos_alpha(self) -> float:
-        """Cosine of the twist, exact at right angles."""
-        return exact_cosine(self.alpha)
-
-    @property
-    def sin_alpha(self) -> float:
-        """Sine of the twist, exact at right angles."""
-        return exact_sine(self.alpha)
 
 
 @attrs.frozen(kw_only=True)
@@ -274,17 +229,13 @@ class Link:
 
     def __attrs_post_init__(self) -> None:
         """Refuse a negative mass, and a tensor that no body has."""
-        _as_floats(self, "link", ("mass",))
-        if not 0 <= self.mass < math.inf:
-            raise InvalidValueError(f"link: mass must be 0 or more, got {self.mass:g}")
+        _check_numbers(self, "link", ("mass",), "0 or more")
         moments = impossible_moments(self.mass, self.com, self.inertia) if self.complete else None
         if moments is not None:
-            said = ", ".join(f"{moment:.3g}" for moment in moments)
             raise InvalidValueError(
-                f"link of {self.mass:g} kg: a body cannot have the principal moments {said} kg m² of its inertia "
-                f"{self.inertia.tolist()}: none may be negative, or exceed the sum of the other two. Specify the "
-                "tensor about the centre of mass, not about the origin of the frame, and check its units and the signs "
-                "of its products; complete=False accepts a tensor of which not all moments are known"
+                f"link of {self.mass:g} kg with the inertia {self.inertia.tolist()}: {moments_message(moments)}. "
+                "Specify the tensor about the centre of mass, not about the origin of the frame, and check its units "
+                "and the signs of its products; complete=False accepts a tensor of which not all moments are known"
             )
 
 
@@ -308,11 +259,20 @@ class Motor:
 
     def __attrs_post_init__(self) -> None:
         """Refuse drives that give energy for nothing."""
-        felt = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
-        _as_floats(self, "motor", (*felt, "gear_ratio"))
-        for name in felt:
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InvalidValueError(f"motor: {name} must be 0 or more, got {getattr(self, name):g}")
+        _check_numbers(self, "motor", ("inertia", "viscous", "coulomb_forward", "coulomb_backward"), "0 or more")
+        _check_numbers(self, "motor", ("gear_ratio",))
+
+
+def _parts(value: Iterable[_Part], part_class: type[_Part], what: str) -> tuple[_Part, ...]:
+    """Return parts of an arm as a tuple, all of which must be of one class."""
+    try:
+        parts = tuple(value)
+    except TypeError as error:
+        raise KindError(f"{what}: expected a list of {part_class.__name__}, got {shown(value)}") from error
+    for i, part in enumerate(parts, 1):
+        if not isinstance(part, part_class):
+            raise KindError(f"{what}: expected each to be a {part_class.__name__}, got {shown(part)} as number {i}")
+    return parts
 
 
 def _joints(value: Iterable[Joint]) -> tuple[Joint, ...]:
@@ -385,10 +345,7 @@ class Arm:
         """Refuse an arm without joints, and a hand that goes nowhere."""
         if not self.joints:
             raise ShapeError(f"arm '{self.name}': expected at least one joint")
-        _as_floats(self, f"arm '{self.name}'", ("reach", "tool_speed"))
-        for name in ("reach", "tool_speed"):
-            if not getattr(self, name) > 0:
-                raise InvalidValueError(f"arm '{self.name}': {name} must be above 0, got {getattr(self, name):g}")
+        _check_numbers(self, f"arm '{self.name}'", ("reach", "tool_speed"), "above 0")
         if self.gravity_from not in get_args(GravityFrom):
             known = ", ".join(get_args(GravityFrom))
             raise InvalidValueError(
@@ -415,15 +372,15 @@ class Arm:
     @cached_property
     def limits(self) -> JointLimits:
         """The limits of all joints, each (n,)."""
-        names = [field.name for field in attrs.fields(JointLimits)]
-        return JointLimits(**{name: np.array([getattr(joint.limits, name) for joint in self.joints]) for name in names})
+        values = np.array([attrs.astuple(joint.limits) for joint in self.joints]).T
+        return JointLimits(**dict(zip(attrs.fields_dict(Limits), values, strict=True)))
 
     @cached_property
     def revolute(self) -> Flags:
         """Which joints rotate, (n,)."""
         return read_only(np.array([joint.revolute for joint in self.joints]))
 
-    def drive(self, name: str) -> Array:
+    def motor_values(self, name: str) -> Array:
         """Return one of the numbers of all motors, (n,), by its name in ``Motor``."""
         return np.array([getattr(motor, name) for motor in self.motors])
 

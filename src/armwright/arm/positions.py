@@ -12,7 +12,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.errors import KindError, ShapeError, UnitWarning, shown
 
-_TURN = 2 * math.pi
+_REVOLUTION = 2 * math.pi
 # Joints without limits are tried within so much either way [rad], [m].
 _FREE, _FREE_SLIDE = math.pi, 1.0
 _PACKAGE = __name__.partition(".")[0]
@@ -21,7 +21,7 @@ _PACKAGE = __name__.partition(".")[0]
 def positions(arm: Arm, q: ArrayLike, what: str = "q", *, callers: int = 1) -> Array:
     """Return joint positions as read-only float64 of shape (..., n).
 
-    A turn farther than once around, on a joint whose limits do not go so far, is taken for degrees: there is one
+    A rotation by more than a revolution, on a joint whose limits do not go so far, is taken for degrees: there is one
     warning, at the line outside of this package that has called. A public function that another part of the package
     calls says nothing: the positions of a motion, or images of an angle, may be anything.
 
@@ -40,7 +40,7 @@ def positions(arm: Arm, q: ArrayLike, what: str = "q", *, callers: int = 1) -> A
         UnitWarning: the positions look like degrees.
     """
     array = joint_array(q, known_arm(arm).n, what)
-    if array.size and np.abs(array).max() > _TURN:
+    if array.size and np.abs(array).max() > _REVOLUTION:
         ask_for_degrees(arm, array, what, callers + 1)
     return array
 
@@ -70,8 +70,9 @@ def known_arm(arm: Arm) -> Arm:
 
 def admitted(arm: Arm) -> Array:
     """Return how far every joint may be from 0 before its position looks like degrees, (n,) [rad]; slides always."""
-    farthest = [max(abs(x) for x in (_TURN, *_known(joint.limits.lower, joint.limits.upper))) for joint in arm.joints]
-    return np.array([far if joint.revolute else math.inf for far, joint in zip(farthest, arm.joints, strict=True)])
+    ends = np.abs([arm.limits.lower, arm.limits.upper])
+    farthest = np.where(np.isfinite(ends), ends, _REVOLUTION).max(axis=0, initial=_REVOLUTION)
+    return np.where(arm.revolute, farthest, np.inf)
 
 
 def ranges(arm: Arm) -> tuple[Array, Array]:
@@ -93,8 +94,8 @@ def degrees_by_mistake(arm: Arm, q: Array) -> str:
     i = int(suspects[0])
     value = float(q.reshape(-1, arm.n)[rows[:, i].argmax(), i])
     return (
-        f"{arm.called(i)} of '{arm.name}' is at {value:g} rad, {abs(value) / _TURN:.1f} revolutions. If degrees are "
-        f"meant, {value:g} degrees are {math.radians(value):.6g} rad"
+        f"{arm.called(i)} of '{arm.name}' is at {value:g} rad, {abs(value) / _REVOLUTION:.1f} revolutions. If degrees "
+        f"are meant, {value:g} degrees are {math.radians(value):.6g} rad"
     )
 
 
@@ -105,10 +106,6 @@ def _range(joint: Joint) -> tuple[float, float]:
         return lower, upper
     middle = min(max(0.0, lower + free), upper - free)
     return middle - free, middle + free
-
-
-def _known(*limits: float) -> list[float]:
-    return [limit for limit in limits if math.isfinite(limit)]
 
 
 def ask_for_degrees(arm: Arm, q: Array, what: str, callers: int) -> None:
@@ -125,10 +122,10 @@ def ask_for_degrees(arm: Arm, q: Array, what: str, callers: int) -> None:
         frame = frame.f_back if frame else None
     if frame is None or frame.f_globals.get("__name__", "").partition(".")[0] == _PACKAGE:
         return
-    found = degrees_by_mistake(arm, q)
-    if found:
+    suspicion = degrees_by_mistake(arm, q)
+    if suspicion:
         warnings.warn(
-            f"{what}: {found}: give numpy.deg2rad(...). If the joint really rotates so far, set its limits; or "
+            f"{what}: {suspicion}: give numpy.deg2rad(...). If the joint really rotates so far, set its limits; or "
             "silence this: warnings.simplefilter('ignore', armwright.errors.UnitWarning)",
             UnitWarning,
             stacklevel=callers + 2,

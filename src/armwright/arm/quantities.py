@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from armwright.arm.dh import turn
 from armwright.arrays import Array
 from armwright.files.document import Table
 from armwright.spatial.euler import from_zyz
 from armwright.spatial.poses import homogeneous
-from armwright.spatial.rotations import nearest_rotation, orthonormality_error, rotation_from_quaternion
+from armwright.spatial.rotations import (
+    nearest_rotation,
+    orthonormality_error,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
 
+_Quantity = TypeVar("_Quantity", float, Array)
 # Factors to SI by the ending of the key.
 ANGLE = {"deg": math.pi / 180, "rad": 1.0}
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
@@ -38,25 +44,25 @@ class TypedPose(NamedTuple):
 
 
 def typed_pose(table: Table) -> TypedPose:
-    """Read a pose: a place, and a turn by one of several ways.
+    """Read a pose: a position, and an orientation in one of several forms.
 
-    The place is ``xyz``. The turn is ``rpy`` (roll, pitch, yaw about fixed x, y, z), ``zyz`` (Euler angles),
-    ``rotation`` (three rows), or ``quaternion_wxyz``; none for no turn.
+    The position is ``xyz``. The orientation is ``rpy`` (roll, pitch, yaw about fixed x, y, z), ``zyz`` (Euler angles),
+    ``rotation`` (three rows), or ``quaternion_wxyz``; none for that of the frame itself.
 
     Raises:
-        FileFormatError: the turn is given twice or is none, or a unit is missing.
+        FileFormatError: the orientation is given twice or is none, or a unit is missing.
     """
-    place = vector_in(table, "xyz", LENGTH, default=np.zeros(3))
-    ways = {way: f"{way}_{unit}" for way in ("rpy", "zyz") if (unit := unit_of(table, way, ANGLE))}
-    ways |= {way: way for way in ("rotation", "quaternion_wxyz") if way in table}
-    if len(ways) > 1:
-        (first, _), (second, key), *_ = ways.items()
+    position = vector_in(table, "xyz", LENGTH, default=np.zeros(3))
+    forms = {form: f"{form}_{unit}" for form in ("rpy", "zyz") if (unit := unit_of(table, form, ANGLE))}
+    forms |= {form: form for form in ("rotation", "quaternion_wxyz") if form in table}
+    if len(forms) > 1:
+        (first, _), (second, key), *_ = forms.items()
         raise table.error(key, f"the rotation is specified twice, as {first} and as {second}")
     rpy = vector_in(table, "rpy", ANGLE, default=np.zeros(3))
     zyz = vector_in(table, "zyz", ANGLE, default=np.zeros(3))
     table.allow("rotation", "quaternion_wxyz")
     change = 0.0
-    match [*ways]:
+    match [*forms]:
         case ["zyz"]:
             R = from_zyz(zyz)
         case ["rotation"]:
@@ -64,8 +70,8 @@ def typed_pose(table: Table) -> TypedPose:
         case ["quaternion_wxyz"]:
             R = _quaternion(table)
         case _:
-            R = turn(2, rpy[2]) @ turn(1, rpy[1]) @ turn(0, rpy[0])
-    return TypedPose(homogeneous(R, place), change)
+            R = rotation_from_rpy(*rpy)
+    return TypedPose(homogeneous(R, position), change)
 
 
 def pose_in(table: Table) -> Array:
@@ -89,29 +95,30 @@ def unit_of(table: Table, name: str, units: dict[str, float]) -> str | None:
     if name in table:
         known = [f"{name}_{unit}" for unit in units]
         raise table.error(name, f"the key must contain the unit: {', '.join(known[:-1])} or {known[-1]}")
-    found = [unit for unit in units if f"{name}_{unit}" in table]
-    if len(found) > 1:
-        raise table.error(f"{name}_{found[1]}", f"{name} is specified twice, in {found[0]} and in {found[1]}")
-    return found[0] if found else None
+    present = [unit for unit in units if f"{name}_{unit}" in table]
+    if len(present) > 1:
+        raise table.error(f"{name}_{present[1]}", f"{name} is specified twice, in {present[0]} and in {present[1]}")
+    return present[0] if present else None
 
 
 def number_in(table: Table, name: str, units: dict[str, float], *, default: float, positive: bool = False) -> float:
     """Read a quantity in SI units, by whatever unit its key tells."""
-    unit = unit_of(table, name, units)
-    if unit is None:
-        table.allow(*(f"{name}_{unit}" for unit in units))
-        return default
-    read = table.positive if positive else table.number
-    return read(f"{name}_{unit}") * units[unit]
+    return _quantity_in(table, name, units, table.positive if positive else table.number, default)
 
 
 def vector_in(table: Table, name: str, units: dict[str, float], *, default: Array) -> Array:
     """Read three quantities in SI units, by whatever unit their key tells."""
+    return _quantity_in(table, name, units, lambda key: table.vector(key, 3), default)
+
+
+def _quantity_in(
+    table: Table, name: str, units: dict[str, float], read: Callable[[str], _Quantity], default: _Quantity
+) -> _Quantity:
     unit = unit_of(table, name, units)
     if unit is None:
         table.allow(*(f"{name}_{unit}" for unit in units))
         return default
-    return table.vector(f"{name}_{unit}", 3) * units[unit]
+    return read(f"{name}_{unit}") * units[unit]
 
 
 def _rotation(table: Table) -> tuple[Array, float]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, array_key, floats, number, read_only, reduce_by_fields
+from armwright.arrays import Array, ArrayLike, array_key, floats, not_negative, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 # Covariances are written and read to the last bit; this part of the largest is rounding.
@@ -56,6 +56,4 @@ class Uncertainty:
             raise InvalidValueError(
                 "uncertainty: expected a covariance matrix, symmetric and with variances of 0 or more"
             )
-        object.__setattr__(self, "noise", number(self.noise, "uncertainty: noise"))
-        if not self.noise >= 0:
-            raise InvalidValueError(f"uncertainty: noise must be 0 or more, got {self.noise:g}")
+        object.__setattr__(self, "noise", not_negative(self.noise, "uncertainty: noise", "m"))

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 import attrs
 import numpy as np
 
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link, Motor
 from armwright.arm.tensors import impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import Array
@@ -70,15 +70,9 @@ def _uncertainty(known: Uncertainty) -> Iterator[str]:
 
 def _limits(joint: Joint) -> dict[str, float]:
     position, effort = ("rad", "Nm") if joint.revolute else ("m", "N")
-    keys = {
-        "lower": f"lower_{position}",
-        "upper": f"upper_{position}",
-        "speed": f"speed_{position}_per_s",
-        "acceleration": f"acceleration_{position}_per_s2",
-        "effort": f"effort_{effort}",
-    }
-    values = attrs.asdict(joint.limits)
-    return {keys[field.name]: values[field.name] for field in attrs.fields(Limits) if math.isfinite(values[field.name])}
+    units = (position, position, f"{position}_per_s", f"{position}_per_s2", effort)
+    limits = zip(attrs.asdict(joint.limits).items(), units, strict=True)
+    return {f"{name}_{unit}": value for (name, value), unit in limits if math.isfinite(value)}
 
 
 def _body(arm: Arm, i: int, link: Link) -> Iterator[str]:
@@ -98,16 +92,11 @@ def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:
             f"arm '{arm.name}': link {i} has the inertia {link.inertia.tolist()}, of which not all moments are known; "
             "an arm file cannot represent this"
         )
-    values: dict[str, float | Array] = {}
-    if link.mass:
-        values["mass_kg"] = link.mass
-    if link.com.any():
-        values["com_m"] = link.com
-    if link.inertia.any():
-        I = link.inertia
-        moments, products = np.diag(I), np.array((I[0, 1], I[0, 2], I[1, 2]))
-        values["inertia_kgm2"] = np.append(moments, products) if products.any() else moments
-    return values
+    I = link.inertia
+    moments, products = np.diag(I), np.array((I[0, 1], I[0, 2], I[1, 2]))
+    tensor = np.append(moments, products) if products.any() else moments
+    values: dict[str, float | Array] = {"mass_kg": link.mass, "com_m": link.com, "inertia_kgm2": tensor}
+    return {key: value for key, value in values.items() if np.any(value)}
 
 
 def _motor(arm: Arm, i: int, motor: Motor, joint: Joint) -> dict[str, float]:

@@ -22,7 +22,6 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from armwright.arm.dh import turn
 from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array, Flags, read_only
@@ -31,7 +30,7 @@ from armwright.calibration.readings import Readings, number_labels
 from armwright.errors import FileFormatError, closest
 from armwright.files.column_names import Heading, default_units
 from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, lines_text
-from armwright.spatial.rotations import rotation_from_quaternion
+from armwright.spatial.rotations import rotation_from_quaternion, rotation_from_rpy
 
 _SETS = ("fit", "check")
 # A joint whose positions differ by less has not moved [rad], [m].
@@ -175,7 +174,7 @@ def _rotations(table: UnitTable, points: Array, orientation: Sequence[str]) -> A
     for i in np.flatnonzero(np.isfinite(numbers[:, 0])):
         if orientation is RPY:
             roll, pitch, yaw = numbers[i]
-            rotations[i] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
+            rotations[i] = rotation_from_rpy(roll, pitch, yaw)
             continue
         length = float(np.linalg.norm(numbers[i]))
         if abs(length - 1) > _QUATERNION_TOLERANCE:

@@ -56,7 +56,7 @@ def _locked_positions(path: str, text: str | None) -> "dict[str, float]":
     from armwright.arm.urdf.robot import read_robot
 
     parts = [item.rpartition("=") if "=" in item else (item, "", "0") for item in (text or "").split(",") if item]
-    kinds = {joint.name: joint.kind for joint in read_robot(Path(path)).above.values()} if text else {}
+    kinds = {joint.name: joint.kind for joint in read_robot(Path(path)).parent_joints.values()} if text else {}
     locked = {}
     for name, _, value in parts:
         try:

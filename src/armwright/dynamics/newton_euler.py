@@ -9,6 +9,7 @@ from armwright.arm.model import Arm, Joint, Motor
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, batch, stack_matrix
 from armwright.kinematics.forward_kinematics import link_frames, link_transform, stack
+from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.tracing.scalar import Scalar, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
 
@@ -121,7 +122,7 @@ def lever_of(joint: Joint, q: Scalar) -> Vector:
     if joint.fixed is not None:
         X = joint.behind
         return apply(X[:3, :3].T.tolist(), add(X[:3, 3].tolist(), [0.0, 0.0, d]))
-    return [joint.a, joint.sin_alpha * d, joint.cos_alpha * d]
+    return [joint.a, exact_sine(joint.alpha) * d, exact_cosine(joint.alpha) * d]
 
 
 def _next_link(

@@ -10,6 +10,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike
 from armwright.spatial.poses import homogeneous
+from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.tracing.scalar import Scalar, cos, sin
 from armwright.tracing.vectors import Matrix, Vector, add, apply, product
 
@@ -23,18 +24,13 @@ def link_transform(joint: Joint, q: Scalar) -> tuple[Matrix, Vector]:
     if joint.revolute:
         c, s, d = cos(joint.theta + q), sin(joint.theta + q), joint.d
     else:
-        c, s, d = joint.cos_theta, joint.sin_theta, joint.d + q
+        c, s, d = exact_cosine(joint.theta), exact_sine(joint.theta), joint.d + q
     if joint.fixed is not None:
         x, y, z, _ = joint.behind.tolist()
         rows = [[c * a - s * b for a, b in zip(x, y, strict=True)], [s * a + c * b for a, b in zip(x, y, strict=True)]]
         return [*(row[:3] for row in rows), z[:3]], [rows[0][3], rows[1][3], d + z[3]]
-    ca, sa = joint.cos_alpha, joint.sin_alpha
-    R = [
-        [c, -s * ca, s * sa],
-        [s, c * ca, -c * sa],
-        [0.0, sa, ca],
-    ]
-    return R, [joint.a * c, joint.a * s, d]
+    ca, sa = exact_cosine(joint.alpha), exact_sine(joint.alpha)
+    return [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0.0, sa, ca]], [joint.a * c, joint.a * s, d]
 
 
 def link_frames(arm: Arm, q: Sequence[Scalar]) -> list[tuple[Matrix, Vector]]:

@@ -177,7 +177,8 @@ def lasting_efforts(solver: Solver, q: Array, qd: Array) -> Array:
 
 def dry_frictions(arm: Arm, qd: Array) -> Array:
     """Return what dry friction takes of joints (..., n) that move as ``qd`` does."""
-    return np.where(qd > 0, arm.drive("coulomb_forward"), np.where(qd < 0, -arm.drive("coulomb_backward"), 0.0))
+    forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
+    return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
 
 
 def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
@@ -188,7 +189,7 @@ def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
     m, each = len(trajectory.coefficients), _each(trajectory)
     parts = np.linspace(_INSIDE, 1 - _INSIDE, each)
     samples = _Samples(np.repeat(np.arange(m), each), np.tile(parts, m))
-    rubs = arm.drive("coulomb_forward") + arm.drive("coulomb_backward") > 0
+    rubs = arm.motor_values("coulomb_forward") + arm.motor_values("coulomb_backward") > 0
     speeds = _states(trajectory, samples)[1].reshape(m, each, -1)
     segment, before, joint = np.nonzero((speeds[:, 1:] * speeds[:, :-1] < 0) & rubs)
     low, high, sign = parts[before], parts[before + 1], np.sign(speeds[segment, before, joint])
@@ -223,7 +224,7 @@ def _efforts(solver: Solver, trajectory: Trajectory, samples: _Samples) -> Array
 def _shares(solver: Solver, trajectory: Trajectory, samples: _Samples) -> _Shares:
     q, qd, qdd = _states(trajectory, samples)
     lasting = lasting_efforts(solver, q, qd)
-    viscous = qd * solver.arm.drive("viscous")
+    viscous = qd * solver.arm.motor_values("viscous")
     return _Shares(lasting, viscous, solver.inverse_dynamics(q, qd, qdd) - lasting - viscous)
 
 

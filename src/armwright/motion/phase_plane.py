@@ -137,7 +137,7 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
     """Write down the bounds of all limits that there are."""
     arm = solver.arm
     speed, acceleration, effort = arm.limits.speed, arm.limits.acceleration, arm.limits.effort
-    viscous = arm.drive("viscous")
+    viscous = arm.motor_values("viscous")
     # The least and the most that dry friction takes of the joints on the intervals (N, n).
     frictions = np.stack([dry_frictions(arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
     least, most = frictions.min(axis=0), frictions.max(axis=0)

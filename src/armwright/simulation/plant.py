@@ -98,17 +98,17 @@ class Plant:
     @cached_property
     def viscous(self) -> Array:
         """Friction per speed, (n,)."""
-        return self.arm.drive("viscous")
+        return self.arm.motor_values("viscous")
 
     @cached_property
     def forward(self) -> Array:
         """Dry friction against motion forward, (n,)."""
-        return self.arm.drive("coulomb_forward")
+        return self.arm.motor_values("coulomb_forward")
 
     @cached_property
     def backward(self) -> Array:
         """Dry friction against motion backward, (n,)."""
-        return self.arm.drive("coulomb_backward")
+        return self.arm.motor_values("coulomb_backward")
 
     @property
     def dry(self) -> Flags:

@@ -2,12 +2,45 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, of_shape
 
 # Below this angle sin(angle)/angle is 1 to the last bit, so the axis needs no division by the angle.
 _TINY_ANGLE = 1e-12
+
+
+def exact_cosine(angle: float) -> float:
+    """Return cos(angle), exactly 0 or ±1 at the multiples of a right angle.
+
+    Twist angles of real arms are right angles; the zeros they leave are structure, not rounding.
+    """
+    return _exact(math.cos(angle))
+
+
+def exact_sine(angle: float) -> float:
+    """Return sin(angle), exactly 0 or ±1 at the multiples of a right angle."""
+    return _exact(math.sin(angle))
+
+
+def _exact(value: float) -> float:
+    return round(value) + 0.0 if abs(value - round(value)) < 1e-15 else value
+
+
+def elementary_rotation(axis: int, angle: float) -> Array:
+    """Return the rotation (3, 3) about x, y or z, axis 0 to 2, by an angle [rad]; right angles are exact."""
+    c, s = exact_cosine(angle), exact_sine(angle)
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[j, j], R[j, k], R[k, j], R[k, k] = c, 0.0 - s, s, c
+    return R
+
+
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation (3, 3) about the fixed axes x, y and z by three angles [rad]; right angles are exact."""
+    return elementary_rotation(2, yaw) @ elementary_rotation(1, pitch) @ elementary_rotation(0, roll)
 
 
 def orthonormality_error(R: ArrayLike) -> Array:

@@ -1,7 +1,7 @@
 """Joint axes as a Denavit-Hartenberg table: frames are put where the convention wants them.
 
 Frame i stands on the axis of joint i+1, where the common normal of the axes of the joints i and i+1 meets it. Two
-parallel axes have any number of common normals: that through the place the file gives to joint i+1 is taken.
+parallel axes have any number of common normals: that through the origin the file gives to joint i+1 is taken.
 
 Axes that are nearly parallel are the hard case. Their common normal is far away, 100 km for an angle of 1e-5 rad and
 axes 1 m apart, and dynamics seen from there lose twice as many digits as the distance has. Where the convention would
@@ -17,9 +17,10 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.arm.dh import turn, twist
+from armwright.arm.dh import twist
 from armwright.arrays import Array
 from armwright.spatial.poses import homogeneous, inverse
+from armwright.spatial.rotations import elementary_rotation
 
 # Angles this close to a right one, and lengths this close to 0 beside the size of the arm, are so: typed numbers of
 # twelve digits, multiplied a few times.
@@ -71,13 +72,13 @@ def frames_of(joints: Sequence[Array], axes: Sequence[Array], size: float) -> Fr
     Source:
         Denavit & Hartenberg (1955).
     """
-    first = X = homogeneous(_first_turn(joints[0][:3, :3], axes[0]), joints[0][:3, 3])
+    first = X = homogeneous(_first_rotation(joints[0][:3, :3], axes[0]), joints[0][:3, 3])
     rows, poses, leaning = [], [], []
     for joint, axis in zip(joints[1:], axes[1:], strict=True):
         row = _row(X, joint[:3, 3], axis, size * ROUNDING)
-        behind = X @ homogeneous(turn(2, row.theta), (0.0, 0.0, row.d)) @ twist(row.alpha, row.a)
+        behind = X @ homogeneous(elementary_rotation(2, row.theta), (0.0, 0.0, row.d)) @ twist(row.alpha, row.a)
         if np.linalg.norm(behind[:3, 3] - joint[:3, 3]) > size:
-            behind = homogeneous(_turn_on(axis, X[:3, 2], joint[:3, :3]), joint[:3, 3])
+            behind = homogeneous(_rotation_on_axis(axis, X[:3, 2], joint[:3, :3]), joint[:3, 3])
             row = Row(fixed=cleared_pose(inverse(X) @ behind, size, _NOISE))
         lean = float(np.linalg.norm(np.cross(X[:3, 2], axis)))
         leaning.append(lean if lean > ROUNDING else 0.0)
@@ -103,26 +104,24 @@ def cleared_pose(X: Array, size: float, rounding: float = ROUNDING) -> Array:
     return homogeneous(R, cleared(X[:3, 3], size, rounding))
 
 
-def _turn_on(axis: Array, before: Array, R: Array) -> Array:
-    """Return the turn (3, 3) of a frame on an axis, its x along the common normal with the axis before it.
+def _rotation_on_axis(axis: Array, before: Array, R: Array) -> Array:
+    """Return the rotation (3, 3) of a frame on an axis, its x along the common normal with the axis before it.
 
     So errors of the four numbers, which calibration looks for, are there as in a row of the table.
     """
     normal = np.cross(before, axis)
     length = float(np.linalg.norm(normal))
-    if length <= ROUNDING:
-        return _first_turn(R, axis)
-    x = normal / length
-    x = x - (x @ axis) * axis
-    x = x / np.linalg.norm(x)
-    return np.stack([x, np.cross(axis, x), axis], axis=-1)
+    return _first_rotation(R, axis) if length <= ROUNDING else _rotation_from_axes(normal / length, axis)
 
 
-def _first_turn(R: Array, z: Array) -> Array:
-    """Return the turn (3, 3) of frame 0: its x along that axis of the joint's own frame which fits best."""
-    own = R.T @ z
-    largest = int(np.abs(own).argmax())
-    x = R[:, (largest + 1) % 3]
+def _first_rotation(R: Array, z: Array) -> Array:
+    """Return the rotation (3, 3) of frame 0: its x along that axis of the joint's own frame which fits best."""
+    largest = int(np.abs(R.T @ z).argmax())
+    return _rotation_from_axes(R[:, (largest + 1) % 3], z)
+
+
+def _rotation_from_axes(x: Array, z: Array) -> Array:
+    """Return the rotation (3, 3) of a frame with this z axis, whose x axis is as near to another as can be."""
     x = x - (x @ z) * z
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z], axis=-1)
@@ -130,27 +129,27 @@ def _first_turn(R: Array, z: Array) -> Array:
 
 def _row(X: Array, p: Array, u: Array, tiny: float) -> Row:
     """Return the row that leads from frame X to a frame on the line through p along u."""
-    x, z, way = X[:3, 0], X[:3, 2], p - X[:3, 3]
+    x, z, lever = X[:3, 0], X[:3, 2], p - X[:3, 3]
     across, c = np.cross(z, u), float(z @ u)
     s = float(np.linalg.norm(across))
     if s <= ROUNDING:
-        aside = way - (way @ z) * z
+        aside = lever - (lever @ z) * z
         a = float(np.linalg.norm(aside))
         normal = aside / a if a > tiny else x
-        alpha, d = 0.0 if c > 0 else math.pi, float(way @ z)
+        alpha, d = 0.0 if c > 0 else math.pi, float(lever @ z)
     else:
         normal = across / s
-        a, alpha, d = float(way @ normal), math.atan2(s, c), float(np.cross(way, u) @ across) / s**2
+        a, alpha, d = float(lever @ normal), math.atan2(s, c), float(np.cross(lever, u) @ across) / s**2
     # The normal has two directions. The nearer one to the x axis before it keeps theta small; failing that, a > 0.
     nearer = float(x @ normal)
     if nearer < -ROUNDING or (nearer <= ROUNDING and a < -tiny):
         normal, a, alpha = -normal, -a, -alpha if s > ROUNDING else alpha
     theta = math.atan2(float(np.cross(x, normal) @ z), float(x @ normal))
     a, d = (0.0 if abs(length) <= tiny else length for length in (a, d))
-    return Row(theta=_squared(theta), d=d, a=a, alpha=_squared(alpha))
+    return Row(theta=_rounded_to_right_angle(theta), d=d, a=a, alpha=_rounded_to_right_angle(alpha))
 
 
-def _squared(angle: float) -> float:
+def _rounded_to_right_angle(angle: float) -> float:
     """Return an angle, the multiple of a right angle where it is one but for rounding."""
     whole = round(angle / _RIGHT_ANGLE) * _RIGHT_ANGLE
     return whole + 0.0 if abs(angle - whole) <= ROUNDING else angle

@@ -19,7 +19,7 @@ _MAX_LISTED = 50
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Moving:
+class MovingJoint:
     """A joint of the chain that moves, in the frame of the base link, all joints at 0.
 
     Attributes:
@@ -50,7 +50,7 @@ class Chain:
 
     base: str
     tip: str
-    moving: tuple[Moving, ...]
+    moving: tuple[MovingJoint, ...]
     X_BT: Array
     X_RB: Array
     notes: tuple[str, ...] = ()
@@ -72,44 +72,40 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
     base = _root(robot) if base is None else one_of("link", base, robot.links)
     notes: tuple[str, ...] = ()
     if tip is None:
-        tip, notes = _only_end(robot, base)
+        tip, notes = _default_tip(robot, base)
     one_of("link", tip, robot.links)
-    route = _route(robot, base, tip)
-    for joint in route:
+    path = _joint_path(robot, base, tip)
+    for joint in path:
         joint.require_serial()
-    stops = [joint for joint in route if not joint.fixed]
-    if not stops:
+    movable = [joint for joint in path if not joint.fixed]
+    if not movable:
         raise robot.error(f"no joint moves between the links '{base}' and '{tip}'")
-    if len(stops) > limit("joints"):
-        raise robot.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(stops))}")
+    if len(movable) > limit("joints"):
+        raise robot.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(movable))}")
     X, moving = np.eye(4), []
-    beside: list[UrdfJoint] = []
-    for joint in route:
+    branches: list[UrdfJoint] = []
+    for joint in path:
         X = X @ joint.origin
         if not joint.fixed:
-            bodies = tuple(_rigid_with(robot, joint.child, X, beside))
-            moving.append(Moving(joint=joint, X_BJ=X, axis=X[:3, :3] @ axis_of(joint), bodies=bodies))
-    _refuse_loads(robot, [joint for joint in beside if joint not in stops])
-    X_RB = np.eye(4)
-    for joint in _route(robot, _top(robot, base), base):
+            bodies = tuple(_rigid_bodies(robot, joint.child, X, branches))
+            moving.append(MovingJoint(joint=joint, X_BJ=X, axis=X[:3, :3] @ axis_of(joint), bodies=bodies))
+    _refuse_loads(robot, [joint for joint in branches if joint not in movable])
+    X_RB, root = np.eye(4), base
+    while root in robot.parent_joints:
+        root = robot.parent_joints[root].parent
+    for joint in _joint_path(robot, root, base):
         X_RB = X_RB @ joint.origin
     return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, notes=notes)
 
 
 def _root(robot: Robot) -> str:
-    roots = [name for name in robot.links if name not in robot.above]
+    roots = [name for name in robot.links if name not in robot.parent_joints]
     if len(roots) > 1:
         raise robot.error(f"the base link is ambiguous: it could be {_listed(roots)}; specify one as base (--base)")
     return roots[0]
 
 
-def _top(robot: Robot, link: str) -> str:
-    while link in robot.above:
-        link = robot.above[link].parent
-    return link
-
-
-def _only_end(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
+def _default_tip(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
     """Return the only link that ends a chain, and notes; one that is fixed to the base ends none.
 
     Where several ends are fixed to one another, the link that carries all of them is the end: it moves as they do.
@@ -118,8 +114,8 @@ def _only_end(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
     pending = [(base, False)]
     while pending:
         link, moves = pending.pop()
-        pending += [(joint.child, moves or not joint.fixed) for joint in reversed(robot.below[link])]
-        if moves and not robot.below[link]:
+        pending += [(joint.child, moves or not joint.fixed) for joint in reversed(robot.child_joints[link])]
+        if moves and not robot.child_joints[link]:
             ends.append(link)
     if not ends:
         raise robot.error(f"no joint moves a link below '{base}'")
@@ -138,61 +134,61 @@ def _only_end(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
 
 def _carrier(robot: Robot, base: str, ends: list[str]) -> str | None:
     """Return the last link that all ends hang on, if no joint moves between it and them, else None."""
-    routes = [_route(robot, base, end) for end in ends]
-    common = [row[0] for row in zip(*routes, strict=False) if all(joint is row[0] for joint in row)]
-    rigid = all(joint.fixed for route in routes for joint in route[len(common) :])
+    paths = [_joint_path(robot, base, end) for end in ends]
+    common = [row[0] for row in zip(*paths, strict=False) if all(joint is row[0] for joint in row)]
+    rigid = all(joint.fixed for path in paths for joint in path[len(common) :])
     return common[-1].child if common and rigid else None
 
 
-def _route(robot: Robot, base: str, tip: str) -> list[UrdfJoint]:
+def _joint_path(robot: Robot, base: str, tip: str) -> list[UrdfJoint]:
     """Return the joints from the base to the tip."""
-    route: list[UrdfJoint] = []
+    path: list[UrdfJoint] = []
     link = tip
     while link != base:
-        if link not in robot.above:
+        if link not in robot.parent_joints:
             raise robot.error(f"link '{tip}' is not below link '{base}'")
-        route.append(robot.above[link])
-        link = robot.above[link].parent
-    return route[::-1]
+        path.append(robot.parent_joints[link])
+        link = robot.parent_joints[link].parent
+    return path[::-1]
 
 
-def _rigid_with(robot: Robot, link: str, X_BL: Array, beside: list[UrdfJoint]) -> Iterator[Link]:
+def _rigid_bodies(robot: Robot, link: str, X_BL: Array, branches: list[UrdfJoint]) -> Iterator[Link]:
     """Walk through the bodies that are fixed to a link and to one another, in the frame of the base.
 
-    Joints that move and hang on one of them are put into ``beside``.
+    Joints that move and hang on one of them are put into ``branches``.
     """
     pending = [(link, X_BL)]
     while pending:
         name, X = pending.pop()
         yield carry(body_of(robot.links[name]), X)
-        for joint in robot.below[name]:
+        for joint in robot.child_joints[name]:
             if joint.fixed:
                 pending.append((joint.child, X @ joint.origin))
             else:
-                beside.append(joint)
+                branches.append(joint)
 
 
-def _refuse_loads(robot: Robot, beside: list[UrdfJoint]) -> None:
+def _refuse_loads(robot: Robot, branches: list[UrdfJoint]) -> None:
     """Refuse joints beside the chain that carry something: how that moves, a serial arm does not know."""
-    loaded = [joint for joint in beside if _carries(robot, joint)]
+    loaded = [joint for joint in branches if _carries_mass(robot, joint)]
     if loaded:
-        one, names = len(loaded) == 1, [joint.name for joint in loaded]
-        does = "joint lies beside the chain, moves and has" if one else "joints lie beside the chain, move and have"
+        single, names = len(loaded) == 1, [joint.name for joint in loaded]
+        does = "joint lies beside the chain, moves and has" if single else "joints lie beside the chain, move and have"
         raise loaded[0].element.error(
             "",
             f"{len(loaded)} {does} mass to carry: {_listed(names)}. An arm has no branches: choose another tip, or "
-            f"lock {'it' if one else 'them'}, at 0 or elsewhere: lock={names} (--lock {','.join(names)})",
+            f"lock {'it' if single else 'them'}, at 0 or elsewhere: lock={names} (--lock {','.join(names)})",
         )
 
 
-def _carries(robot: Robot, joint: UrdfJoint) -> bool:
+def _carries_mass(robot: Robot, joint: UrdfJoint) -> bool:
     pending = [joint.child]
     while pending:
         name = pending.pop()
         body = body_of(robot.links[name])
         if body.mass or body.inertia.any() or body.unknown:
             return True
-        pending += [below.child for below in robot.below[name]]
+        pending += [child_joint.child for child_joint in robot.child_joints[name]]
     return False
 
 

@@ -1,8 +1,8 @@
-"""URDF text as elements that know their place: what is read is checked, and named with file, line and key.
+"""URDF text as elements that know their location: what is read is checked, and named with file, line and key.
 
 Elements and attributes that URDF does not have are skipped, as files are full of what other programs put there. But
 one that is spelt nearly as URDF spells it is refused, since what it says would be lost; and so is whatever else an
-<origin> says of a place.
+<origin> says of a pose.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Element:
     Attributes:
         path: the file.
         line: where the element starts.
-        place: how messages call it, such as ``joint 'elbow', limit``; empty for the robot.
+        location: how messages call it, such as ``joint 'elbow', limit``; empty for the robot.
         tag: its name.
         attributes: its attributes as they are written.
         children: the elements in it, those of other namespaces left out.
@@ -61,7 +61,7 @@ class Element:
 
     path: Path
     line: int
-    place: str
+    location: str
     tag: str
     attributes: dict[str, str]
     children: tuple[Element, ...]
@@ -73,34 +73,34 @@ class Element:
 
     def error(self, attribute: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of an attribute, or of the element itself where that is empty."""
-        key = ", ".join(part for part in (self.place, attribute) if part)
+        key = ", ".join(part for part in (self.location, attribute) if part)
         return FileFormatError(self.path, self.line, key, message)
 
-    def all(self, tag: str) -> list[Element]:
+    def find_all(self, tag: str) -> list[Element]:
         """Return the elements in it that have a name, in their order."""
         return [child for child in self.children if child.tag == tag]
 
-    def one(self, tag: str) -> Element | None:
+    def find(self, tag: str) -> Element | None:
         """Return the element in it that has a name, or None.
 
         Raises:
             FileFormatError: there are two.
         """
-        found = self.all(tag)
-        if len(found) > 1:
-            raise found[1].error("", f"occurs twice, first in line {found[0].line}")
-        return found[0] if found else None
+        children = self.find_all(tag)
+        if len(children) > 1:
+            raise children[1].error("", f"occurs twice, first in line {children[0].line}")
+        return children[0] if children else None
 
-    def needed(self, tag: str) -> Element:
+    def require(self, tag: str) -> Element:
         """Return the element in it that has a name.
 
         Raises:
             FileFormatError: there is none, or there are two.
         """
-        found = self.one(tag)
-        if found is None:
+        child = self.find(tag)
+        if child is None:
             raise self.error("", f"expected <{tag}> in it")
-        return found
+        return child
 
     def text(self, attribute: str) -> str:
         """Return an attribute as it is written.
@@ -134,8 +134,7 @@ class Element:
         """
         if attribute not in self.attributes and default is not _MISSING:
             return np.array(default, dtype=np.float64)
-        words = self.text(attribute).split()
-        numbers = [self._number(attribute, word) for word in words]
+        numbers = [self._number(attribute, word) for word in self.text(attribute).split()]
         if len(numbers) != 3:
             raise self.error(attribute, f"expected 3 numbers, got {len(numbers)}")
         return np.array(numbers)
@@ -173,7 +172,7 @@ def read_elements(path: Path) -> Element:
     space, tag = _split(raw)
     if tag != "robot":
         raise FileFormatError(path, raw.sourceline, "", f"expected <robot>, as URDF files have, got <{tag}>")
-    foreign = next((one for one in raw.iter() if "xacro" in _split(one)[0]), None)
+    foreign = next((each for each in raw.iter() if "xacro" in _split(each)[0]), None)
     if foreign is not None:
         raise FileFormatError(path, foreign.sourceline, f"<{_split(foreign)[1]}>", _XACRO)
     _refuse_deep(path, raw)
@@ -184,7 +183,7 @@ def _refuse_deep(path: Path, raw: Any) -> None:
     """Refuse elements in one another beyond the limit."""
     row, most = list(raw), limit("nesting")
     for _ in range(most):
-        row = [below for one in row for below in one]
+        row = [child for element in row for child in element]
         if not row:
             return
     raise FileFormatError(path, row[0].sourceline, "", f"nested too deeply: {limit_message('nesting')}")
@@ -207,12 +206,14 @@ def _element(path: Path, raw: Any, space: str, around: str) -> Element:
         )
     attributes = dict(raw.attrib)
     if tag in {"link", "joint"} and not around:
-        place = f"{tag} {shown(attributes['name'])}" if "name" in attributes else tag
+        location = f"{tag} {shown(attributes['name'])}" if "name" in attributes else tag
     else:
-        place = ", ".join(part for part in (around, tag) if part and tag != "robot")
-    inside = [one for one in raw if _split(one)[0] == space and _split(one)[1]]
-    children = tuple(_element(path, one, space, place) for one in inside) if tag in _KNOWN else ()
-    element = Element(path=path, line=raw.sourceline, place=place, tag=tag, attributes=attributes, children=children)
+        location = ", ".join(part for part in (around, tag) if part and tag != "robot")
+    inside = [each for each in raw if _split(each)[0] == space and _split(each)[1]] if tag in _KNOWN else []
+    children = tuple(_element(path, each, space, location) for each in inside)
+    element = Element(
+        path=path, line=raw.sourceline, location=location, tag=tag, attributes=attributes, children=children
+    )
     _refuse_misspelt(element)
     return element
 

@@ -75,16 +75,15 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
     if isinstance(lock, str):
         raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
     path = Path(path)
-    held = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
-    robot = read_robot(path, {name: number(at, f"lock, '{name}'") for name, at in held.items()})
+    locked = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
+    robot = read_robot(path, {name: number(q, f"lock, '{name}'") for name, q in locked.items()})
     chain = chain_of(robot, base, tip)
     size = _size(chain)
-    frames = frames_of([one.X_BJ for one in chain.moving], [one.axis for one in chain.moving], size)
+    frames = frames_of([each.X_BJ for each in chain.moving], [each.axis for each in chain.moving], size)
     joints, links, motors, notes = [], [], [], [*chain.notes, *_leaning(chain, frames)]
     for moving, row, X in zip(chain.moving, frames.rows, frames.poses, strict=True):
         limits, unknown = limits_of(moving.joint)
-        slides = moving.joint.kind == "prismatic"
-        kind: JointKind = "prismatic" if slides else "revolute"
+        kind: JointKind = "prismatic" if moving.joint.kind == "prismatic" else "revolute"
         joints.append(Joint(kind=kind, **attrs.asdict(row), limits=limits, name=moving.joint.name))
         links.append(attrs.evolve(_link(moving.bodies, X, size), name=moving.joint.child))
         motors.append(motor_of(moving.joint))
@@ -110,8 +109,8 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
 
 def _size(chain: Chain) -> float:
     """Return how far the joints and the tip are from the base, or 1 m where all are in one place."""
-    places = np.array([*(one.X_BJ[:3, 3] for one in chain.moving), chain.X_BT[:3, 3]])
-    return float(np.linalg.norm(places, axis=-1).max()) or 1.0
+    origins = np.array([*(each.X_BJ[:3, 3] for each in chain.moving), chain.X_BT[:3, 3]])
+    return float(np.linalg.norm(origins, axis=-1).max()) or 1.0
 
 
 def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:
@@ -144,8 +143,8 @@ def _welded(bodies: Sequence[Link]) -> Link:
 def _leaning(chain: Chain, frames: Frames) -> list[str]:
     """Say which axes are nearly parallel, and so were probably meant to be."""
     return [
-        f"joints '{one.joint.name}' and '{other.joint.name}': their axes deviate by {angle:.1e} rad from "
+        f"joints '{first.joint.name}' and '{second.joint.name}': their axes deviate by {angle:.1e} rad from "
         "parallel, which is preserved; if they should be parallel, write their angles with more digits"
-        for one, other, angle in zip(chain.moving, chain.moving[1:], frames.leaning, strict=False)
+        for first, second, angle in zip(chain.moving, chain.moving[1:], frames.leaning, strict=False)
         if 0 < angle < _MEANT_PARALLEL
     ]

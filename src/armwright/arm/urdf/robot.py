@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import attrs
 import numpy as np
 
-from armwright.arm.dh import turn
 from armwright.arm.model import Limits, Link, Motor
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.urdf.elements import Element, read_elements
@@ -17,7 +17,7 @@ from armwright.arrays import Array
 from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
 from armwright.files.limits import limit, limit_message
 from armwright.spatial.poses import homogeneous
-from armwright.spatial.rotations import rotation_from_vector
+from armwright.spatial.rotations import rotation_from_rpy, rotation_from_vector
 
 # URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
 NO_LIMIT = 1e30
@@ -71,7 +71,7 @@ class UrdfJoint:
             return
         if self.kind not in _MOVING:
             raise self.element.error("type", f"an arm cannot have a {self.kind} joint; expected {_either(_MOVING)}")
-        follows = self.element.one("mimic")
+        follows = self.element.find("mimic")
         if follows is not None:
             master = follows.attributes.get("joint", "another joint")
             raise follows.error("", f"the joint mimics '{master}'; an arm can only have independent joints")
@@ -85,15 +85,15 @@ class Robot:
         path: the file.
         name: of the robot; that of the file where it has none.
         links: by name, in the order of the file.
-        above: by the name of a link: the joint that carries it.
-        below: by the name of a link: the joints that hang on it.
+        parent_joints: by the name of a link: the joint that carries it.
+        child_joints: by the name of a link: the joints that hang on it.
     """
 
     path: Path
     name: str
     links: dict[str, Element]
-    above: dict[str, UrdfJoint]
-    below: dict[str, list[UrdfJoint]]
+    parent_joints: dict[str, UrdfJoint]
+    child_joints: dict[str, list[UrdfJoint]]
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the whole file."""
@@ -115,29 +115,29 @@ def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
     """
     root, lock = read_elements(path), lock or {}
     links: dict[str, Element] = {}
-    for element in root.all("link"):
+    for element in root.find_all("link"):
         if element.name in links:
             raise element.error("name", f"another link has this name, in line {links[element.name].line}")
         links[element.name] = element
     names: dict[str, UrdfJoint] = {}
-    above: dict[str, UrdfJoint] = {}
-    below: dict[str, list[UrdfJoint]] = {name: [] for name in links}
-    for element in root.all("joint"):
+    parent_joints: dict[str, UrdfJoint] = {}
+    child_joints: dict[str, list[UrdfJoint]] = {name: [] for name in links}
+    for element in root.find_all("joint"):
         joint = _joint(element, links, lock)
         if joint.name in names:
             raise element.error("name", f"another joint has this name, in line {names[joint.name].element.line}")
-        if joint.child in above:
-            raise element.error(
-                "child", f"link '{joint.child}' is already the child of joint '{above[joint.child].name}'"
-            )
-        names[joint.name] = above[joint.child] = joint
-        below[joint.parent].append(joint)
+        if joint.child in parent_joints:
+            other = parent_joints[joint.child].name
+            raise element.error("child", f"link '{joint.child}' is already the child of joint '{other}'")
+        names[joint.name] = parent_joints[joint.child] = joint
+        child_joints[joint.parent].append(joint)
     for name in lock:
         one_of("joint", name, names)
     if not links:
         raise root.error("", "expected at least one <link> in <robot>")
-    robot = Robot(path=path, name=root.attributes.get("name") or path.stem, links=links, above=above, below=below)
-    _refuse_rings(robot)
+    name = root.attributes.get("name") or path.stem
+    robot = Robot(path=path, name=name, links=links, parent_joints=parent_joints, child_joints=child_joints)
+    _refuse_cycles(robot)
     return robot
 
 
@@ -149,7 +149,7 @@ def _joint(element: Element, links: dict[str, Element], lock: Mapping[str, float
         raise element.error("type", f"expected one of {', '.join(_KINDS)}, got '{kind}'{hint}")
     ends = []
     for tag in ("parent", "child"):
-        end = element.needed(tag)
+        end = element.require(tag)
         link = end.text("link")
         if link not in links:
             near = closest(link, links)
@@ -171,19 +171,14 @@ def _locked(joint: UrdfJoint, position: float) -> UrdfJoint:
     return attrs.evolve(joint, kind="fixed", locked=position)
 
 
-def _refuse_rings(robot: Robot) -> None:
-    """Refuse links that hang on one another in a ring."""
-    settled: set[str] = set()
-    for start in robot.links:
-        way: dict[str, None] = {}
-        link = start
-        while link not in settled and link in robot.above:
-            if link in way:
-                ring = list(way)[list(way).index(link) :]
-                raise robot.above[link].element.error("", f"links form a cycle: {', '.join(map(repr, sorted(ring)))}")
-            way[link] = None
-            link = robot.above[link].parent
-        settled.update(way)
+def _refuse_cycles(robot: Robot) -> None:
+    """Refuse links that hang on one another in a cycle."""
+    try:
+        TopologicalSorter({child: [joint.parent] for child, joint in robot.parent_joints.items()}).prepare()
+    except CycleError as error:
+        cycle = sorted(set(error.args[1]))
+        joint = robot.parent_joints[cycle[0]]
+        raise joint.element.error("", f"links form a cycle: {', '.join(map(repr, cycle))}") from None
 
 
 def origin_of(element: Element) -> Array:
@@ -192,11 +187,11 @@ def origin_of(element: Element) -> Array:
     Raises:
         FileFormatError: it is not written as one.
     """
-    origin = element.one("origin")
+    origin = element.find("origin")
     if origin is None:
         return np.eye(4)
-    roll, pitch, yaw = origin.vector("rpy", (0.0, 0.0, 0.0))
-    return homogeneous(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll), origin.vector("xyz", (0.0, 0.0, 0.0)))
+    rpy, xyz = (origin.vector(key, (0.0, 0.0, 0.0)) for key in ("rpy", "xyz"))
+    return homogeneous(rotation_from_rpy(*rpy), xyz)
 
 
 def axis_of(joint: UrdfJoint) -> Array:
@@ -205,7 +200,7 @@ def axis_of(joint: UrdfJoint) -> Array:
     Raises:
         FileFormatError: it is no axis.
     """
-    element = joint.element.one("axis")
+    element = joint.element.find("axis")
     if element is None:
         return np.array((1.0, 0.0, 0.0))
     axis = element.vector("xyz", (1.0, 0.0, 0.0))
@@ -224,12 +219,12 @@ def body_of(link: Element) -> Link:
     Raises:
         FileFormatError: mass or inertia are missing, or no numbers.
     """
-    inertial = link.one("inertial")
+    inertial = link.find("inertial")
     if inertial is None:
         return Link()
     X = origin_of(inertial)
-    mass = inertial.needed("mass").number("value", lower=0.0)
-    element = inertial.needed("inertia")
+    mass = inertial.require("mass").number("value", lower=0.0)
+    element = inertial.require("inertia")
     xx, yy, zz, xy, xz, yz = (element.number(key) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     moments = impossible_moments(mass, X[:3, 3], tensor)
@@ -245,7 +240,7 @@ def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
     Raises:
         FileFormatError: there are none where the kind of joint needs them, or nothing can satisfy them.
     """
-    element = joint.element.one("limit")
+    element = joint.element.find("limit")
     if element is None:
         if joint.kind == "continuous":
             return Limits(), []
@@ -285,7 +280,7 @@ def motor_of(joint: UrdfJoint) -> Motor:
     Raises:
         FileFormatError: it is negative.
     """
-    element = joint.element.one("dynamics")
+    element = joint.element.find("dynamics")
     if element is None:
         return Motor()
     dry = element.number("friction", 0.0, lower=0.0)
