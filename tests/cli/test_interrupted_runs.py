@@ -1,4 +1,4 @@
-"""A whole run that is struck by a signal at any moment of its life: old results or new ones, never a mix unnamed."""
+"""A run that gets a signal at any moment of its life: old results or new ones, and a mix is always named."""
 
 import contextlib
 import json
@@ -126,7 +126,7 @@ def with_old_results(bench: Bench, out: Path) -> None:
 @pytest.mark.share(0.04)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
 @pytest.mark.drawn(0.34)
-def test_signals(number: signal.Signals, bench: Bench, sample: Sample, tmp_path: Path) -> None:
+def test_signal_leaves_old_or_new_results(number: signal.Signals, bench: Bench, sample: Sample, tmp_path: Path) -> None:
     """A signal leaves the old results or the new ones, and says truly which; the next run leaves nothing else."""
     found = {OLD: 0, NEW: 0}
     silent = 0
@@ -156,7 +156,7 @@ def test_signals(number: signal.Signals, bench: Bench, sample: Sample, tmp_path:
 
 
 @pytest.mark.share(0.04)
-def test_kill(bench: Bench, sample: Sample, tmp_path: Path) -> None:
+def test_kill_leaves_named_mixes_at_most(bench: Bench, sample: Sample, tmp_path: Path) -> None:
     """SIGKILL leaves old results, new ones, or a mix whose every file is named; the next run clears up."""
     found = {OLD: 0, NEW: 0, MIX: 0}
     for case, rng in enumerate(sample.cases(50)):
@@ -183,7 +183,7 @@ def assert_named(out: Path) -> None:
             assert is_stray(path)
 
 
-def test_leftovers_of_several(bench: Bench, tmp_path: Path) -> None:
+def test_next_run_removes_leftovers(bench: Bench, tmp_path: Path) -> None:
     """What several killed runs have left beside a folder, in it or half removed is gone after the next run."""
     out = tmp_path / "out"
     with_old_results(bench, out)
@@ -218,7 +218,9 @@ def _plan_poses(_bench: Bench, to: Path) -> list[str]:
 
 
 @pytest.mark.parametrize(("call", "name"), [(_code, "x.rlc"), (_convert, "x.urdf"), (_plan_poses, "x.csv")])
-def test_single_files(call: Callable[[Bench, Path], list[str]], name: str, bench: Bench, tmp_path: Path) -> None:
+def test_single_files_remove_leftovers(
+    call: Callable[[Bench, Path], list[str]], name: str, bench: Bench, tmp_path: Path
+) -> None:
     """Beside a single file that is written, what a killed process has left goes as well."""
     to = tmp_path / name
     for left in ("0" * 16, "1" * 16):

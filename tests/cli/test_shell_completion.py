@@ -1,4 +1,4 @@
-"""What a shell is told while somebody types, and what --help shows."""
+"""Completion of commands, options and files in a shell, and what --help shows."""
 
 import os
 import shutil
@@ -37,7 +37,7 @@ def offered(*words: str, cwd: Path | None = None) -> list[str]:
 
 
 @pytest.mark.parametrize("path", [path for path, _ in all_commands(typer.main.get_command(app))], ids=" ".join)
-def test_flags_have_no_type(path: tuple[str, ...]) -> None:
+def test_help_shows_flags_without_a_type(path: tuple[str, ...]) -> None:
     """What takes no value is shown without one."""
     shown = CliRunner().invoke(app, [*path, "--help"]).output
 
@@ -65,7 +65,7 @@ def test_flags_have_no_type(path: tuple[str, ...]) -> None:
         (("--raise", "table_m"), ["table_mb="]),
     ],
 )
-def test_what_a_word_may_become(words: tuple[str, ...], told: list[str], tmp_path: Path) -> None:
+def test_words_are_completed(words: tuple[str, ...], told: list[str], tmp_path: Path) -> None:
     """Commands, options, arms and every word that an option knows are completed."""
     found = offered(*words, cwd=tmp_path)
 
@@ -73,7 +73,7 @@ def test_what_a_word_may_become(words: tuple[str, ...], told: list[str], tmp_pat
     assert all(word.lower().startswith(words[-1].lower()) for word in found)
 
 
-def test_files(tmp_path: Path) -> None:
+def test_files_are_completed(tmp_path: Path) -> None:
     """A file stands beside the arms that begin like it; all other paths are left to the shell."""
     (tmp_path / "ur5_mine.toml").touch()
     (tmp_path / "ur5s").mkdir()
@@ -84,7 +84,7 @@ def test_files(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash on this machine")
-def test_bash(tmp_path: Path) -> None:
+def test_bash_completes_a_word(tmp_path: Path) -> None:
     """Bash reads the script and fills in what fits."""
     program = tmp_path / "armwright"
     program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m armwright "$@"\n')
@@ -107,7 +107,7 @@ def test_bash(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("shell", get_args(Shell))
-def test_scripts(shell: Shell) -> None:
+def test_each_shell_has_a_script(shell: Shell) -> None:
     """Every shell has a script, which asks by the variable that the program listens to."""
     assert "_ARMWRIGHT_COMPLETE" in script(shell)
 
@@ -120,7 +120,9 @@ def test_scripts(shell: Shell) -> None:
         ("fish", ".config/fish/completions/armwright.fish"),
     ],
 )
-def test_installed(shell: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_script_is_installed_where_the_shell_looks(
+    shell: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The script goes where the shell looks for it, and its place is said."""
     monkeypatch.setenv("HOME", str(tmp_path))
 
@@ -131,7 +133,7 @@ def test_installed(shell: str, file: str, tmp_path: Path, monkeypatch: pytest.Mo
     assert "_ARMWRIGHT_COMPLETE" in (tmp_path / file).read_text()
 
 
-def test_a_pipe_in_the_place_of_a_start_up_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pipe_in_place_of_a_start_up_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody waits for a pipe where a shell has its start-up file."""
     os.mkfifo(tmp_path / ".bashrc")
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -142,7 +144,7 @@ def test_a_pipe_in_the_place_of_a_start_up_file(tmp_path: Path, monkeypatch: pyt
     assert ".bashrc: expected a file, got a pipe" in done.stderr
 
 
-def test_cannot_be_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_start_up_file_that_is_no_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Start-up files that are no text are left alone, and the script can be had otherwise."""
     (tmp_path / ".bashrc").write_bytes(b"\xff\xfe")
     monkeypatch.setenv("HOME", str(tmp_path))

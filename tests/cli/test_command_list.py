@@ -11,7 +11,7 @@ from armwright.cli.app import app, application
 from armwright.cli.command_list import COMMANDS
 
 
-def test_the_list_says_what_commands_say() -> None:
+def test_each_command_is_listed_with_its_first_sentence() -> None:
     """Each command is listed with the first sentence of its help, and no other is."""
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     said = {name: inspect.cleandoc(one.help).split("\n\n")[0].replace("\n", " ") for name, one in commands.items()}
@@ -20,7 +20,7 @@ def test_the_list_says_what_commands_say() -> None:
 
 
 @pytest.mark.parametrize(("words", "loaded"), [(["--help"], set()), (["arms"], {"arms"}), (["-h", "show"], {"show"})])
-def test_only_what_is_asked_for_is_imported(words: list[str], loaded: set[str]) -> None:
+def test_only_the_named_command_is_imported(words: list[str], loaded: set[str]) -> None:
     """A list of commands needs neither Rich nor the modules of commands; a command needs its own."""
     names = {name.replace("-", "_") for name in COMMANDS} - {"jacobian"}
     script = (
