@@ -292,7 +292,7 @@ def test_names_are_kept(read: Callable[..., Arm], tmp_path: Path) -> None:
     written = urdf_text(again)
     assert '<joint name="turn" type="revolute">' in written
     assert '<link name="hand" />' in written
-    assert '<link name="tool"/>' in written  # the hand is the tool; two links cannot have one name
+    assert '<link name="tool" />' in written  # the hand is the tool; two links cannot have one name
     solution = inverse(arm, forward(arm, [2.5]))
     assert "joint 1 ('turn') would be at 143.2 deg, 28.6 deg beyond its limit 114.6 deg" in solution.explain()
 
