@@ -72,25 +72,11 @@ def _lines(code: Code) -> Iterator[str]:
     for at, step in enumerate(code.instructions):
         source, span = code.source, step.span
         place = f"{source.line(span.start)}:{source.column(span.start)}+{span.end - span.start}"
-        operands = " ".join(map(_written, step.operands))
-        row = f"{at:04d}  {place + ('!' if step.begins else ''):<12} {step.op.value:<6} {operands}".rstrip()
+        operands = (repr(float(part)) if isinstance(part, float | int) else str(part) for part in step.operands)
+        row = f"{at:04d}  {place + ('!' if step.begins else ''):<12} {step.op:<6} {' '.join(operands)}".rstrip()
         yield f"{row:<56} ; {step.comment}" if step.comment else row
     yield "source"
     yield from (f"| {json.dumps(line, ensure_ascii=False)[1:-1]}" for line in code.source.text.split("\n"))
-
-
-def _written(operand: Operand) -> str:
-    match operand:
-        case str():
-            return operand
-        case Constant(index=index):
-            return f"c{index}"
-        case JumpTarget(index=index):
-            return f"@{index:04d}"
-        case Text(value=value):
-            return json.dumps(value, ensure_ascii=False)
-        case _:
-            return repr(float(operand))
 
 
 # ---- reading -------------------------------------------------------------------------------------------------------

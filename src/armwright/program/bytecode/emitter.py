@@ -91,7 +91,7 @@ class Emitter:
                 return self._matrix(node, into or self.passing())
             case tree.Function(name=name, arguments=arguments):
                 operands = [self.value(argument) for argument in arguments]
-                return self._operation(Op(name.key), into or self.passing(), *operands, node=node)
+                return self._operation(Op[name.key], into or self.passing(), *operands, node=node)
             case tree.Unary():
                 value = self.value(node.operand)
                 op = Op.NOT if node.operation == "NOT" else Op.NEG

@@ -2,8 +2,8 @@
 
 import enum
 import json
-from collections.abc import Iterator, Mapping
-from typing import TypeAlias
+from collections.abc import Mapping
+from typing import Self, TypeAlias
 
 import attrs
 
@@ -14,77 +14,96 @@ from armwright.program.language.words import Standard
 
 
 class Op(enum.StrEnum):
-    """What an instruction does; docs/code.md has the operands. What a value goes to is the first operand."""
+    """What an instruction does, and what its operands are; docs/code.md explains both.
+
+    The operands have a letter each: N a number, P a pose or transformation, T a truth value, v any value, t any value
+    or a text; F, S and E the name of a FRAME, a SCALAR or an EVENT, n any name, C a counter; k and K a constant of one
+    and of twelve numbers, j a jump target; a an axis, o ON or OFF, r RIGIDLY, w any word. What is in brackets may be
+    left out, + stands for any number more of the last. In front of `=` is what the result is, which goes to the first
+    operand.
+
+    Attributes:
+        signature: the letters of its operands.
+    """
+
+    _value_: str
+    signature: str
+
+    def __new__(cls, name: str, signature: str) -> Self:
+        """Return the operation of a name, with the letters of its operands."""
+        op = str.__new__(cls, name)
+        op._value_, op.signature = name, signature
+        return op
 
     # values
-    LOADM = "LOADM"  # to, constant: the twelve numbers
-    LOADS = "LOADS"  # to, constant: the number
-    COPY = "COPY"  # to, value
-    MATX = "MATX"  # to, twelve values: n, o, a, p
-    MUL = "MUL"  # to, left, right: numbers, or places and steps
-    DIV = "DIV"
-    ADD = "ADD"
-    SUB = "SUB"
-    NEG = "NEG"  # to, value
-    INV = "INV"  # to, place or step
-    LT = "LT"  # to, left, right: a truth value
-    LE = "LE"
-    EQ = "EQ"
-    NE = "NE"
-    GE = "GE"
-    GT = "GT"
-    NOT = "NOT"  # to, truth value
-    XYZ = "XYZ"  # to, x, y, z: a step without a turn
-    ROTX = "ROTX"  # to, angle: a turn
-    ROTY = "ROTY"
-    ROTZ = "ROTZ"
-    DIST = "DIST"  # to, frame, frame
-    FORCE = "FORCE"  # to, axis
-    ELEM = "ELEM"  # to, array, indices: the element itself, to be read and written
+    LOADM = "LOADM", "P=K"  # to, constant: the twelve numbers
+    LOADS = "LOADS", "N=k"  # to, constant: the number
+    COPY = "COPY", "nv"  # to, value
+    MATX = "MATX", "P=NNNNNNNNNNNN"  # to, twelve values: n, o, a, p
+    MUL = "MUL", "nvv"  # to, left, right: numbers, or places and steps
+    DIV = "DIV", "N=NN"
+    ADD = "ADD", "N=NN"
+    SUB = "SUB", "N=NN"
+    NEG = "NEG", "N=N"  # to, value
+    INV = "INV", "P=P"  # to, place or step
+    LT = "LT", "T=NN"  # to, left, right: a truth value
+    LE = "LE", "T=NN"
+    EQ = "EQ", "T=NN"
+    NE = "NE", "T=NN"
+    GE = "GE", "T=NN"
+    GT = "GT", "T=NN"
+    NOT = "NOT", "T=T"  # to, truth value
+    XYZ = "XYZ", "P=NNN"  # to, x, y, z: a step without a turn
+    ROTX = "ROTX", "P=N"  # to, angle: a turn
+    ROTY = "ROTY", "P=N"
+    ROTZ = "ROTZ", "P=N"
+    DIST = "DIST", "N=PP"  # to, frame, frame
+    FORCE = "FORCE", "N=a"  # to, axis
+    ELEM = "ELEM", "nwN+"  # to, array, indices: the element itself, to be read and written
     # frames
-    AFFIX = "AFFIX"  # child, parent[, RIGIDLY]: hang on, where both stand now
-    AFFAT = "AFFAT"  # child, parent, step[, RIGIDLY]: hang on, at a step from the parent
-    UNFIX = "UNFIX"  # child[, parent]: cut; the child keeps its place
+    AFFIX = "AFFIX", "FF(r)"  # child, parent[, RIGIDLY]: hang on, where both stand now
+    AFFAT = "AFFAT", "FFP(r)"  # child, parent, step[, RIGIDLY]: hang on, at a step from the parent
+    UNFIX = "UNFIX", "F(F)"  # child[, parent]: cut; the child keeps its place
     # tools and sensors
-    OPEN = "OPEN"  # arm[, width]: open the fingers
-    GRASP = "GRASP"  # [arm]: close the fingers; without an arm, of the one named or moved last
-    OPER = "OPER"  # device, ON or OFF
-    READV = "READV"  # frame: ask the vision system
-    READS = "READS"  # arm: read the joint sensors
+    OPEN = "OPEN", "w(N)"  # arm[, width]: open the fingers
+    GRASP = "GRASP", "(w)"  # [arm]: close the fingers; without an arm, of the one named or moved last
+    OPER = "OPER", "wo"  # device, ON or OFF
+    READV = "READV", "F"  # frame: ask the vision system
+    READS = "READS", "w"  # arm: read the joint sensors
     # motion
-    MVBEG = "MVBEG"  # moved, goal: a motion begins
-    MVDIR = "MVDIR"  # the shortest way in joint space
-    MVSTR = "MVSTR"  # one straight line
-    MVVIA = "MVVIA"  # frames: through these without a stop
-    MVAPP = "MVAPP"  # frame: approach point
-    MVDEP = "MVDEP"  # frame: departure point
-    MVSPD = "MVSPD"  # number: speed
-    MVBLD = "MVBLD"  # number: how far from via points corners may be rounded
-    MVDUR = "MVDUR"  # number: how long it shall take
-    MVON = "MVON"  # condition, truth value, action: look at every tick, act once
-    MVEND = "MVEND"  # go
-    MVHLT = "MVHLT"  # in an action: end the motion
+    MVBEG = "MVBEG", "FP"  # moved, goal: a motion begins
+    MVDIR = "MVDIR", ""  # the shortest way in joint space
+    MVSTR = "MVSTR", ""  # one straight line
+    MVVIA = "MVVIA", "P+"  # frames: through these without a stop
+    MVAPP = "MVAPP", "P"  # frame: approach point
+    MVDEP = "MVDEP", "P"  # frame: departure point
+    MVSPD = "MVSPD", "N"  # number: speed
+    MVBLD = "MVBLD", "N"  # number: how far from via points corners may be rounded
+    MVDUR = "MVDUR", "N"  # number: how long it shall take
+    MVON = "MVON", "jnj"  # condition, truth value, action: look at every tick, act once
+    MVEND = "MVEND", ""  # go
+    MVHLT = "MVHLT", ""  # in an action: end the motion
     # control
-    JMP = "JMP"  # place
-    JZ = "JZ"  # truth value, place: go there when it is false
-    FOR = "FOR"  # variable, count so far, first, last, step, place: next pass, or go there
-    CALL = "CALL"  # procedure, arguments
-    RET = "RET"  # end of a procedure, a condition or an action
-    FORK = "FORK"  # place[, priority]: a process begins there
-    JOIN = "JOIN"  # wait for the processes begun here
-    QUIT = "QUIT"  # end of a process
-    SIG = "SIG"  # event
-    WAIT = "WAIT"  # event
-    PAUSE = "PAUSE"  # seconds
-    LOCK = "LOCK"  # variables or elements
-    UNLK = "UNLK"  # the same
-    TRY = "TRY"  # place of the recovery
-    ENDT = "ENDT"  # place behind the recovery; nothing went wrong
-    ENDR = "ENDR"  # end of a recovery
-    RETRY = "RETRY"  # from the start of the TRY again
-    HALT = "HALT"  # the program ends here
-    STOP = "STOP"  # end of the text
-    PRINT = "PRINT"  # values and texts
+    JMP = "JMP", "j"  # place
+    JZ = "JZ", "Tj"  # truth value, place: go there when it is false
+    FOR = "FOR", "SCNNNj"  # variable, count so far, first, last, step, place: next pass, or go there
+    CALL = "CALL", "w(v+)"  # procedure, arguments
+    RET = "RET", ""  # end of a procedure, a condition or an action
+    FORK = "FORK", "j(N)"  # place[, priority]: a process begins there
+    JOIN = "JOIN", ""  # wait for the processes begun here
+    QUIT = "QUIT", ""  # end of a process
+    SIG = "SIG", "E"  # event
+    WAIT = "WAIT", "E"  # event
+    PAUSE = "PAUSE", "N"  # seconds
+    LOCK = "LOCK", "n+"  # variables or elements
+    UNLK = "UNLK", "n+"  # the same
+    TRY = "TRY", "j"  # place of the recovery
+    ENDT = "ENDT", "j"  # place behind the recovery; nothing went wrong
+    ENDR = "ENDR", ""  # end of a recovery
+    RETRY = "RETRY", ""  # from the start of the TRY again
+    HALT = "HALT", ""  # the program ends here
+    STOP = "STOP", ""  # end of the text
+    PRINT = "PRINT", "t+"  # values and texts
 
 
 @attrs.frozen
@@ -93,6 +112,9 @@ class Constant:
 
     index: int
 
+    def __str__(self) -> str:
+        return f"c{self.index}"
+
 
 @attrs.frozen
 class JumpTarget:
@@ -100,12 +122,18 @@ class JumpTarget:
 
     index: int
 
+    def __str__(self) -> str:
+        return f"@{self.index:04d}"
+
 
 @attrs.frozen
 class Text:
     """An operand: characters to print."""
 
     value: str
+
+    def __str__(self) -> str:
+        return json.dumps(self.value, ensure_ascii=False)
 
 
 # A name in upper case (a variable, an arm, a device, a procedure, a word such as RIGIDLY), a value in passing
@@ -265,35 +293,20 @@ def listing(code: Code) -> str:
     for at, step in enumerate(code.instructions):
         if at in starts:
             rows.append(f"{'':{width + 9}}{code.spelled(starts[at])}:")
-        rows.append(_row(code, at, step, width))
+        row = f"{at:04d} {code.line(step):>{width}}    {step.op:<6} {' '.join(shown_operands(code, step))}".rstrip()
+        rows.append(f"{row:<37} ; {step.comment}" if step.comment else row)
     if code.constants:
-        rows += ["", *(f"c{index:<4} {number_list(value)}" for index, value in enumerate(code.constants))]
+        rows += ["", *(f"c{index:<4} {_number_list(value)}" for index, value in enumerate(code.constants))]
     return "\n".join(rows) + "\n"
 
 
-def _row(code: Code, at: int, step: Instruction, width: int) -> str:
-    operands = " ".join(shown_operands(code, step))
-    row = f"{at:04d} {code.line(step):>{width}}    {step.op.value:<6} {operands}".rstrip()
-    return f"{row:<37} ; {step.comment}" if step.comment else row
+def shown_operands(code: Code, step: Instruction) -> list[str]:
+    """Return the operands of an instruction as a listing writes them."""
+    operands = (code.spelled(operand) if isinstance(operand, str) else operand for operand in step.operands)
+    return [f"{operand:.12g}" if isinstance(operand, float | int) else str(operand) for operand in operands]
 
 
-def shown_operands(code: Code, step: Instruction) -> Iterator[str]:
-    """Give the operands of an instruction as a listing writes them."""
-    for operand in step.operands:
-        match operand:
-            case str():
-                yield code.spelled(operand)
-            case Constant(index=index):
-                yield f"c{index}"
-            case JumpTarget(index=index):
-                yield f"@{index:04d}"
-            case Text(value=value):
-                yield json.dumps(value, ensure_ascii=False)
-            case _:
-                yield f"{operand:.12g}"
-
-
-def number_list(value: tuple[float, ...] | float) -> str:
+def _number_list(value: tuple[float, ...] | float) -> str:
     """Return a constant for people."""
     numbers = value if isinstance(value, tuple) else (value,)
     triples = [numbers[i : i + 3] for i in range(0, len(numbers), 3)]

@@ -147,10 +147,8 @@ class Verifier:
         self._known: dict[int, State] = {}
         self._types: dict[str, ValueType] = {}
         self._bits: dict[str, int] = {}
-        jumps = {
-            operand.index for step in code.instructions for operand in step.operands if isinstance(operand, JumpTarget)
-        }
-        self._merges = jumps | {number for number, step in enumerate(code.instructions) if step.op is Op.TRY}
+        attempts = {number for number, step in enumerate(code.instructions) if step.op is Op.TRY}
+        self._merges = jump_targets(code) | attempts
 
     @property
     def op(self) -> Op:
@@ -161,6 +159,11 @@ class Verifier:
     def operands(self) -> tuple[Operand, ...]:
         """The operands of the instruction."""
         return self.code.instructions[self.at].operands
+
+    @property
+    def targets(self) -> list[int]:
+        """The numbers of the instructions that the instruction jumps to."""
+        return [operand.index for operand in self.operands if isinstance(operand, JumpTarget)]
 
     def follow(self) -> None:
         """Follow every routine, until nothing new is learnt of any instruction.
@@ -219,10 +222,10 @@ class Verifier:
             raise self.wrong("two paths lead here that differ in their open TRYs or LOCKs")
         return attrs.evolve(new, written=old.written & new.written)
 
-    def begin(self, target: Operand, routine: Routine, state: State, truth: str = "") -> None:
+    def begin(self, target: int, routine: Routine, state: State, truth: str = "") -> None:
         """Follow a routine that the instruction begins, with the values in passing that are known here."""
         inside = attrs.evolve(state, attempts=(), locks=())
-        self._entries.append(Entry(index_of(target), routine, self.entry.types, inside, truth, self.at))
+        self._entries.append(Entry(target, routine, self.entry.types, inside, truth, self.at))
 
     def wrong(self, fault: str) -> CodeError:
         """Return the error of the instruction."""
@@ -288,7 +291,6 @@ class Verifier:
         return attrs.evolve(state, written=state.written | 1 << self._bits.setdefault(name, len(self._bits)))
 
 
-def index_of(operand: Operand) -> int:
-    """Return the number of the instruction that a jump leads to."""
-    assert isinstance(operand, JumpTarget)  # noqa: S101 - the sorts of operands have been checked
-    return operand.index
+def jump_targets(code: Code) -> set[int]:
+    """Return the numbers of the instructions that others jump to."""
+    return {operand.index for step in code.instructions for operand in step.operands if isinstance(operand, JumpTarget)}

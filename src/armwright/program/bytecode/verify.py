@@ -26,56 +26,12 @@ from armwright.program.bytecode.verifier import (
     State,
     Value,
     Verifier,
-    index_of,
+    jump_targets,
 )
 from armwright.program.language.kinds import VariableKind
 from armwright.program.syntax.pose_literals import EXACT_TOLERANCE
 from armwright.spatial.rotations import orthonormality_error
 
-# The operands of each operation, a letter for each: N a number, P a pose or transformation, T a truth value, v any
-# value, t any value or a text; F, S and E the name of a FRAME, a SCALAR or an EVENT, n any name, C a counter; k and K
-# a constant of one and of twelve numbers, j a jump target; a an axis, o ON or OFF, r RIGIDLY, w any word. What is in
-# brackets may be left out, + stands for any number more of the last. In front of `=` is what the result is, which goes
-# to the first operand.
-_TAKES: Mapping[str, str] = {
-    "LOADM": "P=K",
-    "LOADS": "N=k",
-    "COPY": "nv",
-    "MUL": "nvv",
-    "DIV ADD SUB": "N=NN",
-    "NEG": "N=N",
-    "LT LE EQ NE GE GT": "T=NN",
-    "NOT": "T=T",
-    "DIST": "N=PP",
-    "INV": "P=P",
-    "ROTX ROTY ROTZ": "P=N",
-    "XYZ": "P=NNN",
-    "MATX": "P=NNNNNNNNNNNN",
-    "FORCE": "N=a",
-    "ELEM": "nwN+",
-    "AFFIX": "FF(r)",
-    "AFFAT": "FFP(r)",
-    "UNFIX": "F(F)",
-    "READV": "F",
-    "OPEN": "w(N)",
-    "GRASP": "(w)",
-    "OPER": "wo",
-    "READS": "w",
-    "MVBEG": "FP",
-    "MVVIA": "P+",
-    "MVAPP MVDEP": "P",
-    "MVSPD MVBLD MVDUR PAUSE": "N",
-    "MVON": "jnj",
-    "MVDIR MVSTR MVEND MVHLT RET JOIN QUIT ENDR RETRY HALT STOP": "",
-    "JMP TRY ENDT": "j",
-    "JZ": "Tj",
-    "FOR": "SCNNNj",
-    "CALL": "w(v+)",
-    "FORK": "j(N)",
-    "SIG WAIT": "E",
-    "LOCK UNLK": "n+",
-    "PRINT": "t+",
-}
 _VALUES: Mapping[str, tuple[Value, ...]] = {
     **dict.fromkeys("NC", (Value.NUMBER,)),
     "P": (Value.POSE,),
@@ -113,28 +69,27 @@ class _Signature:
         return zip(self.letters.ljust(len(operands), self.letters[-1:] or " "), operands, strict=False)
 
 
-def _signature(takes: str) -> _Signature:
-    """Return a signature that is written as in the table."""
-    result, _, operands = takes.rpartition("=")
+def _signature(op: Op) -> _Signature:
+    """Return the signature of an operation, of which the instruction set has the letters."""
+    result, _, operands = op.signature.rpartition("=")
     letters = f"n{operands}" if result else operands
     form = re.compile("".join(_FORMS.get(letter, letter) for letter in letters))
     return _Signature(_VALUES[result][0] if result else None, re.sub(r"[()+]", "", letters), form)
 
 
-_SIGNATURES = {Op[name]: _signature(takes) for names, takes in _TAKES.items() for name in names.split()}
+_SIGNATURES = {op: _signature(op) for op in Op}
 # What works a value out: all that a condition may do, beside jumps and its end.
-_OF_CONDITIONS = {
-    *(op for op, signature in _SIGNATURES.items() if signature.result),
-    Op.COPY,
-    Op.MUL,
-    Op.ELEM,
-    Op.JZ,
-    Op.RET,
-}
-
-
+_OF_CONDITIONS = {op for op in Op if _SIGNATURES[op].result} | {Op.COPY, Op.MUL, Op.ELEM, Op.JZ, Op.RET}
+# What may follow MVBEG and the parts of a MOVE.
 _PARTS = {Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON}
-_ENDS = {Op.STOP, Op.RET, Op.QUIT, Op.JMP, Op.HALT, Op.MVHLT, Op.ENDT, Op.RETRY}
+# Which routines an instruction ends, and what else does not lead on to the next.
+_ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
+    Op.RET: (Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION),
+    Op.QUIT: (Routine.BRANCH,),
+    Op.MVHLT: (Routine.ACTION,),
+    **dict.fromkeys((Op.HALT, Op.STOP), (Routine.PROGRAM, Routine.PROCEDURE, Routine.BRANCH, Routine.ACTION)),
+}
+_ENDS = {*_ENDED_ROUTINES, Op.JMP, Op.ENDT, Op.RETRY}
 
 # TRYs and LOCKs in one another; the compiler refuses programs with as many.
 _MAX_NESTING = 200
@@ -199,10 +154,7 @@ def _wrong_operands(code: Code) -> Iterator[CodeError]:
 
 def _wrong_neighbours(code: Code) -> Iterator[CodeError]:
     """FORKs and their JOIN stand together, and so do the parts of a MOVE; nothing jumps into the middle."""
-    targets = {
-        operand.index for step in code.instructions for operand in step.operands if isinstance(operand, JumpTarget)
-    }
-    before = None
+    targets, before = jump_targets(code), None
     for number, step in enumerate(code.instructions):
         op = step.op
         if (before is Op.FORK) != (op is Op.JOIN or (op is Op.FORK and before is Op.FORK)):
@@ -230,25 +182,17 @@ def _wrong_ends(code: Code) -> Iterator[CodeError]:
 
 
 def _letter(operand: Operand) -> str:
-    match operand:
-        case str():
-            return "q" if operand.startswith("%") else "w"
-        case Constant():
-            return "k"
-        case JumpTarget():
-            return "j"
-        case Text():
-            return "s"
-        case _:
-            return "d"
+    if isinstance(operand, str):
+        return "q" if operand.startswith("%") else "w"
+    return {Constant: "k", JumpTarget: "j", Text: "s"}.get(type(operand), "d")
 
 
 def _fault(operand: Operand, instructions: int, constants: int) -> str:
     match operand:
         case JumpTarget(index=index) if not 0 <= index < instructions:
-            return f"there is no instruction @{index:04d}"
+            return f"there is no instruction {operand}"
         case Constant(index=index) if not 0 <= index < constants:
-            return f"there is no constant c{index}"
+            return f"there is no constant {operand}"
         case float() | int() if not abs(operand) <= LARGEST:
             return f"expected a number from {-LARGEST:g} to {LARGEST:g}, got {operand:g}"
         case _:
@@ -282,7 +226,7 @@ def _element(verifier: Verifier, state: State) -> Flow:
 
 
 def _guard(verifier: Verifier, state: State) -> Flow:
-    condition, truth, action = verifier.operands
+    (condition, action), truth = verifier.targets, verifier.operands[1]
     if not str(truth).startswith("%"):
         raise verifier.wrong(f"MVON expects a temporary such as %1 for the value of its condition, got {truth}")
     verifier.begin(condition, Routine.CONDITION, state, str(truth))
@@ -328,23 +272,14 @@ def _call(verifier: Verifier, state: State) -> Flow:
     return Flow(state)
 
 
-def _jump(verifier: Verifier, state: State) -> Flow:
-    return Flow(state, (index_of(verifier.operands[0]), state), falls=False)
-
-
 def _jump_if_not(verifier: Verifier, state: State) -> Flow:
-    target = index_of(verifier.operands[1])
-    if verifier.entry.routine is Routine.CONDITION and target <= verifier.at:
+    if verifier.entry.routine is Routine.CONDITION and verifier.targets[0] <= verifier.at:
         raise verifier.wrong("the code of a condition must not jump backward")
-    return Flow(state, (target, state))
-
-
-def _for(verifier: Verifier, state: State) -> Flow:
-    return Flow(state, (index_of(verifier.operands[-1]), state))
+    return Flow(state, (verifier.targets[0], state))
 
 
 def _fork(verifier: Verifier, state: State) -> Flow:
-    verifier.begin(verifier.operands[0], Routine.BRANCH, state)
+    verifier.begin(verifier.targets[0], Routine.BRANCH, state)
     return Flow(state)
 
 
@@ -354,22 +289,16 @@ def _try(verifier: Verifier, state: State) -> Flow:
         attrs.evolve(state, attempts=(*state.attempts, Attempt(verifier.at, recovers, state.locks)))
         for recovers in (False, True)
     )
-    return Flow(trying, (index_of(verifier.operands[0]), recovering))
+    return Flow(trying, (verifier.targets[0], recovering))
 
 
-def _end_of_try(verifier: Verifier, state: State) -> Flow:
-    outside = _without_attempt(verifier, state, recovering=False)
-    return Flow(outside, (index_of(verifier.operands[0]), outside), falls=False)
-
-
-def _end_of_recovery(verifier: Verifier, state: State) -> Flow:
-    return Flow(_without_attempt(verifier, state, recovering=True))
-
-
-def _without_attempt(verifier: Verifier, state: State, *, recovering: bool) -> State:
+def _end_attempt(verifier: Verifier, state: State) -> Flow:
+    """ENDT ends a TRY and leads behind its RECOVER part, which ENDR ends."""
+    recovering = verifier.op is Op.ENDR
     if not state.attempts or state.attempts[-1].recovering is not recovering:
         raise verifier.wrong(f"{verifier.op} has no {'RECOVER' if recovering else 'TRY'} to end")
-    return attrs.evolve(state, attempts=state.attempts[:-1])
+    outside = attrs.evolve(state, attempts=state.attempts[:-1])
+    return Flow(outside) if recovering else Flow(outside, (verifier.targets[0], outside), falls=False)
 
 
 def _retry(verifier: Verifier, state: State) -> Flow:
@@ -382,18 +311,13 @@ def _retry(verifier: Verifier, state: State) -> Flow:
     return Flow(state, (attempt.start, before), falls=False)
 
 
-def _end_of(*routines: Routine) -> Rule:
-    """Return the rule of an instruction that ends routines of these sorts."""
-
-    def rule(verifier: Verifier, state: State) -> Flow:
-        entry = verifier.entry
-        if entry.routine not in routines:
-            raise verifier.wrong(f"{verifier.op} cannot end {entry.routine.value}")
-        if entry.routine is Routine.CONDITION:
-            verifier.need(state, entry.truth, Value.TRUTH, Value.NUMBER)
-        return Flow(state, falls=False)
-
-    return rule
+def _end_routine(verifier: Verifier, state: State) -> Flow:
+    entry = verifier.entry
+    if entry.routine not in _ENDED_ROUTINES[verifier.op]:
+        raise verifier.wrong(f"{verifier.op} cannot end {entry.routine.value}")
+    if entry.routine is Routine.CONDITION:
+        verifier.need(state, entry.truth, Value.TRUTH, Value.NUMBER)
+    return Flow(state, falls=False)
 
 
 _RULES: Mapping[Op, Rule] = {
@@ -404,17 +328,13 @@ _RULES: Mapping[Op, Rule] = {
     Op.LOCK: _lock,
     Op.UNLK: _unlock,
     Op.CALL: _call,
-    Op.JMP: _jump,
+    Op.JMP: lambda verifier, state: Flow(state, (verifier.targets[0], state), falls=False),
     Op.JZ: _jump_if_not,
-    Op.FOR: _for,
+    Op.FOR: lambda verifier, state: Flow(state, (verifier.targets[0], state)),
     Op.FORK: _fork,
     Op.TRY: _try,
-    Op.ENDT: _end_of_try,
-    Op.ENDR: _end_of_recovery,
+    Op.ENDT: _end_attempt,
+    Op.ENDR: _end_attempt,
     Op.RETRY: _retry,
-    Op.RET: _end_of(Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION),
-    Op.QUIT: _end_of(Routine.BRANCH),
-    Op.MVHLT: _end_of(Routine.ACTION),
-    Op.HALT: _end_of(Routine.PROGRAM, Routine.PROCEDURE, Routine.BRANCH, Routine.ACTION),
-    Op.STOP: _end_of(Routine.PROGRAM, Routine.PROCEDURE, Routine.BRANCH, Routine.ACTION),
+    **dict.fromkeys(_ENDED_ROUTINES, _end_routine),
 }
