@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.report import clearance_figures, move_figures
-from armwright.report.figures import bar_chart, curves, plain_label
+from armwright.report.figures import bar_chart, curves, empty_figure, figure_title, plain_label
 
 # What is no formula, with a tab and an end of line, what a terminal obeys, half a letter, and a page of letters.
 STRANGE = "$x_{$\t$\\frac\n\x1b[31m\ud800" + "a" * 100_000
@@ -18,6 +18,16 @@ def test_literal() -> None:
     assert plain_label("a\tb\nc") == "a b c"
     assert plain_label("\x1b\ud800") == "\N{REPLACEMENT CHARACTER}" * 2
     assert len(plain_label("a" * 1000)) < 200
+
+
+def test_long_title() -> None:
+    """A title longer than a figure is wide stands in lines, none of which is cut before the third."""
+    figure, title = empty_figure((6.4, 4.0)), "five-bar, y1: path of the tool, approach vectors, with joint clearance"
+
+    assert figure_title(figure, title).replace("\n", " ") == title
+    assert max(map(len, figure_title(figure, title).split("\n"))) < len(title)
+    assert figure_title(figure, "short $1") == r"short \$1"
+    assert len(figure_title(figure, "a " * 10_000)) < 200
 
 
 @pytest.mark.parametrize("what", ["curves", "bars", "panels", "path", "surface", "lines", "paths"])

@@ -38,8 +38,8 @@ def accuracy_drawings(assessment: Assessment) -> list[Drawing]:
             kind = "velocity" if isinstance(result, PathVelocity) else test.kind
             figure = empty_figure((7.4, 4.2))
             draw(figure, test, result)
-            figure.suptitle(plain_label(f"{kind}: {title}"))
-            drawn.append(Drawing(f"{len(drawn) + 1:02d}-{kind}", f"{kind} {title}: {caption}", svg_text(figure)))
+            svg = svg_text(figure, f"{kind}: {title}")
+            drawn.append(Drawing(f"{len(drawn) + 1:02d}-{kind}", f"{kind} {title}: {caption}", svg))
     return drawn
 
 

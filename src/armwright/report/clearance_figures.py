@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.report.figures import empty_figure, plain_label, svg_text
+from armwright.report.figures import empty_figure, figure_title, plain_label, svg_text
 
 # Half the width of what is shown around a target [mm].
 _DETAIL_HALF_WIDTH = 1.5
@@ -30,7 +30,7 @@ def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> 
     X, Y = np.meshgrid(x, y, indexing="ij")
     axis.plot_surface(X, Y, z, cmap="viridis", alpha=0.85, linewidth=0.3, edgecolor="0.35")
     axis.scatter(X.ravel(), Y.ravel(), z.ravel(), s=5, color="0.15", depthshade=False)
-    axis.set(title=plain_label(title), xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
+    axis.set(title=figure_title(figure, title), xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
     axis.locator_params(nbins=5)
     axis.view_init(elev=24, azim=-128)
     axis.set_box_aspect(None, zoom=0.88)
@@ -58,8 +58,7 @@ def spectrum_figure(title: str, frequencies: Array, spectra: Mapping[str, Array]
         axis.set_ylim(bottom=0)
         axis.grid(visible=True, alpha=0.3)
     panels[-1].set_xlabel("frequency, Hz")
-    figure.suptitle(plain_label(title))
-    return svg_text(figure)
+    return svg_text(figure, title)
 
 
 def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array) -> str:
@@ -89,8 +88,7 @@ def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array)
             detail.set(xlim=xlim, ylim=ylim, title=f"Q{k + 1}")
             detail.set_aspect("equal")
             detail.tick_params(labelsize="x-small")
-    figure.suptitle(plain_label(title))
-    return svg_text(figure)
+    return svg_text(figure, title)
 
 
 def _draw_paths(axis: Any, lines: Mapping[str, Array], targets: Array) -> None:

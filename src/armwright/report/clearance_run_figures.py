@@ -32,32 +32,16 @@ _MAX_FREQUENCY = 200.0
 def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
     """Return the figures of a run: path, bearings, error, forces, energy, spectrum."""
     drawn = []
-    factor = magnification(run)
-    pins = len(run.simulation.scenario.linkage.pins)
-    for name, draw, size, caption in (
-        (
-            "path",
-            _draw_path,
-            (6.4, 5.2),
-            f"The path without play and the path taken, its error magnified {factor:g} times",
-        ),
-        (
-            "bearings",
-            _draw_bearings,
-            (3.1 * pins + 1.0, 3.6),
-            "Middles of the journals in their bearings; circles: walls",
-        ),
-        ("error", _draw_error, (7.4, 4.2), "Error of the tip over time"),
-        ("spectrum", _draw_spectrum, (7.4, 4.2), "Amplitudes of the error: mean removed, up to 200 Hz"),
-        (
-            "forces",
-            _draw_forces,
-            (7.4, 4.2),
-            "Forces between journals and bearings; a gap in a curve: the journal flies",
-        ),
-        ("energy", _draw_energy, (7.4, 4.2), "What impacts and friction have taken, and what the books lack"),
+    path = f"The path without play and the path taken, its error magnified {magnification(run):g} times"
+    for name, draw, caption in (
+        ("path", _draw_path, path),
+        ("bearings", _draw_bearings, "Middles of the journals in their bearings; circles: walls"),
+        ("error", _draw_error, "Error of the tip over time"),
+        ("spectrum", _draw_spectrum, "Amplitudes of the error: mean removed, up to 200 Hz"),
+        ("forces", _draw_forces, "Forces between journals and bearings; a gap in a curve: the journal flies"),
+        ("energy", _draw_energy, "What impacts and friction have taken, and what the books lack"),
     ):
-        figure = empty_figure(size)
+        figure = empty_figure((7.4, 4.2))
         draw(figure, run)
         drawn.append(Drawing(name, caption, svg_text(figure)))
     return drawn
@@ -110,6 +94,7 @@ def _draw_bearings(figure: "Figure", run: ClearanceRun) -> None:
     from matplotlib.patches import Circle  # noqa: PLC0415
 
     pins, samples = run.simulation.scenario.linkage.pins, evenly_spaced(run.rows, _MAX_POINTS)
+    figure.set_size_inches(3.1 * len(pins) + 1.0, 3.6)
     panels = figure.subplots(1, len(pins), squeeze=False)[0]
     # Each piece begins where the one before it ends.
     bounds = np.unique(np.linspace(0, len(samples) - 1, _SEGMENTS + 1).astype(int))
@@ -123,8 +108,8 @@ def _draw_bearings(figure: "Figure", run: ClearanceRun) -> None:
         lines = LineCollection([gaps[segment] for segment in segments], array=factor, cmap="viridis", linewidths=1.0)
         axis.add_collection(lines)
         axis.plot(*gaps[0], "o", color="C3", markersize=6, fillstyle="none", zorder=4)
-        axis.set(title=plain_label(f"{pin.name}, {wall:g} mm"), xlabel="x, mm", xlim=(-1.12 * wall, 1.12 * wall))
-        axis.set_ylim(-1.12 * wall, 1.12 * wall)
+        shown = (-1.12 * wall, 1.12 * wall)
+        axis.set(title=plain_label(f"{pin.name}, {wall:g} mm"), xlabel="x, mm", xlim=shown, ylim=shown)
         axis.set_aspect("equal")
         axis.grid(visible=True, alpha=0.3)
     panels[0].set_ylabel("y, mm")
@@ -161,13 +146,8 @@ def _draw_forces(figure: "Figure", run: ClearanceRun) -> None:
     axis, samples = plain_axes(figure, "time, s", "force, N"), evenly_spaced(run.rows, _MAX_POINTS)
     for i, pin in enumerate(run.simulation.scenario.linkage.pins):
         forces = run.simulation.forces[: run.rows, i][samples]
-        axis.plot(
-            run.time[samples],
-            np.where(forces > 0, forces, np.nan),
-            linewidth=1.1,
-            color=f"C{i % 10}",
-            label=plain_label(pin.name),
-        )
+        contact = np.where(forces > 0, forces, np.nan)
+        axis.plot(run.time[samples], contact, linewidth=1.1, color=f"C{i % 10}", label=plain_label(pin.name))
     if np.any(run.simulation.forces[: run.rows] > 0):
         axis.set_yscale("log")
     axis.legend(fontsize="small")

@@ -5,15 +5,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import attrs
-import numpy as np
 
 from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.energy_balance import EnergyBalance
-from armwright.files.rows import text_cell
 from armwright.report.clearance_run_figures import clearance_run_figures
 from armwright.report.clearance_run_page import clearance_run_page
 from armwright.report.five_bar_figure import scenario_workspace
+from armwright.report.motion_table import csv_lines
 
 
 def clearance_run_files(run: ClearanceRun, *, command: str) -> dict[str, Any]:
@@ -40,10 +39,8 @@ def samples_csv(run: ClearanceRun) -> Iterator[str]:
     simulation = run.simulation
     linkage, rows = simulation.scenario.linkage, slice(run.rows)
     columns: dict[str, Array] = {"time_s": run.time}
-    for i, axis in enumerate("xy"):
-        columns[f"tip_{axis}_m"] = simulation.tip[rows, i]
-    for i, axis in enumerate("xy"):
-        columns[f"error_{axis}_m"] = run.error[:, i]
+    columns["tip_x_m"], columns["tip_y_m"] = simulation.tip[rows].T
+    columns["error_x_m"], columns["error_y_m"] = run.error.T
     columns["error_m"] = run.distance
     for i, coordinate in enumerate(linkage.coordinates):
         unit = "rad" if coordinate.kind == "angle" else "m"
@@ -55,7 +52,4 @@ def samples_csv(run: ClearanceRun) -> Iterator[str]:
         columns[f"{pin.name}.force_N"] = simulation.forces[rows, i]
     for field in attrs.fields(EnergyBalance):
         columns[f"{field.name}_J"] = getattr(run.energy, field.name)[rows]
-    yield ",".join(map(text_cell, columns)) + "\n"
-    line = ",".join(["%.10g"] * len(columns)) + "\n"
-    # Adding 0 turns -0 into 0, which reads better.
-    yield from (line % tuple(row) for row in (np.stack(list(columns.values()), axis=-1) + 0.0).tolist())
+    return csv_lines(columns, 10)

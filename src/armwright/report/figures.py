@@ -3,6 +3,7 @@
 import base64
 import html
 import io
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,8 +18,10 @@ if TYPE_CHECKING:
 
 # Line styles in the order of the curves: the first is the reference; all are distinguishable without colour.
 _STYLES = ("-", "--", "-.", ":")
-# Characters of a name or title that are shown at most.
+# Characters of a name that are shown at most.
 _MAX_LENGTH = 40
+# Width of a title, and its lines at most.
+_CHARACTERS_PER_INCH, _MAX_LINES = 9, 3
 
 
 class Drawing(NamedTuple):
@@ -75,7 +78,7 @@ def curves(
         axes.plot(abscissae, values, "k--", label=plain_label(name), linewidth=1.4)
     for low, high in spans:
         axes.axvspan(low, high, color="0.88", zorder=0)
-    axes.set(title=plain_label(title), xlim=(float(x[0]), float(x[-1])))
+    axes.set(title=figure_title(figure, title), xlim=(float(x[0]), float(x[-1])))
     if len(axes.lines) > 1:
         axes.legend()
     return svg_text(figure)
@@ -101,9 +104,8 @@ def bar_chart(
     width = 0.8 / len(values)
     for i, (name, heights) in enumerate(values.items()):
         axes.bar([k + (i + 0.5) * width - 0.4 for k in range(len(names))], heights, width, label=plain_label(name))
-    axes.set(title=plain_label(title), ylabel=y_label, xticks=range(len(names)), xticklabels=names)
-    if logarithmic:
-        axes.set_yscale("log")
+    axes.set(title=figure_title(figure, title), ylabel=y_label, xticks=range(len(names)), xticklabels=names)
+    axes.set_yscale("log" if logarithmic else "linear")
     axes.grid(visible=True, axis="y", alpha=0.3)
     figure.legend(fontsize="small", loc="outside lower center", ncols=len(values))
     return svg_text(figure)
@@ -148,15 +150,24 @@ def evenly_spaced(count: int, most: int) -> Array:
     return np.unique(np.linspace(0, count - 1, most).astype(int))
 
 
-def svg_text(figure: "Figure") -> str:
-    """Return a figure as the text of an SVG file, the same for the same figure on every machine."""
+def svg_text(figure: "Figure", title: str = "") -> str:
+    """Return a figure, below its title if it has one, as the text of an SVG file, the same on every machine."""
     import matplotlib as mpl  # noqa: PLC0415
 
+    if title:
+        figure.suptitle(figure_title(figure, title))
     text = io.StringIO()
     # Without a date and with fixed identifiers, a figure changes only when its numbers do.
     with mpl.rc_context({"svg.hashsalt": "armwright"}):
         figure.savefig(text, format="svg", metadata={"Date": None})
     return normalize_svg(text.getvalue())
+
+
+def figure_title(figure: "Figure", text: str) -> str:
+    """Return the title of a figure in lines as wide as the figure, at most three; see ``plain_label``."""
+    width = int(_CHARACTERS_PER_INCH * figure.get_figwidth())
+    lines = textwrap.wrap(_printable(text), width, max_lines=_MAX_LINES, placeholder="...")
+    return "\n".join(lines).replace("$", r"\$")
 
 
 def plain_label(text: str) -> str:
@@ -165,6 +176,8 @@ def plain_label(text: str) -> str:
     Tabs and line breaks become blanks, other unprintable characters become replacement characters, and a long text is
     truncated.
     """
-    text = text if len(text) <= _MAX_LENGTH else f"{text[:_MAX_LENGTH]}..."
-    letters = (c if c.isprintable() else " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" for c in text)
-    return "".join(letters).replace("$", r"\$")
+    return _printable(text if len(text) <= _MAX_LENGTH else f"{text[:_MAX_LENGTH]}...").replace("$", r"\$")
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" for c in text)

@@ -1,10 +1,11 @@
-"""A motion as rows of text: motion.csv."""
+"""Arrays as rows of text: motion.csv and other tables of samples."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.files.rows import text_cell
 
 
 def motion_csv(t: Array, q: Array, qd: Array, qdd: Array, tau: Array) -> Iterator[str]:
@@ -17,10 +18,15 @@ def motion_csv(t: Array, q: Array, qd: Array, qdd: Array, tau: Array) -> Iterato
         qdd: (k, n) accelerations.
         tau: (k, n) efforts.
     """
-    columns = [f"{name}{i + 1}" for name in ("q", "qd", "qdd", "tau") for i in range(q.shape[1])]
-    yield ",".join(["t", *columns]) + "\n"
-    table = np.concatenate([t[:, None], q, qd, qdd, tau], axis=1)
+    quantities = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
+    columns = {f"{name}{i + 1}": values[:, i] for name, values in quantities.items() for i in range(q.shape[1])}
     # Twelve digits hold a position to 1e-12, so that differences over a tick still show the speed.
-    line = ",".join(["%.12g"] * table.shape[1]) + "\n"
+    return csv_lines({"t": t, **columns}, 12)
+
+
+def csv_lines(columns: Mapping[str, Array], digits: int) -> Iterator[str]:
+    """Give the lines of a table: the names of its columns, and their numbers (k,) with so many significant digits."""
+    yield ",".join(map(text_cell, columns)) + "\n"
+    line = ",".join([f"%.{digits}g"] * len(columns)) + "\n"
     # Adding 0 turns -0 into 0, which reads better.
-    yield from (line % tuple(row) for row in (table + 0.0).tolist())
+    yield from (line % tuple(row) for row in (np.stack(list(columns.values()), axis=-1) + 0.0).tolist())

@@ -61,8 +61,7 @@ def panels(
             axis.annotate(plain_label(name), (time, 1), xycoords=("data", "axes fraction"), **above)
     for axis in grid[-1]:
         axis.set_xlabel("time, s")
-    figure.suptitle(plain_label(title))
-    return svg_text(figure)
+    return svg_text(figure, title)
 
 
 def path_figure(title: str, X: Array, marks: Mapping[str, Array]) -> str:
@@ -78,8 +77,7 @@ def path_figure(title: str, X: Array, marks: Mapping[str, Array]) -> str:
     """
     figure = empty_figure((6.4, 5.6))
     draw_path(figure.add_subplot(projection="3d"), X, marks)
-    figure.suptitle(plain_label(title))
-    return svg_text(figure)
+    return svg_text(figure, title)
 
 
 def overview(title: str, t: Array, time_panels: Sequence[Panel], X: Array, marks: Mapping[str, Array]) -> str:
@@ -101,8 +99,7 @@ def overview(title: str, t: Array, time_panels: Sequence[Panel], X: Array, marks
         draw_curves(axis, t, panel)
         axis.set_xlabel("time, s")
     draw_path(figure.add_subplot(2, 2, 4, projection="3d"), X, marks)
-    figure.suptitle(plain_label(title))
-    return svg_text(figure)
+    return svg_text(figure, title)
 
 
 def joint_panels(samples: Samples, revolute: Sequence[bool]) -> list[Panel]:

@@ -9,8 +9,8 @@ from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.moves import Move
 from armwright.motion.poses_file import PosesFile
 from armwright.motion.trajectory import Samples
-from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, StageRow
-from armwright.report.stick_figure import joint_infos, stick_figure, thinned_rows
+from armwright.report.page import Animation, Effect, FrameTrack, Message, RunPage, StageRow
+from armwright.report.stick_figure import arm_record, stick_figure
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -44,7 +44,7 @@ def move_page(
         command: the command line.
         notes: warnings and remarks.
     """
-    rows = thinned_rows(len(samples.times))
+    motion = (samples.times, samples.q, samples.qd, samples.qdd, tau)
     return RunPage(
         title=title,
         program_name=name,
@@ -57,30 +57,16 @@ def move_page(
         messages=[Message(severity="note", text=note) for note in notes],
         effects=list(_effects(move, file)),
         stages=list(_stages(move, file, samples, tau)),
-        arms=[
-            ArmRecord(
-                name=_ARM,
-                model=move.arm.name,
-                joints=joint_infos(move.arm),
-                t=samples.times[rows],
-                q=samples.q[rows],
-                qd=samples.qd[rows],
-                qdd=samples.qdd[rows],
-                tau=tau[rows],
-                hand=forward(move.arm, samples.q[rows])[:, :3, 3],
-            )
-        ],
+        arms=[arm_record(_ARM, move.arm, motion)],
         animation=_animation(move, file),
     )
 
 
 def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
     for i, (name, t, line) in enumerate(zip(file.names, move.times.tolist(), file.lines, strict=True)):
-        deviation = (
-            f" with a deviation of {move.passing_distances[i] * 1e3:.1f} mm" if move.tool_path else " approximately"
-        )
-        passage = "reached" if move.passing_distances[i] == 0 else f"passed{deviation}"
-        yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {passage}")
+        distance = move.passing_distances[i]
+        how = f"with a deviation of {distance * 1e3:.1f} mm" if move.tool_path else "approximately"
+        yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {'reached' if distance == 0 else f'passed {how}'}")
 
 
 def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array) -> Iterator[StageRow]:
@@ -88,7 +74,8 @@ def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array) -> Iterat
         hand = forward(move.arm, move.trajectory(np.linspace(t0, t1, _SAMPLES)))[:, :3, 3]
         during = (samples.times >= t0 - 1e-12) & (samples.times <= t1 + 1e-12)
         if not during.any():  # a segment shorter than a tick
-            during = np.abs(samples.times - (t0 + t1) / 2) == np.abs(samples.times - (t0 + t1) / 2).min()
+            from_middle = np.abs(samples.times - (t0 + t1) / 2)
+            during = from_middle == from_middle.min()
         detour = move.detours[i] if move.detours else None
         yield StageRow(
             t0=t0,

@@ -9,14 +9,14 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
-from armwright.cell.model import Cell, CellArm, base_name
+from armwright.cell.model import base_name
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt, omission_text, shorten_line
 from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
-from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
-from armwright.report.stick_figure import joint_infos, stick_figure, thinned_rows
+from armwright.report.page import Animation, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
+from armwright.report.stick_figure import arm_record, stick_figure
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -57,13 +57,18 @@ def run_page_data(
         command=command,
         duration=recording.duration,
         messages=[
-            Message(severity=d.severity.value, code=d.code, line=source.line(d.span.start), text=d.message)
-            for d in listed
-        ]
-        + [Message(severity="note", text=text) for text in notes],
+            *(
+                Message(severity=d.severity.value, code=d.code, line=source.line(d.span.start), text=d.message)
+                for d in listed
+            ),
+            *(Message(severity="note", text=text) for text in notes),
+        ],
         effects=_effects(recording),
         stages=[_stage_row(run, source.line(run.span.start)) for run in stages],
-        arms=[_arm_record(stream, cell) for stream in recording.streams],
+        arms=[
+            arm_record(s.arm, cell.arms[s.arm].arm, (s.t, s.q, s.qd, s.qdd, s.tau), cell.arms[s.arm].base)
+            for s in recording.streams
+        ],
         animation=animation,
     )
 
@@ -105,36 +110,17 @@ def _stage_row(run: RunStage, line: int) -> StageRow:
     )
 
 
-def _arm_record(stream: Stream, cell: Cell) -> ArmRecord:
-    arm = cell.arms[stream.arm]
-    rows = thinned_rows(len(stream.t))
-    return ArmRecord(
-        name=stream.arm,
-        model=arm.arm.name,
-        joints=joint_infos(arm.arm),
-        t=stream.t[rows],
-        q=stream.q[rows],
-        qd=stream.qd[rows],
-        qdd=stream.qdd[rows],
-        tau=stream.tau[rows],
-        hand=_poses_in_world(arm, stream.q[rows])[:, -1, :3, 3],
-    )
-
-
 def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     """Return the animation, and notes on what it omits."""
     fps = min(_FRAMES_PER_SECOND, _MAX_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
-    arms = recording.cell.arms
-    links = {s.arm: _poses_in_world(arms[s.arm], _sample_configurations(s, t)) for s in recording.streams}
+    arms, tree = recording.cell.arms, recording.tree
+    links = {s.arm: arms[s.arm].base @ link_poses(arms[s.arm].arm, _configurations_at(s, t)) for s in recording.streams}
     tool_poses = {name: poses[:, -1] for name, poses in links.items()}
-    visible = [
-        name for name in recording.tree if _is_displayed(name, recording.cell) and recording.tree.has_value(name)
-    ]
+    hidden = {WORLD, *arms, *map(base_name, arms)}
+    visible = [name for name in tree if name not in hidden and tree.has_value(name)]
     names, fewer_frames = _limit_items(visible, _MAX_FRAMES, "frames", "all in frames.json")
-    changes, fewer_changes = _limit_items(
-        [*_tree_changes(recording, t)], MAX_LIST_ITEMS, "changes of the tree of frames"
-    )
+    changes, fewer_changes = _limit_items([*_tree_changes(recording, t)], MAX_LIST_ITEMS, "changes of the frame tree")
     animation = Animation(
         fps=fps,
         t=t,
@@ -148,13 +134,9 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     return animation, [*fewer_frames, *fewer_changes]
 
 
-def _sample_configurations(stream: Stream, t: Array) -> Array:
+def _configurations_at(stream: Stream, t: Array) -> Array:
     period = stream.t[1] - stream.t[0] if len(stream.t) > 1 else 1.0
     return np.asarray(stream.q[np.clip(np.round(t / period).astype(int), 0, len(stream.t) - 1)])
-
-
-def _poses_in_world(arm: CellArm, q: Array) -> Array:
-    return np.asarray(arm.base @ link_poses(arm.arm, q))
 
 
 def _finger_opening(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
@@ -223,7 +205,3 @@ def _tree_changes(recording: Recording, t: Array) -> Iterator[TreeChange]:
                 shown[name] = parent
                 yield TreeChange(t=time, child=recording.code.spelled(name), parent=recording.code.spelled(parent))
         before = tree.nodes
-
-
-def _is_displayed(name: str, cell: Cell) -> bool:
-    return name != WORLD and name not in cell.arms and not any(name == base_name(arm) for arm in cell.arms)

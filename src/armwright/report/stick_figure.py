@@ -2,12 +2,14 @@
 
 import math
 
+import attrs
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.report.page import ArmFigure, JointInfo
+from armwright.kinematics.forward_kinematics import forward
+from armwright.report.page import ArmFigure, ArmRecord, JointInfo
 
 # Rows of the charts at most, which suffice for a screen.
 _CHART_ROWS = 1500
@@ -15,20 +17,24 @@ _CHART_ROWS = 1500
 _THICK, _THIN = 0.045, 0.016
 
 
-def joint_infos(arm: Arm) -> list[JointInfo]:
-    """Return the joints of an arm for the page."""
-    return [
-        JointInfo(
-            name=f"joint {i + 1}",
-            kind=joint.kind,
-            lower=joint.limits.lower,
-            upper=joint.limits.upper,
-            speed=joint.limits.speed,
-            acceleration=joint.limits.acceleration,
-            effort=joint.limits.effort,
-        )
-        for i, joint in enumerate(arm.joints)
+def arm_record(
+    name: str, arm: Arm, motion: tuple[Array, Array, Array, Array, Array], base: Array | None = None
+) -> ArmRecord:
+    """Return the motion of an arm for the page, at as many instants as a chart shows.
+
+    Args:
+        name: its name in the program.
+        arm: the arm, with n joints.
+        motion: (k,) times [s]; (k, n) positions, speeds, accelerations and efforts of its joints.
+        base: (4, 4) pose of the arm in the world; the world itself when left out.
+    """
+    t, q, qd, qdd, tau = (values[thinned_rows(len(motion[0]))] for values in motion)
+    joints = [
+        JointInfo(name=f"joint {i}", kind=joint.kind, **attrs.asdict(joint.limits))
+        for i, joint in enumerate(arm.joints, 1)
     ]
+    poses = forward(arm, q) if base is None else base @ forward(arm, q)
+    return ArmRecord(name=name, model=arm.name, joints=joints, t=t, q=q, qd=qd, qdd=qdd, tau=tau, hand=poses[:, :3, 3])
 
 
 def stick_figure(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
