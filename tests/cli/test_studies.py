@@ -13,9 +13,12 @@ from cli_calls import armwright
 
 
 def test_study_writes_its_figures(tmp_path: Path) -> None:
-    """The study prints its tables and leaves nine figures, the same ones every time."""
+    """The study prints its tables and leaves nine figures, the same ones every time.
+
+    Its verdicts are those of the errata: b4, k2, b20 and the factor of k3 are wrong, the others agree or are near.
+    """
     first = armwright("study", "stanford-torque", "-o", tmp_path / "a")
-    armwright("study", "stanford-torque", "-o", tmp_path / "b", "--json")
+    again = armwright("study", "stanford-torque", "-o", tmp_path / "b", "--json")
 
     assert first.returncode == 0
     assert "6.47" in first.stdout
@@ -24,33 +27,8 @@ def test_study_writes_its_figures(tmp_path: Path) -> None:
     for name in names:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
         assert ET.parse(tmp_path / "a" / name).getroot().tag.endswith("svg")
-
-
-def test_study_verdicts() -> None:
-    """As the errata say: b4, k2, b20 and the factor of k3 are wrong, the others agree or are near."""
-    tables = json.loads(armwright("study", "stanford-torque", "--json").stdout)
-
-    wrong = {row["name"] for row in tables["constants"] if row["verdict"] == "wrong"}
-    assert wrong == {"b4", "k2", "b20", "k3 / b5"}
-
-
-def test_moves_of_the_puma(tmp_path: Path) -> None:
-    """The study of the PUMA's moves leaves ten figures, a film and its tables, and says what stops which move."""
-    done = armwright("study", "puma-moves", "-o", tmp_path, columns=200)
-
-    assert done.returncode == 0, done.stderr
-    numbers = (5, 6, 7, 10, 16, 17, 18, 19, 22, 23)
-    names = {f"figure{number:02d}.svg" for number in numbers}
-    assert {path.name for path in tmp_path.iterdir()} - {"figure25.mp4"} == names | {
-        "figure25.gif",
-        "tables.json",
-        "run.json",
-    }
-    for name in names:
-        assert ET.parse(tmp_path / name).getroot().tag.endswith("svg")
-    tables = json.loads((tmp_path / "tables.json").read_text())
-    assert [row["inverse"] for row in tables["moves"]] == [3, 501, 501, 501]
-    assert "no single branch of the inverse kinematics can be followed to the last pose" in done.stdout
+    tables = json.loads(again.stdout)
+    assert {row["name"] for row in tables["constants"] if row["verdict"] == "wrong"} == {"b4", "k2", "b20", "k3 / b5"}
 
 
 def test_unknown_study() -> None:

@@ -1,5 +1,9 @@
 """The project on the PUMA's trajectories: its formulas, its figures, and what its moves ask of the joints."""
 
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -21,32 +25,37 @@ from armwright.study.puma_moves import (
     ConfigurationRow,
     MoveRow,
     angle_table,
-    configuration_table,
-    detour_table,
     figure_panels,
     joints_along,
-    move_table,
     path_of,
     sample_times,
     study_poses,
 )
+from armwright.study.puma_moves_study import PumaMoves
+from cli_calls import armwright
 
 ROUNDING = 1e-12
 
 
 @pytest.fixture(scope="module")
-def configurations() -> dict[str, ConfigurationRow]:
-    return {row.pose: row for row in configuration_table()}
+def study() -> PumaMoves:
+    """The study, run once for its tables and for the command that prints them."""
+    return PumaMoves.run()
 
 
-@pytest.fixture(scope="module")
-def angles() -> dict[str, AngleRow]:
-    return {row.pose: row for row in angle_table()}
+@pytest.fixture
+def configurations(study: PumaMoves) -> dict[str, ConfigurationRow]:
+    return {row.pose: row for row in study.configurations}
 
 
-@pytest.fixture(scope="module")
-def moves() -> dict[str, MoveRow]:
-    return {row.name: row for row in move_table()}
+@pytest.fixture
+def angles(study: PumaMoves) -> dict[str, AngleRow]:
+    return {row.pose: row for row in study.angles}
+
+
+@pytest.fixture
+def moves(study: PumaMoves) -> dict[str, MoveRow]:
+    return {row.name: row for row in study.moves}
 
 
 def of_the_project(A: Array, B: Array, C: Array, t: float) -> tuple[Array, Array, Array]:
@@ -169,10 +178,31 @@ def test_joints_follow_the_hand(way: str) -> None:
     np.testing.assert_allclose(found, X, atol=1e-7)
 
 
-def test_ways_round() -> None:
+def test_ways_round(study: PumaMoves) -> None:
     """From B to C the wrist is turned over: a via pose near the joint move does it, and damped rates, at a price."""
-    via, damped = detour_table()
+    via, damped = study.detours
 
     for row in (via, damped):
         assert row.exists
         assert "mm off the line" in row.summary
+
+
+def test_command(study: PumaMoves, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command leaves ten figures, a film and the study's tables, and says what stops which move."""
+    monkeypatch.setattr(PumaMoves, "run", lambda _progress: study)
+
+    done = armwright("study", "puma-moves", "-o", tmp_path, columns=200)
+
+    assert done.returncode == 0, done.stderr
+    numbers = (5, 6, 7, 10, 16, 17, 18, 19, 22, 23)
+    names = {f"figure{number:02d}.svg" for number in numbers}
+    assert {path.name for path in tmp_path.iterdir()} - {"figure25.mp4"} == names | {
+        "figure25.gif",
+        "tables.json",
+        "run.json",
+    }
+    for name in names:
+        assert ET.parse(tmp_path / name).getroot().tag.endswith("svg")
+    tables = json.loads((tmp_path / "tables.json").read_text())
+    assert [row["inverse"] for row in tables["moves"]] == [3, 501, 501, 501]
+    assert "no single branch of the inverse kinematics can be followed to the last pose" in done.stdout
