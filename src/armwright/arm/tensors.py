@@ -1,7 +1,5 @@
 """Inertia tensors: which a body can have."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from armwright.arrays import Array

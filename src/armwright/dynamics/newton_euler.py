@@ -1,7 +1,5 @@
 """Newton-Euler inverse dynamics: the joint efforts that a motion requires."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

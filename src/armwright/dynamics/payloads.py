@@ -1,7 +1,5 @@
 """A load on the tool, as part of the last link."""
 
-from __future__ import annotations
-
 import attrs
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Forward kinematics: the pose of every link and of the tool."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

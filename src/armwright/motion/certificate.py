@@ -1,7 +1,5 @@
 """What a planned path is certified to keep: its deviation, and the limits of the joints."""
 
-from __future__ import annotations
-
 from typing import Any, Literal, TypeAlias
 
 import attrs
@@ -58,13 +56,13 @@ class Certificate:
 
     def run_slower(
         self, factor: float, peaks: dict[LimitName, Array], because: tuple[LimitName, int] | None
-    ) -> Certificate:
+    ) -> "Certificate":
         """Return that of the same motion run ``factor`` times slower for a limit, with the peaks that it has then."""
         return attrs.evolve(
             self, worst_time=self.worst_time * factor, peaks=peaks, factor=self.factor * factor, because=because
         )
 
-    def retimed(self, stretch: float) -> Certificate:
+    def retimed(self, stretch: float) -> "Certificate":
         """Return that of the same motion, all of it run so many times slower; efforts are those of the faster one."""
         peaks: dict[LimitName, Array] = {
             "speed": self.peaks["speed"] / stretch,

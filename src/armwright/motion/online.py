@@ -5,8 +5,6 @@ trajectory like any other, so that limits are checked exactly and the motion can
 again.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """A path of the tool through poses, and the report's rule for how densely and how fast to run it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import accumulate

@@ -1,7 +1,5 @@
 """Straight lines with a certificate."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

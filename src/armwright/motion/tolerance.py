@@ -1,7 +1,5 @@
 """How far the tool may leave its path: in position and in orientation."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Arms from URDF files."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias

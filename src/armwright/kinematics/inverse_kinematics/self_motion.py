@@ -1,7 +1,5 @@
 """Self-motion: where a pose leaves a joint free, the configuration that is inside the limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

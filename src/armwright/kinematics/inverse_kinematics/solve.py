@@ -1,7 +1,5 @@
 """Inverse kinematics: in closed form where the arm has one, else step by step; ranked."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
