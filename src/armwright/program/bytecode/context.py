@@ -6,12 +6,12 @@ from typing import Any, TypeAlias
 import attrs
 
 from armwright.program.bytecode.emitter import Emitter
-from armwright.program.bytecode.instructions import Operand
+from armwright.program.bytecode.instructions import Op, Operand
 from armwright.program.flow_analysis.analysis import Flow
 from armwright.program.language.names import is_arm
 from armwright.program.syntax import tree
 
-Generate: TypeAlias = Callable[["Context", Any], None]
+Generate: TypeAlias = Callable[["Context", Any], object]
 Generators: TypeAlias = Mapping[type, Generate]
 
 
@@ -47,13 +47,21 @@ class Context:
         self.generate(*statements)
         self.in_action = outside
 
-    def operand(self, node: tree.Mobile) -> Operand:
-        """Generate the code of what is named, and return where it is."""
-        assert not isinstance(node, tree.Poison)  # noqa: S101 - a checked program has none
-        return self.out.value(node)
+    def values(self, node: tree.Node) -> list[Operand]:
+        """Generate the values of the parts of a node, and return where they are."""
+        return [self.out.value(part) for part in tree.child_nodes(node)]
 
     def text(self, node: tree.Expression) -> str:
-        """Return an expression as the program writes it."""
+        """Return an expression as the program writes it, on one line."""
         if isinstance(node, tree.Name | tree.ArmName):
             return node.key if is_arm(node.key) else self.spelling.get(node.key, node.key)
-        return self.out.text(node)
+        return " ".join(self.out.source.slice(node.span).split())
+
+
+def one_instruction(op: Op) -> Generate:
+    """Return the generator of statements that are one instruction, whose operands are the values of their parts."""
+
+    def generate(context: Context, node: tree.Node) -> None:
+        context.out.emit(op, *context.values(node), span=node.span)
+
+    return generate

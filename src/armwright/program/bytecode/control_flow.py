@@ -1,14 +1,9 @@
 """Code of control flow: choices, loops, processes, events, locks, recovery, calls."""
 
-from armwright.program.bytecode.context import Context, Generators
+from armwright.program.bytecode.context import Context, Generators, one_instruction
 from armwright.program.bytecode.emitter import LATER
 from armwright.program.bytecode.instructions import Op
 from armwright.program.syntax import tree
-
-
-def block(context: Context, node: tree.Block) -> None:
-    """Generate the statements of a block."""
-    context.generate(*node.statements)
 
 
 def if_(context: Context, node: tree.If) -> None:
@@ -60,7 +55,7 @@ def for_(context: Context, node: tree.For) -> None:
     out.emit(Op.COPY, count, 0.0, span=head)
     out.begin()
     top = out.here
-    over = out.emit(Op.FOR, context.operand(node.variable), count, *bounds, LATER, span=head)
+    over = out.emit(Op.FOR, context.out.value(node.variable), count, *bounds, LATER, span=head)
     context.generate(node.body)
     out.emit(Op.JMP, top, span=head)
     out.patch_jump(over)
@@ -83,24 +78,9 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     out.patch_jump(over)
 
 
-def signal(context: Context, node: tree.Signal) -> None:
-    """Generate one SIGNAL."""
-    context.out.emit(Op.SIG, context.operand(node.event), span=node.span)
-
-
-def wait(context: Context, node: tree.Wait) -> None:
-    """Generate one WAIT."""
-    context.out.emit(Op.WAIT, context.operand(node.event), span=node.span)
-
-
-def pause(context: Context, node: tree.Pause) -> None:
-    """Generate one PAUSE."""
-    context.out.emit(Op.PAUSE, context.out.value(node.duration), span=node.span)
-
-
 def lock(context: Context, node: tree.Lock) -> None:
     """Generate a body between LOCK and UNLK of the same variables."""
-    locked = [context.operand(target) for target in node.targets]
+    locked = [context.out.value(target) for target in node.targets]
     context.out.emit(Op.LOCK, *locked, span=node.head)
     context.generate(node.body)
     context.out.emit(Op.UNLK, *locked, span=node.head)
@@ -118,11 +98,6 @@ def try_(context: Context, node: tree.Try) -> None:
     out.patch_jump(succeeded)
 
 
-def retry(context: Context, node: tree.Retry) -> None:
-    """Generate one RETRY."""
-    context.out.emit(Op.RETRY, span=node.span)
-
-
 def halt(context: Context, node: tree.Halt) -> None:
     """Generate one HALT: of the MOVE in an action, else of the program."""
     context.out.emit(Op.MVHLT if context.in_action else Op.HALT, span=node.span)
@@ -135,18 +110,18 @@ def call(context: Context, node: tree.Call) -> None:
 
 
 GENERATORS: Generators = {
-    tree.Block: block,
+    tree.Block: lambda context, node: context.generate(*node.statements),
     tree.If: if_,
     tree.While: while_,
     tree.Repeat: repeat,
     tree.For: for_,
     tree.Cobegin: cobegin,
-    tree.Signal: signal,
-    tree.Wait: wait,
-    tree.Pause: pause,
+    tree.Signal: one_instruction(Op.SIG),
+    tree.Wait: one_instruction(Op.WAIT),
+    tree.Pause: one_instruction(Op.PAUSE),
     tree.Lock: lock,
     tree.Try: try_,
-    tree.Retry: retry,
+    tree.Retry: one_instruction(Op.RETRY),
     tree.Halt: halt,
     tree.Call: call,
 }

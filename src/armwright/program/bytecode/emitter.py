@@ -10,18 +10,8 @@ from armwright.program.syntax import pose_literals, tree
 # A place that will be known later.
 LATER = JumpTarget(-1)
 
-_OPERATIONS = {
-    "*": Op.MUL,
-    "/": Op.DIV,
-    "+": Op.ADD,
-    "-": Op.SUB,
-    "<": Op.LT,
-    "<=": Op.LE,
-    "=": Op.EQ,
-    "<>": Op.NE,
-    ">=": Op.GE,
-    ">": Op.GT,
-}
+_OPERATIONS = {"*": Op.MUL, "/": Op.DIV, "+": Op.ADD, "-": Op.SUB}
+_OPERATIONS |= {"<": Op.LT, "<=": Op.LE, "=": Op.EQ, "<>": Op.NE, ">=": Op.GE, ">": Op.GT}
 
 
 class Emitter:
@@ -68,7 +58,7 @@ class Emitter:
 
     # ---- expressions -----------------------------------------------------------------------------------------------
 
-    def value(self, node: tree.Expression, into: str | None = None) -> Operand:
+    def value(self, node: tree.Node, into: str | None = None) -> Operand:
         """Write the code of an expression.
 
         Args:
@@ -81,10 +71,8 @@ class Emitter:
         match node:
             case tree.Number() | tree.Name() | tree.ArmName():
                 operand = self.number(node) if isinstance(node, tree.Number) else node.key
-                return self._passed_on(operand, node, into)
             case tree.Index(name=name, indices=indices):
-                element = self._operation(Op.ELEM, self.passing(), name.key, *map(self.value, indices), node=node)
-                return self._passed_on(element, node, into)
+                operand = self._operation(Op.ELEM, self.passing(), name.key, *map(self.value, indices), node=node)
             case tree.Binary():
                 return self._chain(node, into)
             case tree.Matrix():
@@ -98,9 +86,6 @@ class Emitter:
                 return self._operation(op, into or self.passing(), value, node=node)
             case _:
                 raise AssertionError(f"a checked program has no {type(node).__name__}")
-
-    def _passed_on(self, operand: Operand, node: tree.Expression, into: str | None) -> Operand:
-        """Return an operand that has a value; copy it where it shall go, if that is said."""
         return operand if into is None else self._operation(Op.COPY, into, operand, node=node)
 
     def _operation(self, op: Op, to: str, *operands: Operand, node: tree.Expression) -> str:
@@ -148,7 +133,3 @@ class Emitter:
         numbers, metres = pose_literals.pose_numbers(node), self.units.metres
         shift = [self.number(item) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
         return self._operation(Op.LOADM, to, self.constant((*numbers[:9], *shift)), node=node)
-
-    def text(self, node: tree.Expression) -> str:
-        """Return an expression as the program writes it, on one line."""
-        return " ".join(self.source.slice(node.span).split())

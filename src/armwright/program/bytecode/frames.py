@@ -9,7 +9,7 @@ from armwright.program.syntax import tree
 
 def assign(context: Context, node: tree.Assign) -> None:
     """Generate the value, and let the last instruction stand for the whole statement."""
-    out, to = context.out, str(context.operand(node.target))
+    out, to = context.out, str(context.out.value(node.target))
     if isinstance(node.value, tree.Number):
         out.emit(Op.LOADS, to, out.constant(out.number(node.value)), span=node.span)
         return
@@ -19,17 +19,15 @@ def assign(context: Context, node: tree.Assign) -> None:
 
 def affix(context: Context, node: tree.Affix) -> None:
     """Generate one AFFIX."""
-    operands = [context.operand(node.child), context.operand(node.parent)]
-    if node.at is not None:
-        operands.append(context.out.value(node.at))
+    operands = [context.out.value(part) for part in (node.child, node.parent, node.at) if part is not None]
     rigid = ("RIGIDLY",) if node.rigid else ()
     context.out.emit(Op.AFFIX if node.at is None else Op.AFFAT, *operands, *rigid, span=node.span)
 
 
 def unfix(context: Context, node: tree.Unfix) -> None:
     """Generate one UNFIX."""
-    above = () if node.parent is None else (context.operand(node.parent),)
-    context.out.emit(Op.UNFIX, context.operand(node.child), *above, span=node.span)
+    parent = () if node.parent is None else (context.out.value(node.parent),)
+    context.out.emit(Op.UNFIX, context.out.value(node.child), *parent, span=node.span)
 
 
 GENERATORS: Generators = {tree.Assign: assign, tree.Affix: affix, tree.Unfix: unfix}

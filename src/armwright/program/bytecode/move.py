@@ -6,7 +6,7 @@ import attrs
 
 from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.emitter import LATER
-from armwright.program.bytecode.instructions import Form, Op, Operand, stages_text
+from armwright.program.bytecode.instructions import Form, Op, stages_text
 from armwright.program.syntax import tree
 
 # In the order of the listing: the way, the points on it, the speed.
@@ -25,15 +25,20 @@ def move(context: Context, node: tree.Move) -> None:
     """Generate one MOVE: its places, its instructions in one stretch, then conditions and actions of its guards."""
     out = context.out
     guards = [clause for clause in node.clauses if isinstance(clause, tree.On)]
-    moved, goal = context.operand(node.moved), out.value(node.goal)
+    moved, goal = context.out.value(node.moved), out.value(node.goal)
     # Places are worked out before the motion begins, so that its own instructions follow one another.
-    parts = [(op, clause, _operands(context, clause)) for op, clause in _in_order(node)]
+    parts = [
+        (op, clause.span, context.values(clause))
+        for kind, op in _CLAUSES.items()
+        for clause in node.clauses
+        if isinstance(clause, kind)
+    ]
     out.emit(Op.MVBEG, moved, goal, span=node.span)
     form = form_of(node, context.text)
     if form.direct:
         out.emit(Op.MVDIR, span=node.span)
-    for op, clause, operands in parts:
-        out.emit(op, *operands, span=clause.span)
+    for op, span, operands in parts:
+        out.emit(op, *operands, span=span)
     conditions = [(guard, out.emit(Op.MVON, LATER, out.passing(), LATER, span=guard.head)) for guard in guards]
     comment = stages_text(form)
     arm = context.flow.arms.get(node.span.start)
@@ -61,39 +66,22 @@ def _guard(context: Context, guard: tree.On, number: int) -> None:
     out.instructions[number] = attrs.evolve(old, operands=(condition, truth, action))
 
 
-def _in_order(move: tree.Move) -> list[tuple[Op, tree.Clause]]:
-    return [(op, clause) for kind, op in _CLAUSES.items() for clause in move.clauses if isinstance(clause, kind)]
-
-
-def _operands(context: Context, clause: tree.Clause) -> tuple[Operand, ...]:
-    out = context.out
-    match clause:
-        case tree.Via(points=points):
-            return tuple(out.value(point) for point in points)
-        case tree.Approach(point=value) | tree.Departure(point=value):
-            return (out.value(value),)
-        case tree.Speed(value=value) | tree.Blend(value=value) | tree.Duration(value=value):
-            return (out.value(value),)
-        case _:
-            return ()
-
-
 def form_of(move: tree.Move, text: Callable[[tree.Expression], str]) -> Form:
     """Return the form of a MOVE, its places in the words that ``text`` gives for them."""
-    via: tuple[str, ...] = ()
-    ends: dict[type, str] = {}
-    for clause in move.clauses:
-        if isinstance(clause, tree.Via):
-            via = tuple(text(point) for point in clause.points)
-        elif isinstance(clause, tree.Approach | tree.Departure):
-            ends[type(clause)] = text(clause.point)
+    clauses = {type(clause) for clause in move.clauses}
+    via = [clause.points for clause in move.clauses if isinstance(clause, tree.Via)]
+    ends = {
+        type(clause): text(clause.point)
+        for clause in move.clauses
+        if isinstance(clause, tree.Approach | tree.Departure)
+    }
     return Form(
         goal=text(move.goal),
-        via=via,
+        via=tuple(map(text, via[-1])) if via else (),
         approach=ends.get(tree.Approach),
         departure=ends.get(tree.Departure),
-        straight=any(isinstance(clause, tree.Straightly) for clause in move.clauses),
-        blend=any(isinstance(clause, tree.Blend) for clause in move.clauses),
+        straight=tree.Straightly in clauses,
+        blend=tree.Blend in clauses,
     )
 
 

@@ -69,7 +69,7 @@ def source_text(source: Source, node: tree.Procedure | tree.Statement) -> str:
     return "".join(pieces)
 
 
-def _name_changes(source: Source, node: object) -> Iterator[tuple[int, int, str]]:
+def _name_changes(source: Source, node: tree.Node) -> Iterator[tuple[int, int, str]]:
     for node_ in tree.walk(node):
         if isinstance(node_, tree.Name) and source.slice(node_.span) != node_.text:
             yield node_.span.start, node_.span.end, node_.text

@@ -130,16 +130,18 @@ Mobile: TypeAlias = Name | Index | ArmName | Poison
 Expression: TypeAlias = Number | Name | Index | ArmName | Function | Unary | Binary | Matrix | Poison
 
 
-def walk(node: object) -> Iterator[object]:
+def child_nodes(node: Node) -> Iterator[Node]:
+    """Give the nodes right below a node, in the order of the text."""
+    for _, value in _fields(node):
+        yield from (part for part in (value if isinstance(value, tuple) else (value,)) if isinstance(part, Node))
+
+
+def walk(node: Node) -> Iterator[Node]:
     """Give a node and all nodes below it, in the order of the text."""
     waiting = [node]
     while waiting:
-        now = waiting.pop()
-        if isinstance(now, tuple):
-            waiting += reversed(now)
-        elif isinstance(now, Node):
-            yield now
-            waiting += [value for _, value in reversed([*_fields(now)])]
+        yield (now := waiting.pop())
+        waiting += reversed([*child_nodes(now)])
 
 
 def dump(node: object) -> Iterator[str]:

@@ -20,6 +20,7 @@ from armwright.program.syntax.nodes import (
     String,
     Unary,
     Variable,
+    child_nodes,
     dump,
     operation_chain,
     walk,
@@ -27,7 +28,7 @@ from armwright.program.syntax.nodes import (
 
 # What the nodes of values are called here too.
 __all__ = ["ArmName", "Binary", "Expression", "Function", "Index", "Matrix", "Mobile", "Name", "Node", "Number"]
-__all__ += ["Poison", "String", "Unary", "Variable", "dump", "operation_chain", "walk"]
+__all__ += ["Poison", "String", "Unary", "Variable", "child_nodes", "dump", "operation_chain", "walk"]
 
 
 @attrs.frozen
