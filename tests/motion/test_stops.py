@@ -25,6 +25,7 @@ from armwright.motion.straight import coarse_line, straight_line
 from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
+from samples import Sample
 
 # A configuration followed through whole turns stands beyond them.
 pytestmark = pytest.mark.filterwarnings("ignore::armwright.errors.UnitWarning")
@@ -33,7 +34,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::armwright.errors.UnitWarning")
 FACTORS = {"shoulder": (0, 1), "elbow": (1, 2), "wrist": (2, 4)}
 # How near the lines pass, in parts of the factor's scale.
 DISTANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 0.0)
-LINES = 8  # of each distance
+LINES = 8  # of each distance in `make proof`
 # A factor is to blame below this part of its scale, a joint above this part of the idlest one's motion.
 NEAR, BLAMED = 0.1, 0.3
 MET = 1e-8
@@ -71,10 +72,10 @@ def nearly_singular(arm: Arm, factor: str, part: float, rng: np.random.Generator
             return q
 
 
-def lines_past(arm: Arm, factor: str, rng: np.random.Generator) -> Iterator[tuple[Array, Array, Array]]:
+def lines_past(arm: Arm, factor: str, lines: int, rng: np.random.Generator) -> Iterator[tuple[Array, Array, Array]]:
     """Give lines that pass a singularity at several distances: configuration at the start, poses at both ends."""
     for part in DISTANCES:
-        for _ in range(LINES):
+        for _ in range(lines):
             q = nearly_singular(arm, factor, part * rng.choice((-1, 1)), rng)
             way = rng.normal(size=3)
             if factor == "shoulder" and rng.random() < 0.7:
@@ -142,16 +143,19 @@ def lifted(fast: CompiledArm, q_start: Array, A: Array, B: Array) -> Array:
     ],
 )
 @pytest.mark.drawn(0.4)
-def test_the_singularity_and_a_joint_to_blame_are_named(name: str, factor: str, rng: np.random.Generator) -> None:
+@pytest.mark.share(0.25)
+def test_the_singularity_and_a_joint_to_blame_are_named(
+    name: str, factor: str, rng: np.random.Generator, sample: Sample
+) -> None:
     """What a refused line names is a factor that is small there, and a joint that moves for nothing where it is 0.
 
     A limit that is named is passed by the branch of the start as well, followed densely, unless the wrist could be
     straightened on the way within the deviation, so that the arm went on on another one.
     """
     fast = compile_arm(load_arm(name))
-    arm, causes = fast.arm, Counter[str]()
+    arm, causes, lines = fast.arm, Counter[str](), sample.count(LINES)
     lower, upper = arm.limits.lower, arm.limits.upper
-    for q, A, B in lines_past(arm, factor, rng):
+    for q, A, B in lines_past(arm, factor, lines, rng):
         deviation = 10 ** rng.uniform(-4.5, -3)
         error = refused(fast, q, B, deviation)
         causes["run" if error is None else error.cause] += 1
@@ -163,8 +167,8 @@ def test_the_singularity_and_a_joint_to_blame_are_named(name: str, factor: str, 
             way, j = lifted(fast, q, A, B), error.joint - 1
             straightened = np.abs(singularity_factors(arm, way)[:, 2]).min() < 2 * ROTATION_PER_METRE * deviation
             assert straightened or (way[:, j] < lower[j]).any() or (way[:, j] > upper[j]).any(), str(error)
-    assert causes["run"] > LINES, causes
-    assert causes["limits"] + causes["singular"] > LINES or factor != "wrist", causes
+    assert causes["run"] > lines, causes
+    assert causes["limits"] + causes["singular"] > lines or factor != "wrist", causes
 
 
 @pytest.mark.parametrize("deviation", [1e-3, 1e-4, 1e-5])
