@@ -22,7 +22,7 @@ from armwright.calibration.fitting import Calibration, calibrate
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
 from armwright.calibration.joint_errors import largest_gravity_efforts
 from armwright.calibration.measurements import Measurements
-from armwright.calibration.nongeometric import NongeometricCalibration, calibrate_nongeometric
+from armwright.calibration.nongeometric import ModelComparison, NongeometricCalibration, calibrate_nongeometric
 from armwright.calibration.readings import Readings, refuse_unlocated
 from armwright.calibration.residuals import PoseError
 from armwright.errors import ContradictionError, InvalidValueError
@@ -114,7 +114,7 @@ class CalibrationAssessment:
             *(f"DOUBTFUL: {reason}" for reason in self.contradictions),
             *_notes_on_fit(self.full, self.measurements),
             _note_on_held_out(self.held_out, self.held_out_region),
-            *_notes_on_nongeometric(self.nongeometric),
+            *([_note_on_nongeometric(self.nongeometric)] if self.nongeometric else []),
         )
 
     def as_data(self) -> dict[str, Any]:
@@ -149,21 +149,12 @@ class CalibrationAssessment:
 
     def tables(self) -> Iterator[ResultTable]:
         """Give the errors of readings, then the errors of the arm."""
-        yield ResultTable(
-            title="Distances of the readings from the arm",
-            heads=("", "mean mm", "largest mm"),
-            rows=[(name, f"{x.mean() * 1e3:.4f}", f"{x.max() * 1e3:.4f}") for name, x in self.distances.items()],
-            numbers=(1, 2),
-        )
-        yield ResultTable(
-            title="Angles between the rotations of readings and arm",
-            heads=("", "mean deg", "largest deg"),
-            rows=[
-                (name, f"{math.degrees(x.mean()):.4f}", f"{math.degrees(x.max()):.4f}")
-                for name, x in self.angles.items()
-            ],
-            numbers=(1, 2),
-        )
+        for title, kinds, unit, scale in (
+            ("Distances of the readings from the arm", self.distances, "mm", 1e3),
+            ("Angles between the rotations of readings and arm", self.angles, "deg", 180 / math.pi),
+        ):
+            rows = [(name, f"{x.mean() * scale:.4f}", f"{x.max() * scale:.4f}") for name, x in kinds.items()]
+            yield ResultTable(title=title, heads=("", f"mean {unit}", f"largest {unit}"), rows=rows, numbers=(1, 2))
         yield ResultTable(
             title="By ISO 9283",
             heads=("", "AP mm", "largest", "AD mm", "largest"),
@@ -221,12 +212,11 @@ def assess_calibration(
     check = measurements.readings.take(measurements.check)
     refuse_unlocated(measured, check)
     full = calibrate(arm, measured, progress=progress)
-    tabular = full if not any(map(_is_tilt, full.names)) else calibrate(arm, measured, without=_TILTS)
-    beyond = (
-        calibrate_nongeometric(arm, measured, folds=folds, seed=seed, nested=True, progress=progress)
-        if nongeometric
-        else None
-    )
+    is_tilted = any(name.endswith(_TILTS) for name in full.names)
+    tabular = calibrate(arm, measured, without=_TILTS) if is_tilted else full
+    beyond = None
+    if nongeometric:
+        beyond = calibrate_nongeometric(arm, measured, folds=folds, seed=seed, nested=True, progress=progress)
     report("cross-validating: all errors")
     held_out = beyond.geometry if beyond else cross_validate(arm, measured, folds=folds, seed=seed)
     report("cross-validating by regions of the workspace")
@@ -236,28 +226,26 @@ def assess_calibration(
         # A frame, a plane or an anchor lies in one region, or too few readings are left.
         held_out_region = None
     held_out_tabular = held_out
-    if any(map(_is_tilt, full.chain.names)):
+    if any(name.endswith(_TILTS) for name in full.chain.names):
         report("cross-validating: for the arm file")
         held_out_tabular = cross_validate(arm, measured, folds=folds, seed=seed, without=_TILTS)
+    nominal = kinematic_chain(arm).forward(measured.q).position
+    points = measured.with_point & (measured.frame == 0)
+    distances = np.linalg.norm(nominal[points] - measured.points[points], axis=1)
+    in_own_frame = len(distances) > 0 and np.median(distances) <= _MAX_NOMINAL_DISTANCE
     positions = {
-        "nominal": kinematic_chain(arm).forward(measured.q).position,
+        "nominal": nominal if in_own_frame else None,
         "nominal, base best-fitted": full.chain.forward(measured.q).position,
         "calibrated, held out": held_out.positions,
+        "non-geometric, held out": beyond.nested.positions if beyond and beyond.nested else None,
     }
-    points = measured.with_point & (measured.frame == 0)
-    nominal = np.linalg.norm(positions["nominal"][points] - measured.points[points], axis=1)
-    if not len(nominal) or np.median(nominal) > _MAX_NOMINAL_DISTANCE:
-        nominal = nominal[:0]
-        del positions["nominal"]
-    if beyond and beyond.nested:
-        positions["non-geometric, held out"] = beyond.nested.positions
-    figures = {name: accuracy(measured, tool) for name, tool in positions.items()}
+    figures = {name: None if tool is None else accuracy(measured, tool) for name, tool in positions.items()}
     return CalibrationAssessment(
         arm=arm,
         measurements=measurements,
         full=full,
         tabular=tabular,
-        nominal=np.asarray(nominal, dtype=np.float64),
+        nominal=np.asarray(distances if in_own_frame else (), dtype=np.float64),
         held_out=held_out,
         held_out_region=held_out_region,
         held_out_tabular=held_out_tabular,
@@ -267,10 +255,6 @@ def assess_calibration(
         nongeometric=beyond,
         contradictions=tuple(find_contradictions(full, measured, noise)),
     )
-
-
-def _is_tilt(name: str) -> bool:
-    return name.endswith(_TILTS)
 
 
 # ---- notes ---------------------------------------------------------------------------------------------------------
@@ -307,17 +291,14 @@ def _note_on_held_out(held_out: HeldOutErrors, region: HeldOutErrors | None) -> 
     )
 
 
-def _notes_on_nongeometric(beyond: NongeometricCalibration | None) -> Iterator[str]:
-    """Give a note on the points of the figures of a non-geometric calibration."""
-    if beyond is None:
-        return
+def _note_on_nongeometric(beyond: NongeometricCalibration) -> str:
+    """Return a note on the points of the figures of a non-geometric calibration."""
     if beyond.nested is None:
-        yield (
+        return (
             "all held-out points were used to select the non-geometric model, and too few readings are left for a "
             "nested cross-validation: measure more, or reserve rows of set check"
         )
-        return
-    yield (
+    return (
         f"non-geometric, held out ({beyond.nested.distance.mean() * 1e3:.4g} mm) is a nested cross-validation: neither "
         f"the fit nor the selection of the model has used these points, unlike those in the table of candidates"
     )
@@ -337,25 +318,18 @@ def _error_rows(calibration: Calibration) -> Iterator[tuple[str, ...]]:
 def _nongeometric_tables(beyond: NongeometricCalibration) -> Iterator[ResultTable]:
     geometry = beyond.comparisons[0]
 
-    def figures(comparison: Any) -> tuple[str, str, str]:
-        if comparison.held_out is None:
-            return "", "", ""
-        held_out = f"{comparison.held_out * 1e3:.4f}"
-        if comparison is geometry:
-            return held_out, "", ""
-        return held_out, f"{comparison.gain * 1e3:+z.4f}", f"{comparison.standard_error * 1e3:.4f}"
+    def row(comparison: ModelComparison) -> tuple[str, ...]:
+        figures = "", "", ""
+        if comparison.held_out is not None:
+            gain = f"{comparison.gain * 1e3:+z.4f}", f"{comparison.standard_error * 1e3:.4f}"
+            figures = f"{comparison.held_out * 1e3:.4f}", *(("", "") if comparison is geometry else gain)
+        accepted = "yes" if comparison.accepted else "no"
+        return comparison.name, *figures, f"{accepted}: {comparison.reason}" if comparison.reason else accepted
 
     yield ResultTable(
         title="Non-geometric candidates, on the held-out points of the selection",
         heads=("", "mean mm", "gain mm", "±", "accepted"),
-        rows=[
-            (
-                comparison.name,
-                *figures(comparison),
-                ": ".join(filter(None, ("yes" if comparison.accepted else "no", comparison.reason))),
-            )
-            for comparison in beyond.comparisons
-        ],
+        rows=map(row, beyond.comparisons),
         numbers=(1, 2, 3),
     )
     yield ResultTable(
@@ -368,15 +342,13 @@ def _nongeometric_tables(beyond: NongeometricCalibration) -> Iterator[ResultTabl
 
 def _joint_error_rows(calibration: Calibration) -> Iterator[tuple[str, ...]]:
     """Give the coefficients of error models of joints: name, value, standard error, what it is of."""
-    models = {error.name: error for error in calibration.chain.joint_errors}
-    largest = largest_gravity_efforts(calibration.chain.arm)
+    joints, arm = {error.name: error.joint for error in calibration.chain.joint_errors}, calibration.chain.arm
+    largest = largest_gravity_efforts(arm)
     for name, value, error in zip(calibration.names, calibration.values, calibration.standard_errors, strict=True):
-        if name not in models:
-            continue
-        joint = models[name].joint
-        unit, effort = ("mrad", "N m") if calibration.chain.arm.joints[joint].revolute else ("mm", "N")
-        of = f"{unit} under {largest[joint]:.3g} {effort}" if name.endswith(".sag") else f"amplitude, {unit}"
-        yield name, f"{value * 1e3:+z.3f}", f"{error * 1e3:.3f}", of
+        if name in joints:
+            unit, effort = ("mrad", "N m") if arm.joints[joints[name]].revolute else ("mm", "N")
+            of = f"{unit} under {largest[joints[name]]:.3g} {effort}" if name.endswith(".sag") else f"amplitude, {unit}"
+            yield name, f"{value * 1e3:+z.3f}", f"{error * 1e3:.3f}", of
 
 
 def _repeatability_remark(figures: Repeatability | None) -> str:

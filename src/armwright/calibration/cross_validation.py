@@ -59,7 +59,6 @@ def calibrate_without(
     held_out: Flags,
     called: str,
     *,
-    base: Array | None = None,
     joint_errors: tuple[JointErrorModel, ...] = (),
     without: Sequence[str] = (),
 ) -> Calibration:
@@ -70,7 +69,6 @@ def calibrate_without(
         measured: m readings of it.
         held_out: (m,) which are held out.
         called: what they are called in a message, such as ``part 2 of 5``.
-        base: see ``calibrate``.
         joint_errors: see ``calibrate``.
         without: see ``calibrate``.
 
@@ -80,7 +78,7 @@ def calibrate_without(
     """
     try:
         refuse_unlocated(measured.take(~held_out), measured.take(held_out))
-        return calibrate(arm, measured.take(~held_out), base=base, joint_errors=joint_errors, without=without)
+        return calibrate(arm, measured.take(~held_out), joint_errors=joint_errors, without=without)
     except (ContradictionError, InvalidValueError) as error:
         raise type(error)(f"with {called} held out: {error}") from error
 
@@ -91,8 +89,6 @@ def cross_validate(
     *,
     folds: int = FOLDS,
     seed: int = 0,
-    base: Array | None = None,
-    joint_errors: tuple[JointErrorModel, ...] = (),
     without: Sequence[str] = (),
     regions: bool = False,
 ) -> HeldOutErrors:
@@ -105,8 +101,6 @@ def cross_validate(
         measured: m readings of it.
         folds: how many there are.
         seed: of the assignment.
-        base: see ``calibrate``.
-        joint_errors: see ``calibrate``.
         without: see ``calibrate``.
         regions: whether each fold is a region of the workspace, so that the arm is judged where it was not measured.
 
@@ -118,10 +112,7 @@ def cross_validate(
     held = HeldOutErrors.unknown(len(measured))
     parts = workspace_regions(arm, measured.q, folds) if regions else random_folds(measured.q, folds, seed)
     for fold, rows in enumerate(parts, 1):
-        called = f"part {fold} of {folds}"
-        calibration = calibrate_without(
-            arm, measured, rows, called, base=base, joint_errors=joint_errors, without=without
-        )
+        calibration = calibrate_without(arm, measured, rows, f"part {fold} of {folds}", without=without)
         held.put(rows, held_out_errors(calibration, measured.take(rows)))
     return held
 
@@ -167,9 +158,8 @@ def _configurations_for_folds(q: Array, folds: int) -> tuple[Numbers, int]:
     configuration = distinct_configurations(q)
     count = int(configuration.max()) + 1
     if count < 2:
-        raise TooFewError(
-            f"folds: {len(q)} readings of one joint configuration leave none to hold out; measure in several"
-        )
+        message = f"folds: {len(q)} readings of one joint configuration leave none to hold out; measure in several"
+        raise TooFewError(message)
     if not 2 <= folds <= count:
         raise InvalidValueError(f"folds: expected 2 to {count}, one joint configuration in each or more, got {folds}")
     return configuration, count

@@ -135,18 +135,15 @@ def compare_held_out(name: str, before: Array, after: Array, configuration: Numb
     cluster = np.bincount(np.unique(configuration, return_inverse=True)[1], before - after - gain)
     count = len(cluster)
     standard_error = float(np.sqrt(count / max(1, count - 1) * np.sum(cluster**2)) / len(before))
-    significant, relevant = gain > _MIN_STANDARD_ERRORS * standard_error, gain > _MIN_PART * float(before.mean())
-    if significant and relevant:
-        reason = "the held-out error decreases"
-    elif gain <= 0:
-        reason = "the held-out error does not decrease"
-    elif not significant:
-        reason = "the gain is not significant"
-    else:
-        reason = "the gain is too small to be worth it"
-    return ModelComparison(
-        name, float(after.mean()), gain, standard_error, accepted=significant and relevant, reason=reason
-    )
+    objection = ""
+    if gain <= 0:
+        objection = "the held-out error does not decrease"
+    elif not gain > _MIN_STANDARD_ERRORS * standard_error:
+        objection = "the gain is not significant"
+    elif not gain > _MIN_PART * float(before.mean()):
+        objection = "the gain is too small to be worth it"
+    reason = objection or "the held-out error decreases"
+    return ModelComparison(name, float(after.mean()), gain, standard_error, accepted=not objection, reason=reason)
 
 
 class _Candidate(NamedTuple):
@@ -163,15 +160,6 @@ class _Candidate(NamedTuple):
     reason_for_none: str
 
 
-def _candidates(arm: Arm) -> list[_Candidate]:
-    no_gears = f"no joint of {arm.name} is revolute"
-    return [
-        _Candidate("joint compliance under gravity", compliances(arm), f"{arm.name} has no masses"),
-        _Candidate("transmission error, first harmonic", transmission_errors(arm, 1), no_gears),
-        _Candidate("transmission error, second harmonic", transmission_errors(arm, 2), no_gears),
-    ]
-
-
 class _FoldedReadings:
     """Readings in folds, with the calibrations and residual models without some of them; each is fitted once.
 
@@ -180,32 +168,37 @@ class _FoldedReadings:
         residual_model: returns the model of the residuals of that calibration.
     """
 
-    def __init__(self, arm: Arm, measured: Readings, *, folds: int, seed: int, base: Array | None) -> None:
-        self.arm, self.measured, self.seed, self.base = arm, measured, seed, base
+    def __init__(self, arm: Arm, measured: Readings, *, folds: int, seed: int) -> None:
+        self.arm, self.measured, self.seed = arm, measured, seed
         self.folds = random_folds(measured.q, folds, seed)
         self.points = measured.with_point & (measured.frame == 0)
         self.configuration = distinct_configurations(measured.q)
-        self.candidates = _candidates(arm)
+        no_gears = f"no joint of {arm.name} is revolute"
+        self.candidates = (
+            _Candidate("joint compliance under gravity", compliances(arm), f"{arm.name} has no masses"),
+            _Candidate("transmission error, first harmonic", transmission_errors(arm, 1), no_gears),
+            _Candidate("transmission error, second harmonic", transmission_errors(arm, 2), no_gears),
+        )
         self.calibration = cache(self._calibrate)
         self.residual_model = cache(self._fit_residual_model)
 
-    def is_outside(self, left_out: frozenset[int]) -> Flags:
-        """Return (m,) which readings are in none of the folds that are left out."""
-        if not left_out:
-            return np.ones(len(self.measured), dtype=np.bool_)
-        return np.asarray(~np.any([self.folds[fold] for fold in left_out], axis=0), dtype=np.bool_)
+    def held_out(self, left_out: frozenset[int]) -> Flags:
+        """Return (m,) which readings are in one of the folds that are left out."""
+        held_out = np.zeros(len(self.measured), dtype=np.bool_)
+        for fold in left_out:
+            held_out |= self.folds[fold]
+        return held_out
 
     def _calibrate(self, left_out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> Calibration:
         if not left_out:
-            return calibrate(self.arm, self.measured, base=self.base, joint_errors=joints)
+            return calibrate(self.arm, self.measured, joint_errors=joints)
         name = f"part {' and '.join(str(fold + 1) for fold in sorted(left_out))} of {len(self.folds)}"
-        held_out = ~self.is_outside(left_out)
-        return calibrate_without(self.arm, self.measured, held_out, name, base=self.base, joint_errors=joints)
+        return calibrate_without(self.arm, self.measured, self.held_out(left_out), name, joint_errors=joints)
 
     def _fit_residual_model(self, left_out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> ResidualModel:
-        calibration, train = self.calibration(left_out, joints), self.points & self.is_outside(left_out)
-        q = self.measured.q[train]
-        return _fit_residuals(self.arm, q, self.measured.points[train] - calibration.predict(q), self.seed)
+        train = self.measured.take(self.points & ~self.held_out(left_out))
+        residuals = train.points - self.calibration(left_out, joints).predict(train.q)
+        return _fit_residuals(self.arm, train.q, residuals, self.seed)
 
     def fold_errors(
         self, fold: int, without: frozenset[int], joints: tuple[JointErrorModel, ...], *, with_residual_model: bool
@@ -241,7 +234,6 @@ def calibrate_nongeometric(
     *,
     folds: int = 5,
     seed: int = 0,
-    base: Array | None = None,
     nested: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> NongeometricCalibration:
@@ -252,15 +244,14 @@ def calibrate_nongeometric(
         measured: readings of it, points among them.
         folds: of the cross-validation.
         seed: of the folds.
-        base: see ``calibrate``.
         nested: whether to hold points out of the selection, too, which takes about three times as long.
         progress: called with what is being done.
 
     Raises:
         InvalidValueError: no point was measured, or see ``calibrate``.
     """
-    report = progress or _ignore
-    data = _FoldedReadings(arm, measured, folds=folds, seed=seed, base=base)
+    report = progress or (lambda _: None)
+    data = _FoldedReadings(arm, measured, folds=folds, seed=seed)
     if not data.points.any():
         raise InvalidValueError("expected points in the measuring frame, whose residuals are modelled; got none")
     nothing: frozenset[int] = frozenset()
@@ -276,22 +267,18 @@ def calibrate_nongeometric(
     )
 
 
-def _ignore(what: str) -> None:
-    """Report nothing."""
-
-
 def _cross_validate_selection(data: _FoldedReadings, report: Callable[[str], None]) -> HeldOutErrors | None:
     """Return the errors of nested cross-validation; None if too few readings are left for the selection."""
     held = HeldOutErrors.unknown(len(data.measured))
-    for number, rows in enumerate(data.folds):
-        left_out = frozenset({number})
-        report(f"nested cross-validation, part {number + 1} of {len(data.folds)}")
+    for fold, rows in enumerate(data.folds):
+        left_out = frozenset({fold})
+        report(f"nested cross-validation, part {fold + 1} of {len(data.folds)}")
         try:
-            selection = _select(data, left_out, _ignore)
+            selection = _select(data, left_out, lambda _: None)
         except (ContradictionError, InvalidValueError):
             return None
         with_residual_model = selection.with_residual_model
-        held.put(rows, data.fold_errors(number, left_out, selection.joints, with_residual_model=with_residual_model))
+        held.put(rows, data.fold_errors(fold, left_out, selection.joints, with_residual_model=with_residual_model))
     return held
 
 
@@ -305,80 +292,51 @@ def _select(data: _FoldedReadings, left_out: frozenset[int], report: Callable[[s
     """
     if len(data.folds) - len(left_out) < 2:
         raise TooFewError("at least two parts of the readings must remain for the selection of a model")
-    points = data.points & data.is_outside(left_out)
-    configuration = data.configuration[points]
+    points = data.points & ~data.held_out(left_out)
 
     def compare(name: str, before: HeldOutErrors, after: HeldOutErrors) -> ModelComparison:
-        return compare_held_out(name, before.distance[points], after.distance[points], configuration)
+        return compare_held_out(name, before.distance[points], after.distance[points], data.configuration[points])
 
     report("cross-validating: geometry")
-    geometry = data.held_out_errors(left_out, ())
+    geometry = held_out = data.held_out_errors(left_out, ())
     mean = float(geometry.distance[points].mean())
-    comparisons = [ModelComparison("geometry", mean, 0.0, 0.0, accepted=True, reason="")]
-    joints, held_out = _select_joint_errors(
-        data, left_out, geometry, compare=compare, comparisons=comparisons, report=report
-    )
-    report("modelling the residuals")
-    name, accepted = "Gaussian process of the residuals", False
-    try:
-        better = data.held_out_errors(left_out, joints, with_residual_model=True)
-    except MissingExtraError as error:
-        comparisons.append(ModelComparison.rejected(name, str(error)))
-    else:
-        comparisons.append(compare(name, held_out, better))
-        accepted = comparisons[-1].accepted
-        held_out = better if accepted else held_out
-    return _Selection(joints, accepted, geometry, held_out, tuple(comparisons))
+    comparisons = {"geometry": ModelComparison("geometry", mean, 0.0, 0.0, accepted=True, reason="")}
 
-
-def _select_joint_errors(
-    data: _FoldedReadings,
-    left_out: frozenset[int],
-    geometry: HeldOutErrors,
-    *,
-    compare: Callable[[str, HeldOutErrors, HeldOutErrors], ModelComparison],
-    comparisons: list[ModelComparison],
-    report: Callable[[str], None],
-) -> tuple[tuple[JointErrorModel, ...], HeldOutErrors]:
-    """Return the error models of joints that held-out points confirm, and the held-out errors with them.
-
-    Args:
-        data: the readings.
-        left_out: folds that are left out of everything.
-        geometry: held-out errors of geometry alone.
-        compare: compares held-out errors without and with a candidate.
-        comparisons: grows by those of the candidates.
-        report: called with what is being done.
-    """
-    joints: tuple[JointErrorModel, ...] = ()
-    held_out = geometry
-    accepted: list[int] = []
-    for candidate in data.candidates:
-        if not candidate.models:
-            comparisons.append(ModelComparison.rejected(candidate.name, candidate.reason_for_none))
-            continue
-        report(f"cross-validating: {candidate.name}")
+    def improve(name: str, joints: tuple[JointErrorModel, ...], **more: bool) -> HeldOutErrors | None:
+        """Compare a model with the one accepted before; return its held-out errors if it is accepted."""
         try:
-            better = data.held_out_errors(left_out, (*joints, *candidate.models))
-        except (ContradictionError, InvalidValueError) as error:
-            comparisons.append(ModelComparison.rejected(candidate.name, str(error)))
+            better = data.held_out_errors(left_out, joints, **more)
+        except (ContradictionError, InvalidValueError, MissingExtraError) as error:
+            comparisons[name] = ModelComparison.rejected(name, str(error))
+            return None
+        comparisons[name] = compare(name, held_out, better)
+        return better if comparisons[name].accepted else None
+
+    joints: tuple[JointErrorModel, ...] = ()
+    accepted: list[_Candidate] = []
+    for candidate in data.candidates:
+        name, models, reason = candidate
+        if not models:
+            comparisons[name] = ModelComparison.rejected(name, reason)
             continue
-        comparisons.append(compare(candidate.name, held_out, better))
-        if comparisons[-1].accepted:
-            joints, held_out = (*joints, *candidate.models), better
-            accepted.append(len(comparisons) - 1)
-    # A model that was accepted early may explain the same errors as a later one. Geometry is the first comparison.
-    for number in accepted[:-1]:
-        candidate = data.candidates[number - 1]
-        report(f"cross-validating: without {candidate.name}")
-        fewer = tuple(error for error in joints if error not in candidate.models)
+        report(f"cross-validating: {name}")
+        better = improve(name, (*joints, *models))
+        if better is not None:
+            joints, held_out = (*joints, *models), better
+            accepted.append(candidate)
+    # A model that was accepted early may explain the same errors as a later one.
+    for name, models, _ in accepted[:-1]:
+        report(f"cross-validating: without {name}")
+        fewer = tuple(error for error in joints if error not in models)
         without = data.held_out_errors(left_out, fewer)
-        if not compare(candidate.name, without, held_out).accepted:
+        if not compare(name, without, held_out).accepted:
             joints, held_out = fewer, without
-            comparisons[number] = comparisons[number]._replace(
-                accepted=False, reason="superfluous beside a later candidate"
-            )
-    return joints, held_out
+            reason = "superfluous beside a later candidate"
+            comparisons[name] = comparisons[name]._replace(accepted=False, reason=reason)
+    report("modelling the residuals")
+    better = improve("Gaussian process of the residuals", joints, with_residual_model=True)
+    best = held_out if better is None else better
+    return _Selection(joints, better is not None, geometry, best, tuple(comparisons.values()))
 
 
 def _errors(calibration: Calibration, model: ResidualModel | None, measured: Readings) -> HeldOutErrors:
