@@ -66,11 +66,7 @@ class JointResponse(NamedTuple):
 
 
 def articulated_body(
-    arm: Arm,
-    q: Sequence[Scalar],
-    qd: Sequence[Scalar],
-    tau: Sequence[Scalar],
-    wrench: Sequence[Scalar] = NO_WRENCH,
+    arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar], tau: Sequence[Scalar], wrench: Sequence[Scalar] = NO_WRENCH
 ) -> tuple[list[Scalar], list[Pivot]]:
     """Return the accelerations that efforts cause, over abstract scalars, in time proportional to n.
 

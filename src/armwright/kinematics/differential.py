@@ -129,9 +129,7 @@ def differential_inverse(
     singular = np.abs(factors) < SINGULAR_FACTOR
     joint_rates = stack([sign * rate for sign, rate in zip(geometry.signs, rates, strict=True)], lead)
     return DifferentialInverse(
-        rates=np.where(singular.any(axis=-1, keepdims=True), np.nan, joint_rates),
-        factors=factors,
-        singular=singular,
+        rates=np.where(singular.any(axis=-1, keepdims=True), np.nan, joint_rates), factors=factors, singular=singular
     )
 
 

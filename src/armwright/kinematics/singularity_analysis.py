@@ -163,10 +163,7 @@ def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: fl
     # What the factors call near decides; the singular values say in how many directions.
     rank = len(sigma) - (max(small, 1) if any(factor.near for factor in factors) else 0)
     return Singularities(
-        factors=factors,
-        singular_values=sigma,
-        lost=U[:, rank:].T / np.repeat((1.0, length), 3),
-        idle=Vt[rank:],
+        factors=factors, singular_values=sigma, lost=U[:, rank:].T / np.repeat((1.0, length), 3), idle=Vt[rank:]
     )
 
 

@@ -75,11 +75,11 @@ def blended(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends: Ends
     change = plan.after - plan.before
     count, joints = plan.points.shape
     coefficients = np.zeros((2 * count - 1, 5, joints))
-    curves, ways = coefficients[::2], coefficients[1::2]
+    curves, lines = coefficients[::2], coefficients[1::2]
     curves[:, 0], curves[:, 1] = plan.points - plan.before * b, plan.before
     with np.errstate(divide="ignore", invalid="ignore"):
         curves[:, 3], curves[:, 4] = change / (4 * b**2), -change / (16 * b**3)
-    ways[:, 0], ways[:, 1] = (plan.points + plan.after * b)[:-1], plan.after[:-1]
+    lines[:, 0], lines[:, 1] = (plan.points + plan.after * b)[:-1], plan.after[:-1]
     begins = np.ravel(np.stack([plan.centres - plan.blend, plan.centres + plan.blend], axis=1))
     begins = np.clip(np.maximum.accumulate(begins), 0.0, plan.end)
     distinct = np.diff(begins) > _ROUNDING * plan.end
@@ -137,8 +137,8 @@ def via_distances(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends
         for i in range(5):
             for j in range(5):
                 squares[:, i + j, 0] += np.sum(terms[:, i] * terms[:, j], axis=-1)
-        looks = [np.zeros_like(b), b, 2 * b, *turning_times(squares, 2 * b[:, 0])]
-        distances[1:-1] = np.min([np.linalg.norm(evaluate(terms, t), axis=-1) for t in looks], axis=0)
+        times_tried = [np.zeros_like(b), b, 2 * b, *turning_times(squares, 2 * b[:, 0])]
+        distances[1:-1] = np.min([np.linalg.norm(evaluate(terms, t), axis=-1) for t in times_tried], axis=0)
     return distances
 
 
@@ -170,13 +170,13 @@ def blend_timing(
     speeds, accelerations = (
         limit_per_joint(limit, q.shape[1], what) for limit, what in ((speed, "speed"), (acceleration, "acceleration"))
     )
-    way = np.diff(q, axis=0)
-    for i in np.flatnonzero(np.abs(way).max(axis=1) <= NOWHERE):
+    travel = np.diff(q, axis=0)
+    for i in np.flatnonzero(np.abs(travel).max(axis=1) <= NOWHERE):
         raise InvalidValueError(f"blends: points {i + 1} and {i + 2} coincide; omit one of them")
-    cruise = (np.abs(way) / speeds).max(axis=1)
+    cruise = (np.abs(travel) / speeds).max(axis=1)
     for i in np.flatnonzero(cruise == 0):
         raise InvalidValueError(f"speed: no joint that moves from point {i + 1} to point {i + 2} has a limit")
-    before, after = _rates(way / cruise[:, None], ends)
+    before, after = rates_at_points(travel / cruise[:, None], ends)
     change = np.abs(after - before)
     blend = (PEAK_ACCELERATION * change / accelerations).max(axis=1)
     for i in np.flatnonzero((blend == 0) & (change.max(axis=1) > 0)):
@@ -212,7 +212,7 @@ def blend_plan(times: ArrayLike, points: ArrayLike, blend: ArrayLike, ends: Ends
         b[[0, -1]] /= 2
         centres[0] += b[0]
         centres[-1] -= b[-1]
-    before, after = _rates(np.diff(q, axis=0) / np.diff(centres)[:, None], ends)
+    before, after = rates_at_points(np.diff(q, axis=0) / np.diff(centres)[:, None], ends)
     return BlendPlan(centres, b, q, before, after, float(t[-1]))
 
 
@@ -225,8 +225,8 @@ def _check_room(t: Array, b: Array) -> None:
         )
 
 
-def _rates(ways: Array, ends: Ends) -> tuple[Array, Array]:
+def rates_at_points(rates: Array, ends: Ends) -> tuple[Array, Array]:
     """Return the rates (k, n) before and after each point, from those of the segments (k-1, n)."""
-    still = np.zeros_like(ways[:1])
-    first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])
-    return np.concatenate([first, ways]), np.concatenate([ways, last])
+    still = np.zeros_like(rates[:1])
+    first, last = (still, still) if ends == "rest" else (rates[:1], rates[-1:])
+    return np.concatenate([first, rates]), np.concatenate([rates, last])

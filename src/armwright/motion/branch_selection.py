@@ -7,7 +7,12 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations
+from armwright.kinematics.inverse_kinematics.revolutions import (
+    equivalent_configurations,
+    joint_distance,
+    joint_distances,
+)
+from armwright.kinematics.inverse_kinematics.solution import InverseSolution
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.obstruction import PathError, cause_of
 
@@ -17,6 +22,21 @@ class LabelledConfiguration(NamedTuple):
 
     label: str
     q: Array
+
+
+def allowed_configurations(solution: InverseSolution) -> list[LabelledConfiguration]:
+    """Return the configurations of a solution inside the limits, revolutions included."""
+    return [
+        LabelledConfiguration(branch.label, q)
+        for branch in solution.allowed
+        for q in equivalent_configurations(solution.arm, branch.q)
+    ]
+
+
+def nearest_configurations(solution: InverseSolution, near: Array) -> list[Array]:
+    """Return the configurations (n,) of a solution inside the limits, revolutions included, nearest first."""
+    configurations = (each.q for each in allowed_configurations(solution))
+    return sorted(configurations, key=lambda q: joint_distance(solution.arm, near, q))
 
 
 def configurations_at(arm: Arm, X: Array, near: Array) -> list[list[LabelledConfiguration]]:
@@ -31,17 +51,11 @@ def configurations_at(arm: Arm, X: Array, near: Array) -> list[list[LabelledConf
         PathError: a pose has none; ``segment`` is the one that leads to it, from 0.
     """
     layers: list[list[LabelledConfiguration]] = []
-    for i, each in enumerate(X):
-        solution = inverse(arm, each, near)
+    for i, pose in enumerate(X):
+        solution = inverse(arm, pose, near)
         if not solution.allowed:
             raise PathError(cause_of(solution), max(i - 1, 0), min(i, 1.0), f"pose {i + 1}: {solution.explain()}")
-        layers.append(
-            [
-                LabelledConfiguration(branch.label, q)
-                for branch in solution.allowed
-                for q in equivalent_configurations(arm, branch.q)
-            ]
-        )
+        layers.append(allowed_configurations(solution))
         near = layers[-1][0].q
     return layers
 
@@ -63,8 +77,8 @@ def configurations_through(arm: Arm, X: Array, near: Array) -> list[LabelledConf
     common = set.intersection(*({configuration.label for configuration in layer} for layer in layers))
     if common:
         by_branch = [[[p for p in layer if p.label == label] for layer in layers] for label in sorted(common)]
-        ways = [_shortest(arm, near, same) for same in by_branch]
-        return min(ways, key=lambda way: way[0])[1]
+        paths = [_shortest(arm, near, same_branch) for same_branch in by_branch]
+        return min(paths, key=lambda path: path[0])[1]
     return _shortest(arm, near, layers)[1]
 
 
@@ -72,17 +86,15 @@ def _shortest(
     arm: Arm, near: Array, layers: Sequence[Sequence[LabelledConfiguration]]
 ) -> tuple[float, list[LabelledConfiguration]]:
     """Return the shortest path through one configuration of every layer, and its length."""
-    speed = arm.limits.speed
-    weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
-    previous, lengths, came = near[None], np.zeros(1), []
+    previous, lengths, predecessors = near[None], np.zeros(1), []
     for layer in layers:
-        here = np.array([configuration.q for configuration in layer])
-        ways = lengths[:, None] + np.linalg.norm((here - previous[:, None]) * weight, axis=-1)
-        came.append(ways.argmin(axis=0))
-        previous, lengths = here, ways.min(axis=0)
+        q = np.array([configuration.q for configuration in layer])
+        sums = lengths[:, None] + joint_distances(arm, previous[:, None], q)
+        predecessors.append(sums.argmin(axis=0))
+        previous, lengths = q, sums.min(axis=0)
     last = int(lengths.argmin())
     length, chosen = float(lengths[last]), []
-    for layer, best in zip(reversed(layers), reversed(came), strict=True):
+    for layer, best in zip(reversed(layers), reversed(predecessors), strict=True):
         chosen.append(layer[last])
         last = int(best[last])
     return length, chosen[::-1]

@@ -7,6 +7,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_lines
 from armwright.spatial.poses import position_text
 
@@ -113,18 +114,11 @@ class Certificate:
 
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data in SI units, as JSON can carry it."""
+        derived = attrs.filters.exclude("arm", "peaks", "factor", "because", "backward")
         return {
             "holds": self.holds,
-            "deviation_tolerance": self.deviation_tolerance,
-            "deviation": self.deviation,
-            "deviation_sampled": self.deviation_sampled,
-            "rotation_tolerance": self.rotation_tolerance,
-            "rotation": self.rotation,
-            "rotation_sampled": self.rotation_sampled,
-            "worst_time": self.worst_time,
+            **attrs.asdict(self, recurse=False, filter=derived),
             "worst_position": self.worst_position.tolist(),
-            "knots": self.knots,
-            "samples": self.samples,
             "of_limits": {name: {"joint": joint + 1, "part": part} for name, joint, part in self._uses},
             "slower": self.factor,
             "because": None if self.because is None else {"limit": self.because[0], "joint": self.because[1] + 1},
@@ -159,16 +153,11 @@ def slower(arm: Arm, factor: float, because: tuple[LimitName, int], than: str = 
     return f"{factor:.2f} times slower{than}, limited by the {limit} of {arm.called(joint)}"
 
 
-def slowing(arm: Arm, peaks: dict[LimitName, Array]) -> tuple[float, tuple[LimitName, int] | None]:
-    """Return by which factor a motion must be slowed to keep speeds and accelerations, at least 1, and for what.
-
-    Args:
-        arm: the arm, with n joints.
-        peaks: largest speeds and accelerations, (n,) each.
-    """
+def slowing(arm: Arm, trajectory: Trajectory) -> tuple[float, tuple[LimitName, int] | None]:
+    """Return by which factor a motion must be slowed to keep speeds and accelerations, at least 1, and for what."""
     needs: dict[LimitName, Array] = {
-        "speed": peaks["speed"] / arm.limits.speed,
-        "acceleration": np.sqrt(peaks["acceleration"] / arm.limits.acceleration),
+        "speed": trajectory.peaks(1) / arm.limits.speed,
+        "acceleration": np.sqrt(trajectory.peaks(2) / arm.limits.acceleration),
     }
     factor, because = 1.0, None
     for name, need in needs.items():

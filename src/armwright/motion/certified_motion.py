@@ -157,7 +157,7 @@ def fastest(
 def slowed_alike(arm: AnyArm, tracking: Tracking, allowed: Tolerance) -> CertifiedMotion:
     """Return a followed motion, all of it slowed until the joints keep their limits; efforts where that helps."""
     model, planned = solver_of(arm).arm, tracking.trajectory
-    factor, because = slowing(model, {"speed": planned.peaks(1), "acceleration": planned.peaks(2)})
+    factor, because = slowing(model, planned)
     trajectory, _, slower = _inside_efforts(arm, planned.slowed(factor), weak=True)
     factor = trajectory.duration / planned.duration
     certificate = certificate_of(arm, trajectory, tracking.error, allowed, time=tracking.error.worst_time * factor)

@@ -72,12 +72,11 @@ def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
                 break
     else:
         branches, singular = solver.inverse_branches(X, q_start)
-        if _along_one_branch(solver, branches, singular, q) and not missed(solver, q, X).any():
-            return q, None
+        if (same_branch := _along_one_branch(solver, X, branches, singular, q_start)) is not None:
+            return same_branch, None
         for k in range(1, len(X)):
             q[k] = _nearest(solver, X[k], q[k - 1], None if singular[k].any() else branches[k])
-    failed = np.flatnonzero(missed(solver, q, X))
-    return q, int(failed[0]) if len(failed) else None
+    return q, _first_missed(solver, q, X)
 
 
 def _several_at_once(solver: Solver, X: Array, q_start: Array) -> Array | None:
@@ -104,10 +103,8 @@ def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
     """Whether the branch of the first configuration meets all poses (k, 4, 4) without a jump."""
     if solver.inverse_branches is None:
         return False
-    q = np.empty((len(X), solver.arm.n))
-    q[:] = q_start
     branches, singular = solver.inverse_branches(X, q_start)
-    return _along_one_branch(solver, branches, singular, q) and not missed(solver, q, X).any()
+    return _along_one_branch(solver, X, branches, singular, q_start) is not None
 
 
 def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
@@ -116,8 +113,7 @@ def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
         q = descend_from(solver.arm, X, guide)
     else:
         q = _nearest_of(solver.arm, solver.inverse_branches(X, guide)[0], guide)
-    failed = np.flatnonzero(missed(solver, q, X))
-    return q, int(failed[0]) if len(failed) else None
+    return q, _first_missed(solver, q, X)
 
 
 def step_by_step(solver: Solver, X: Array, q_start: Array, allowed: Tolerance) -> Iterator[Step]:
@@ -177,15 +173,22 @@ def _nearest_of(arm: Arm, candidates: Array, q: Array) -> Array:
     return np.asarray(np.take_along_axis(turned, nearest[..., None, None], axis=-2)[..., 0, :])
 
 
-def _along_one_branch(solver: Solver, branches: Array, singular: Array, q: Array) -> bool:
-    """Fill in the branch that the first configuration belongs to, where it goes on to the end without a jump."""
-    branch = int(np.abs(branches[0] - q[0]).max(axis=-1).argmin())
+def _along_one_branch(solver: Solver, X: Array, branches: Array, singular: Array, q_start: Array) -> Array | None:
+    """Return the branch (k, n) of the first configuration if it meets all poses (k, 4, 4) without a jump, else None."""
+    branch = int(np.abs(branches[0] - q_start).max(axis=-1).argmin())
     steps = np.diff(branches[:, branch], axis=0)
     steps -= np.where(solver.arm.revolute, 2 * np.pi * np.round(steps / (2 * np.pi)), 0.0)
-    if singular[:, branch].any() or np.abs(branches[0, branch] - q[0]).max() > _OTHER or np.abs(steps).max() > _JUMP:
-        return False
-    q[1:] = q[0] + np.cumsum(steps, axis=0)
-    return True
+    jumps = np.abs(branches[0, branch] - q_start).max() > _OTHER or np.abs(steps).max() > _JUMP
+    if singular[:, branch].any() or jumps:
+        return None
+    q = np.concatenate([q_start[None], q_start + np.cumsum(steps, axis=0)])
+    return None if missed(solver, q, X).any() else q
+
+
+def _first_missed(solver: Solver, q: Array, X: Array) -> int | None:
+    """Return the number of the first pose that its configuration misses; None where none is missed."""
+    failed = np.flatnonzero(missed(solver, q, X))
+    return int(failed[0]) if len(failed) else None
 
 
 def missed(solver: Solver, q: Array, X: Array) -> Flags:

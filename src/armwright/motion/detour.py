@@ -14,8 +14,8 @@ from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
-from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations, joint_distance
 from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certified_motion import CertifiedMotion
 from armwright.motion.deviation import cubic_peaks, hand_bounds, tracking_error
 from armwright.motion.limit_utilization import slowing_for_limits
@@ -246,8 +246,7 @@ def _on_joint_moves(solver: Solver, q: Array, X_goal: Array) -> Iterator[list[Ar
     configuration. The poses round it are the same in every call.
     """
     arm = solver.arm
-    ends = [image for branch in inverse(arm, X_goal, q).allowed for image in equivalent_configurations(arm, branch.q)]
-    ends = sorted(ends, key=lambda end: joint_distance(arm, q, end))[:_JOINT_MOVES]
+    ends = nearest_configurations(inverse(arm, X_goal, q), q)[:_JOINT_MOVES]
     if not ends:
         return
     yield [np.asarray(solver.forward(q + part * (end - q))) for end in ends for part in _ON_THE_WAY]

@@ -135,8 +135,7 @@ def tracking_error(
     needed = np.maximum(bounds.position / allowed.position, 2 * bounds.orientation / allowed.orientation)
     count = int(min(max(math.ceil(float((np.sqrt(needed / (8 * _ADDED)) * h).max())), _SAMPLES[0]), _SAMPLES[1]))
     local = np.linspace(0.0, 1.0, count + 1) * h[:, None]
-    c, t = trajectory.coefficients[:, :, None], local[..., None]
-    q = ((c[:, 3] * t + c[:, 2]) * t + c[:, 1]) * t + c[:, 0]
+    q = evaluate(trajectory.coefficients[:, :, None], local[..., None])
     times = np.minimum(trajectory.times[:-1, None] + local, trajectory.duration)
     return motion.error(HandSamples(times, np.asarray(solver.forward(q)), h / count, hand, bounds))
 
@@ -248,14 +247,12 @@ def turning_positions(c: Array, lengths: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         times = np.stack([large / a, start / large])
     t = np.clip(np.nan_to_num(times, nan=0.0, posinf=0.0, neginf=0.0), 0.0, lengths[:, None])
-    return np.asarray(((c[:, 3] * t + c[:, 2]) * t + c[:, 1]) * t + c[:, 0])
+    return evaluate(c, t)
 
 
 def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:
     """Return the largest distance (n,) of the tool from the frame before each joint, slides as far out as they go."""
-    h = lengths[:, None]
-    c = np.abs(joints)
-    farthest = (((c[:, 3] * h + c[:, 2]) * h + c[:, 1]) * h + c[:, 0]).max(axis=0)
+    farthest = evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
     parts = [joint.span(0.0 if joint.revolute else farthest[i]) for i, joint in enumerate(arm.joints)]
     tool = float(np.linalg.norm(arm.tool[:3, 3]))
     return np.asarray(np.cumsum([tool, *parts[::-1]])[:0:-1])

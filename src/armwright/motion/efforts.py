@@ -7,6 +7,7 @@ Run k times slower, a motion asks of every joint at every point for
 so the least slowing follows from the roots of a parabola in 1/k, for each sample of the motion.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -131,11 +132,11 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     samples = _spread(solver.arm, trajectory)
     u, joint, time = 1.0, None, 0.0
     for _ in range(_ROUNDS):
-        shares = _shares(solver, trajectory, samples)
-        _check_lasting(solver.arm, shares.lasting, samples.times(trajectory))
+        shares, times = _shares(solver, trajectory, samples), samples.times(trajectory)
+        check_lasting(solver.arm, shares.lasting, 1 - _ROUNDING, times, "at {:.3f} s".format)
         part, binding = _largest_part(solver.arm, shares, limits)
         if binding is not None and part < u:
-            u, joint, time = part, binding[1], float(samples.times(trajectory)[binding[0]])
+            u, joint, time = part, binding[1], float(times[binding[0]])
         # What lies between the samples is sampled as well, where the efforts are largest: positions stay when slowed.
         peaks, near = _peaks(solver, trajectory.slowed(1 / u), samples, shares.at(u))
         if (peaks <= limits * (1 + _ROUNDING)).all():
@@ -158,13 +159,28 @@ def checked(arm: Arm, trajectory: Trajectory, what: str = "trajectory") -> None:
         raise ShapeError(f"{what}: expected one of {arm.n} joints, as '{arm.name}' has, got one of {joints}")
 
 
-def refuse_lasting(arm: Arm, joint: int, effort: float, location: str) -> IncapableArmError:
-    """Return the error for a position where holding the arm takes more than a joint, from 0, may give."""
-    unit = arm.joints[joint].units.effort
-    return IncapableArmError(
-        f"{location} gravity and Coulomb friction alone require {abs(effort):.4g} {unit} of {arm.called(joint)}, "
-        f"{arm.joints[joint].limits.effort:.4g} {unit} are allowed: a slower motion is infeasible too"
-    )
+def check_lasting(arm: Arm, lasting: Array, most: float, at: Array, location: Callable[[float], str]) -> None:
+    """Refuse a motion where what lasts however slow it is takes more than a part ``most`` of what a joint may give.
+
+    Args:
+        arm: the arm, with n joints.
+        lasting: (k, n) efforts by gravity and Coulomb friction.
+        most: part of the limits.
+        at: (k,) times or path parameters of these.
+        location: says in words where one of them is on the motion.
+
+    Raises:
+        IncapableArmError: it takes more, with the joint and the effort.
+    """
+    use = np.abs(lasting) / arm.limits.effort
+    if use.max() > most:
+        k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
+        unit = arm.joints[joint].units.effort
+        raise IncapableArmError(
+            f"{location(float(at[k]))} gravity and Coulomb friction alone require {abs(lasting[k, joint]):.4g} {unit} "
+            f"of {arm.called(joint)}, {arm.joints[joint].limits.effort:.4g} {unit} are allowed: a slower motion is "
+            "infeasible too"
+        )
 
 
 def lasting_efforts(solver: Solver, q: Array, qd: Array) -> Array:
@@ -249,14 +265,6 @@ def _peaks(solver: Solver, trajectory: Trajectory, samples: _Samples, tau: Array
         width *= 2.0 / (_CLOSER - 1)
     largest = peaks.reshape(-1, n).argmax(axis=0) * n + np.arange(n)
     return peaks[largest], _Samples(segments[largest], parts[largest])
-
-
-def _check_lasting(arm: Arm, lasting: Array, times: Array) -> None:
-    """Refuse a motion where what lasts however slow it is takes more than there is."""
-    use = np.abs(lasting) / arm.limits.effort
-    if use.max() > 1 - _ROUNDING:
-        k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
-        raise refuse_lasting(arm, joint, float(lasting[k, joint]), f"at {times[k]:.3f} s")
 
 
 def _largest_part(arm: Arm, shares: _Shares, limits: Array) -> tuple[float, tuple[int, int] | None]:

@@ -55,7 +55,7 @@ def slowing_for_limits(arm: AnyArm, trajectory: Trajectory) -> tuple[float, tupl
     """
     model = solver_of(arm).arm
     checked(model, trajectory)
-    factor, because = slowing(model, {"speed": trajectory.peaks(1), "acceleration": trajectory.peaks(2)})
+    factor, because = slowing(model, trajectory)
     efforts = slowing_for_efforts(arm, trajectory.slowed(factor))
     if efforts.joint is None:
         return factor, because

@@ -51,11 +51,7 @@ class MoveAssessment:
         """Return the assessment as plain data in SI units."""
         move = self.move
         passages = zip(
-            self.names,
-            move.times.tolist(),
-            move.configurations.tolist(),
-            move.passing_distances.tolist(),
-            strict=True,
+            self.names, move.times.tolist(), move.configurations.tolist(), move.passing_distances.tolist(), strict=True
         )
         return {
             "arm": move.arm.name,

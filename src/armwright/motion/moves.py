@@ -241,16 +241,15 @@ def stopping_move(
     solver, X = solver_of(arm), exact_poses(poses)
     if Path(poses=X).lengths().max() <= NEGLIGIBLE:
         raise InvalidValueError("poses: all of them coincide, so there is no path")
-    first: PathError | None = None
+    errors: list[PathError] = []
     for start in configurations_at(solver.arm, X[:1], _near(solver.arm, near))[0]:
         try:
             legs = _legs(arm, start.q, X, method=method, deviation=deviation, speed=speed)
         except PathError as error:
-            first = first or error
+            errors.append(error)
         else:
             return _stopping(solver.arm, X, start.q, legs)
-    assert first is not None  # noqa: S101 - there is a posture at the first pose
-    raise first
+    raise errors[0]
 
 
 def exact_poses(poses: ArrayLike) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import IncapableArmError
-from armwright.motion.efforts import dry_frictions, refuse_lasting
+from armwright.motion.efforts import check_lasting, dry_frictions
 from armwright.motion.forward_backward import UNBOUNDED, Bounds, by_toppra, largest_squares
 from armwright.motion.joint_path import Grid
 from armwright.motion.solver import Solver
@@ -152,10 +152,7 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
             a = solver.inverse_dynamics(q, none, rate) - gravity
             b = solver.inverse_dynamics(q, rate, bend) - gravity - viscous * rate - dry_frictions(arm, rate)
             lasting = gravity + np.where(gravity > 0, most, least)
-            use = np.abs(lasting) / effort
-            if use.max() > _ALL:
-                k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
-                raise refuse_lasting(arm, joint, float(lasting[k, joint]), locate(float(grid.origins[k])))
+            check_lasting(arm, lasting, _ALL, grid.origins, locate)
             # Where a joint reverses on an interval, its dry friction is either; so much less is left on both sides.
             margin = effort - (most - least) / 2
             limits.append(_limited(margin, _Rows(a, b, gravity + (most + least) / 2, viscous * rate, ahead)))

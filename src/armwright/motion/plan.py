@@ -8,8 +8,8 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
 from armwright.errors import ArmwrightError, IncapableArmError
-from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations, joint_distance
 from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified_motion import joined
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
@@ -184,18 +184,17 @@ def _worth_looking(arm: AnyArm, goals: Sequence[StageGoal]) -> bool:
 def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, number: int) -> list[PlannedStage]:
     if number == len(goals):
         return []
-    first_error: StageError | None = None
-    for stage in _ways(arm, q, goals[number], manner, number):
+    errors: list[StageError] = []
+    for stage in _candidates(arm, q, goals[number], manner, number):
         try:
             return [stage, *_plan(arm, stage.trajectory(stage.trajectory.duration), goals, manner, number + 1)]
         except StageError as error:
-            first_error = first_error or error
-    assert first_error is not None  # noqa: S101 - _ways gives at least one stage or raises
-    raise first_error
+            errors.append(error)
+    raise errors[0]
 
 
-def _ways(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[PlannedStage]:
-    """Give the paths to make one stage, best first: one per configuration for point to point, else one."""
+def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[PlannedStage]:
+    """Give the ways to make one stage, best first and one at least: one per configuration for PTP, else one."""
     poses = of_shape(goal.poses, (4, 4), "poses")
     far = np.abs(poses[:, :3, 3]).max(axis=-1)
     if far.max() > _FARTHEST:
@@ -203,19 +202,17 @@ def _ways(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -
         raise StageError(number, _at_pose("reach", f"the pose is {far.max():.3g} m away", worst, poses[worst]))
     if goal.kind == "PTP":
         # Planned as they are asked for: nearly always the first one does.
-        yield from (
-            _direct(arm, q, configuration, manner) for configuration in _configurations(arm, poses[0], q, number)
-        )
+        yield from (_direct(arm, q, end, manner) for end in _configurations(arm, poses[0], q, number))
         return
     path = Path(poses=np.concatenate([np.asarray(solver_of(arm).forward(q))[None], poses]))
     try:
         yield _along(arm, path, q, goal, manner)
     except PathError as error:
-        obstacle = _on_the_way(arm, path, error)
-        way_round = _way_round(arm, q, goal, manner, obstacle)
-        if way_round is None:
+        obstacle = _obstacle_on_path(arm, path, error)
+        bypass = _bypass(arm, q, goal, manner, obstacle)
+        if bypass is None:
             raise StageError(number, obstacle) from error
-        yield way_round
+        yield bypass
 
 
 def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -> PlannedStage:
@@ -241,11 +238,11 @@ def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -
         certificate=motion.certificate,
         deviation=motion.certificate.deviation,
         slowed=stops or motion.certificate.slowed,
-        obstacle=None if stopped_by is None else _on_the_way(arm, path, stopped_by),
+        obstacle=None if stopped_by is None else _obstacle_on_path(arm, path, stopped_by),
     )
 
 
-def _on_the_way(arm: AnyArm, path: Path, error: PathError) -> Obstacle:
+def _obstacle_on_path(arm: AnyArm, path: Path, error: PathError) -> Obstacle:
     """Return what stops the arm on a path, with its position."""
     ends = path.poses[error.segment : error.segment + 2]
     return Obstacle(
@@ -267,7 +264,7 @@ def _at_pose(cause: Cause, reason: str, pose: int, X: Array) -> Obstacle:
     )
 
 
-def _way_round(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> PlannedStage | None:
+def _bypass(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> PlannedStage | None:
     """Return the stage that bypasses what stops a line; None where that is not asked for, or there is no path."""
     if manner.around is None or goal.kind != "LINE" or obstacle.certain:
         return None
@@ -307,12 +304,10 @@ def hand_length(arm: AnyArm, trajectory: Trajectory) -> float:
 
 def _configurations(arm: AnyArm, X: Array, q: Array, number: int) -> list[Array]:
     """Return the configurations inside the limits that reach a pose, revolutions included, nearest first."""
-    model = solver_of(arm).arm
-    solution = inverse(model, X, q)
+    solution = inverse(solver_of(arm).arm, X, q)
     if not solution.allowed:
         raise StageError(number, _at_pose(cause_of(solution), solution.explain(), 0, X))
-    configurations = [image for branch in solution.allowed for image in equivalent_configurations(model, branch.q)]
-    return sorted(configurations, key=lambda configuration: joint_distance(model, q, configuration))
+    return nearest_configurations(solution, q)
 
 
 def _direct(arm: AnyArm, q: Array, goal: Array, manner: Manner) -> PlannedStage:

@@ -119,16 +119,15 @@ def coarse_line(
         PathError: as for ``straight_line``.
         ArmwrightError: as for ``straight_line``, but for an arm whose joints cannot hold it up.
     """
-    first: PathError | None = None
+    errors: list[PathError] = []
     for tried in coarse_deviations(deviation):
         try:
             return certified_line(arm, q_start, X_goal, tolerance(tried), speed=speed, weak=True)
         except PathError as error:
-            first = first or error
+            errors.append(error)
             if error.cause == "reach":  # a pose out of reach is so for every deviation
                 break
-    assert first is not None  # noqa: S101 - one deviation at least is tried
-    raise first
+    raise errors[0]
 
 
 def coarse_deviations(deviation: float) -> list[float]:

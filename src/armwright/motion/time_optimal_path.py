@@ -124,7 +124,9 @@ def time_optimal(
     """
     solver = solver_of(arm)
     geometry, locate = _geometry(solver.arm, path)
-    intervals = _whole(intervals)
+    intervals = integer(intervals, "intervals", least=0)
+    if not _MIN_INTERVALS <= intervals <= _MAX_INTERVALS:
+        raise InvalidValueError(f"intervals: expected {_MIN_INTERVALS} to {_MAX_INTERVALS}, got {intervals}")
     one_of("solver", method, get_args(SolverName))
     pieces = pieces_of(solver.arm, geometry)
     _check_path(solver.arm, geometry, efforts=efforts)
@@ -168,13 +170,6 @@ def _geometry(arm: Arm, path: Trajectory | ArrayLike) -> tuple[Trajectory, Calla
         return f"between knots {knot} and {knot + 1}"
 
     return spline, between
-
-
-def _whole(intervals: int) -> int:
-    count = integer(intervals, "intervals", least=0)
-    if not _MIN_INTERVALS <= intervals <= _MAX_INTERVALS:
-        raise InvalidValueError(f"intervals: expected {_MIN_INTERVALS} to {_MAX_INTERVALS}, got {intervals}")
-    return count
 
 
 def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:

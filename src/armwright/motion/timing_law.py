@@ -293,11 +293,7 @@ def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
         np.maximum(along, sd, out=along)
         np.maximum(speed, np.abs(slope * sd), out=speed)
         np.maximum(acceleration, np.abs(evaluate(curves, s) * sd**2 + slope * sdd), out=acceleration)
-    uses = [
-        along / caps[interval][:, None],
-        speed / arm.limits.speed,
-        np.sqrt(acceleration / arm.limits.acceleration),
-    ]
+    uses = [along / caps[interval][:, None], speed / arm.limits.speed, np.sqrt(acceleration / arm.limits.acceleration)]
     return _Run(path, times, interval, inner[..., 0], np.concatenate(uses, axis=1))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.motion.blends import PEAK_ACCELERATION, BlendPlan, Ends, blend_plan, blended
+from armwright.motion.blends import PEAK_ACCELERATION, BlendPlan, Ends, blend_plan, blended, rates_at_points
 from armwright.motion.deviation import (
     ErrorBounds,
     HandBounds,
@@ -202,11 +202,10 @@ def tool_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, o
         return ToolPath(position=position, orientation=angles, times=t)
     plan = blend_plan(times, poses[:, :3, 3], blend, ends)
     # A rotation is the same vector in the axes of the pose before it and of that after it.
-    ways = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / np.diff(plan.centres)[:, None]
-    still = np.zeros((1, 3))
-    first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])
-    plan = plan._replace(before=np.concatenate([first, ways]), after=np.concatenate([ways, last]))
-    return ToolPath(position=position, orientation=Rotations(R=R, plan=plan), times=t)
+    turns = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / np.diff(plan.centres)[:, None]
+    before, after = rates_at_points(turns, ends)
+    rotations = Rotations(R=R, plan=plan._replace(before=before, after=after))
+    return ToolPath(position=position, orientation=rotations, times=t)
 
 
 def zyz_angles(R: Array) -> Array:

@@ -56,7 +56,12 @@ def trapezoid(
     if requested is None:
         requested = check_duration(shortest)
     elif requested < shortest * (1 - _ROUNDING):
-        raise InvalidValueError(_too_short(way, limits, requested, shortest))
+        fastest, hardest = limits.joints
+        j = fastest if limits.speed**2 < limits.acceleration else hardest
+        raise InvalidValueError(
+            f"duration: {requested:g} s is too short for joint {j + 1}, whose travel of {abs(way[j]):.6g} takes "
+            f"at least {shortest:.6g} s within the limits"
+        )
     a = limits.acceleration
     # The speed v at which 1 = v (T - v / a), without loss of digits, and the time to reach it.
     square = requested**2 - 4 / a
@@ -108,12 +113,3 @@ def _limits(way: Array, speed: ArrayLike, acceleration: ArrayLike) -> _Limits | 
 def _shortest(limits: _Limits) -> float:
     v, a, _ = limits
     return 1 / v + v / a if v * v < a else 2 / math.sqrt(a)
-
-
-def _too_short(way: Array, limits: _Limits, requested: float, shortest: float) -> str:
-    v, a, (fastest, hardest) = limits
-    j = fastest if v * v < a else hardest
-    return (
-        f"duration: {requested:g} s is too short for joint {j + 1}, whose travel of {abs(way[j]):.6g} takes "
-        f"at least {shortest:.6g} s within the limits"
-    )

@@ -23,10 +23,7 @@ from armwright.tracing.scalar import select
 _SAME_CONFIGURATION = 1e-9
 # Which joints move together, from 1, where a choice is left open: the turn of joint 1, the raising of joint 2, the
 # wrist; and the joint that then chooses.
-_FREE = {
-    "spherical": ((1, 4, 5, 6), (2, 4, 5, 6), (4, 6)),
-    "parallel": ((1, 2, 3, 4, 5, 6), (2, 4), (2, 3, 4, 6)),
-}
+_FREE = {"spherical": ((1, 4, 5, 6), (2, 4, 5, 6), (4, 6)), "parallel": ((1, 2, 3, 4, 5, 6), (2, 4), (2, 3, 4, 6))}
 _CHOOSERS = {"spherical": (1, 2, 4), "parallel": (1, 2, 6)}
 
 
