@@ -100,6 +100,21 @@ def test_inverse_in_the_other_unit(place: tuple[str, str], said: str) -> None:
     assert said in done.stdout.splitlines()
 
 
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize(("command", "key"), [("forward", "pose"), ("jacobian", "jacobian")])
+def test_rows_of_a_table_are_one_json_document(tmp_path: Path, command: str, key: str, count: int) -> None:
+    """The results of a table are a single JSON list with an object per row, even for a table with a single row."""
+    rows = np.random.default_rng(3).uniform(0.1, 0.6, (count, 6)).tolist()
+    lines = ["q1,q2,q3,q4,q5,q6", *(",".join(map(repr, row)) for row in rows)]
+    (tmp_path / "rows.csv").write_text("\n".join(lines), encoding="utf-8")
+
+    data = json.loads(armwright(command, "puma560", "--csv", tmp_path / "rows.csv", "--json").stdout)
+
+    assert [row["q"] for row in data] == rows
+    function = {"forward": forward, "jacobian": jacobian}[command]
+    np.testing.assert_allclose([row[key] for row in data], function(load_arm("puma560"), rows), atol=1e-12)
+
+
 def test_torque_of_a_file(tmp_path: Path) -> None:
     """Every row of a long file has the efforts that it has alone."""
     motion = np.random.default_rng(5).uniform(0.1, 0.6, (1003, 18))
@@ -108,13 +123,13 @@ def test_torque_of_a_file(tmp_path: Path) -> None:
         "\n".join([names, *(",".join(map(repr, row)) for row in motion.tolist())]), encoding="utf-8"
     )
 
-    lines = armwright("torque", "stanford", "--csv", tmp_path / "motion.csv", "--json").stdout.splitlines()
+    rows = json.loads(armwright("torque", "stanford", "--csv", tmp_path / "motion.csv", "--json").stdout)
 
-    assert len(lines) == len(motion)
+    assert len(rows) == len(motion)
     for row in (0, 999, 1000, 1002):
         alone = terms(load_arm("stanford"), *motion[row].reshape(3, 6))
-        assert json.loads(lines[row])["total"] == alone.total.tolist()
-        assert json.loads(lines[row])["own inertia"] == alone.own.tolist()
+        assert rows[row]["total"] == alone.total.tolist()
+        assert rows[row]["own inertia"] == alone.own.tolist()
 
 
 def test_torque_by_cause() -> None:
@@ -138,10 +153,10 @@ def test_rows_of_a_file(tmp_path: Path) -> None:
     lines = [",".join(["t", *names]), *(",".join(["0", *map(repr, map(float, row))]) for row in rows)]
     (tmp_path / "rows.csv").write_text("\n".join(lines))
 
-    said = armwright("torque", "stanford", "--csv", tmp_path / "rows.csv", "--json").stdout.splitlines()
+    said = json.loads(armwright("torque", "stanford", "--csv", tmp_path / "rows.csv", "--json").stdout)
 
     expected = inverse_dynamics(load_arm("stanford"), rows[:, :6], rows[:, 6:12], rows[:, 12:])
-    np.testing.assert_allclose([json.loads(line)["total"] for line in said], expected, atol=1e-9)
+    np.testing.assert_allclose([row["total"] for row in said], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -171,7 +186,7 @@ def test_bad_files(tmp_path: Path, text: str, said: str) -> None:
         (("forward", "puma560", "-q", "1,2,3"), "expected 6 finite numbers, got 3"),
         (("forward", "puma560", "-q", "1,2,3,4,5,x"), "got 'x'"),
         (("forward", "puma560", "-q", "1,2,3,4,5,inf"), "finite"),
-        (("jacobian", "puma560", "-q", Q_DEG, "--frame", "world"), "expected base or tool, got world"),
+        (("jacobian", "puma560", "-q", Q_DEG, "--frame", "world"), "'world' is not one of 'base', 'tool'"),
         (("inverse", "puma560"), "expected the pose"),
         (("torque", "puma560"), "expected the motion"),
     ],

@@ -1,11 +1,11 @@
 """``armwright forward`` and ``armwright jacobian``: the pose of the tool and its velocity per joint velocity."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from armwright.cli.options import ArmName, Configuration, Json, Rows
-from armwright.cli.shell_completion import one_of
+from armwright.cli.output import print_json_rows
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 
 if TYPE_CHECKING:
@@ -25,18 +25,18 @@ def forward(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright forward puma560 -q 10,20,30,40,50,60`
     """
-    import json
-
     from armwright.arm.load import load_arm
     from armwright.kinematics.forward_kinematics import forward as tool_pose
     from armwright.spatial.poses import to_noap
 
     model = load_arm(arm)
-    for q in configurations(model, configuration, table_file(csv, columns, skip_incomplete=skip_incomplete)):
-        X = tool_pose(model, q)
-        if as_json:
-            print(json.dumps({"q": q.tolist(), "pose": X.tolist(), "noap": to_noap(X).tolist()}))
-            continue
+    rows = configurations(model, configuration, table_file(csv, columns, skip_incomplete=skip_incomplete))
+    poses = ((q, tool_pose(model, q)) for q in rows)
+    if as_json:
+        data = ({"q": q.tolist(), "pose": X.tolist(), "noap": to_noap(X).tolist()} for q, X in poses)
+        print_json_rows(data, as_list=csv is not None)
+        return
+    for _, X in poses:
         print("  ".join(f"{name:>10}" for name in ("n", "o", "a")), f"  {'p mm':>12}")
         for *rotation, position in X[:3].tolist():
             numbers = "  ".join(f"{round(x, 6) + 0.0:10.6f}" for x in rotation)
@@ -49,36 +49,29 @@ def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
     csv: Rows = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
-    frame: Annotated[
-        str, typer.Option(help="Frame of the rows: base or tool.", autocompletion=one_of("base", "tool"))
-    ] = "base",
+    frame: Annotated[Literal["base", "tool"], typer.Option(help="Frame of the rows: base or tool.")] = "base",
     as_json: Json = False,
 ) -> None:
     """Print the Jacobian of the tool point: three linear rows, then three angular, in SI units and radians.
 
     **Example:** `armwright jacobian stanford -q 0,90,500,0,45,0 --frame tool`
     """
-    import json
-
     from armwright.arm.load import load_arm
     from armwright.kinematics.jacobians import jacobian as tool_jacobian
 
     model = load_arm(arm)
-    if frame not in ("base", "tool"):
-        raise typer.BadParameter(f"expected base or tool, got {frame}", param_hint="--frame")
-    for q in configurations(model, configuration, table_file(csv, columns, skip_incomplete=skip_incomplete)):
-        J = tool_jacobian(model, q, "tool" if frame == "tool" else "base")
-        if as_json:
-            print(json.dumps({"q": q.tolist(), "frame": frame, "jacobian": J.tolist()}))
-            continue
-        print("  ", "  ".join(f"{name:>10}" for name in _per_rate(model)))
+    rows = configurations(model, configuration, table_file(csv, columns, skip_incomplete=skip_incomplete))
+    jacobians = ((q, tool_jacobian(model, q, frame)) for q in rows)
+    if as_json:
+        data = ({"q": q.tolist(), "frame": frame, "jacobian": J.tolist()} for q, J in jacobians)
+        print_json_rows(data, as_list=csv is not None)
+        return
+    heads = (f"j{i} {joint.units.position}/s" for i, joint in enumerate(model.joints, 1))
+    head = "  ".join(f"{name:>10}" for name in heads)
+    for _, J in jacobians:
+        print("  ", head)
         for name, row in zip(("vx", "vy", "vz", "wx", "wy", "wz"), J, strict=True):
             print(name, "  ".join(f"{round(x, 6) + 0.0:10.6f}" for x in row.tolist()))
-
-
-def _per_rate(model: "Arm") -> list[str]:
-    """Return the headings of the columns of a Jacobian: the joint with the unit of its velocity."""
-    return [f"j{i} {joint.units.position}/s" for i, joint in enumerate(model.joints, 1)]
 
 
 def configurations(model: "Arm", configuration: str | None, file: TableFile | None) -> "list[Array]":

@@ -3,7 +3,7 @@
 import itertools
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from armwright.cli.terminal import console
@@ -35,6 +35,18 @@ def print_json(data: Any) -> None:
     """Print data as JSON, in ASCII where the encoding of the output is not a Unicode encoding."""
     is_unicode = (sys.stdout.encoding or "").lower().startswith("utf")
     print(json.dumps(data, indent=2, ensure_ascii=not is_unicode))
+
+
+def print_json_rows(rows: Iterable[Any], *, as_list: bool) -> None:
+    """Print rows of results as a JSON list with a line for each, as they are computed; otherwise the only row alone."""
+    if not as_list:
+        print(json.dumps(*rows))
+        return
+    opening = "["
+    for row in rows:
+        print(f"{opening}{json.dumps(row)}", end="")
+        opening = ",\n "
+    print("]")
 
 
 def print_result(

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.options import ArmName, Json
+from armwright.cli.options import ArmName, Configuration, Json
+from armwright.cli.output import print_json_rows
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 from armwright.cli.tool_options import Load, read_payload
 
@@ -20,7 +21,7 @@ _BLOCK = 1000
 
 def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    q: Annotated[str | None, typer.Option("-q", help="Joint positions in degrees and mm, as in 10,20,30.")] = None,
+    q: Configuration = None,
     qd: Annotated[str | None, typer.Option(help="Joint velocities in degrees/s and mm/s; the default is 0.")] = None,
     qdd: Annotated[
         str | None, typer.Option(help="Joint accelerations in degrees/s² and mm/s²; the default is 0.")
@@ -41,8 +42,6 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright torque stanford-jpl -q 0,90,500,0,45,0 --qdd 60,0,0,0,0,0 --load 1.8,0,0,50`
     """
-    import json
-
     from armwright.arm.load import load_arm
     from armwright.arm.model import Link
     from armwright.cli.numbers import numbers
@@ -52,15 +51,18 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     body = Link() if load is None else read_payload(load)
     tool_wrench = None if wrench is None else numbers(wrench, 6, "--wrench")
     motion = _motion(model, (q, qd, qdd), table_file(csv, columns, skip_incomplete=skip_incomplete))
-    for first in range(0, len(motion[0]), _BLOCK):
-        block = terms(model, *(values[first : first + _BLOCK] for values in motion), load=body, wrench=tool_wrench)
-        causes = _causes(block)
-        for row in range(len(block.total)):
-            efforts = {name: values[row].tolist() for name, values in causes.items()}
-            if as_json:
-                print(json.dumps({"total": efforts.pop("total"), **efforts}))
-            else:
-                _print(model, efforts)
+    blocks = ([values[first : first + _BLOCK] for values in motion] for first in range(0, len(motion[0]), _BLOCK))
+    causes = (_causes(terms(model, *block, load=body, wrench=tool_wrench)) for block in blocks)
+    rows = (
+        {name: values[row].tolist() for name, values in block.items()}
+        for block in causes
+        for row in range(len(block["total"]))
+    )
+    if as_json:
+        print_json_rows(({"total": efforts.pop("total"), **efforts} for efforts in rows), as_list=csv is not None)
+        return
+    for efforts in rows:
+        _print(model, efforts)
 
 
 def _motion(model: "Arm", values: tuple[str | None, str | None, str | None], file: TableFile | None) -> "list[Array]":
