@@ -8,14 +8,9 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.files.document import Table
-from armwright.spatial.euler import from_zyz
+from armwright.spatial.euler import from_rpy, from_zyz
 from armwright.spatial.poses import homogeneous
-from armwright.spatial.rotations import (
-    nearest_rotation,
-    orthonormality_error,
-    rotation_from_quaternion,
-    rotation_from_rpy,
-)
+from armwright.spatial.rotations import nearest_rotation, orthonormality_error, rotation_from_quaternion
 
 _Quantity = TypeVar("_Quantity", float, Array)
 # Factors to SI by the ending of the key.
@@ -68,7 +63,7 @@ def typed_pose(table: Table) -> TypedPose:
         case ["quaternion_wxyz"]:
             R = _quaternion(table)
         case _:
-            R = rotation_from_rpy(*rpy)
+            R = from_rpy(*rpy)
     return TypedPose(homogeneous(R, position), change)
 
 

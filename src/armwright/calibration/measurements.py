@@ -30,7 +30,8 @@ from armwright.calibration.readings import Readings, number_labels
 from armwright.errors import FileFormatError, closest
 from armwright.files.column_names import Heading, default_units
 from armwright.files.unit_table import CellText, Header, RequiredCells, UnitTable, lines_text
-from armwright.spatial.rotations import rotation_from_quaternion, rotation_from_rpy
+from armwright.spatial.euler import from_rpy
+from armwright.spatial.rotations import rotation_from_quaternion
 
 _SETS = ("fit", "check")
 # A joint whose positions differ by less has not moved [rad], [m].
@@ -174,7 +175,7 @@ def _rotations(table: UnitTable, points: Array, orientation: Sequence[str]) -> A
     for i in np.flatnonzero(np.isfinite(numbers[:, 0])):
         if orientation is RPY:
             roll, pitch, yaw = numbers[i]
-            rotations[i] = rotation_from_rpy(roll, pitch, yaw)
+            rotations[i] = from_rpy(roll, pitch, yaw)
             continue
         length = float(np.linalg.norm(numbers[i]))
         if abs(length - 1) > _QUATERNION_TOLERANCE:

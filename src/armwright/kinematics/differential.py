@@ -83,10 +83,18 @@ class DifferentialInverse:
         Raises:
             SingularConfigurationError: one does not; the text names the factor that vanishes.
         """
-        if self.singular.any():
-            *index, factor = (int(i) for i in np.argwhere(self.singular)[0])
-            raise SingularConfigurationError(FACTORS[factor], float(self.factors[*index, factor]), tuple(index))
+        check_regular(self.factors)
         return self.rates
+
+
+def check_regular(factors: Array) -> None:
+    """Refuse configurations whose determinant has a factor (..., 3) that vanishes.
+
+    Raises:
+        SingularConfigurationError: one has; the text names the factor.
+    """
+    for *index, factor in np.argwhere(np.abs(factors) < SINGULAR_FACTOR).tolist():
+        raise SingularConfigurationError(FACTORS[factor], float(factors[*index, factor]), tuple(index))
 
 
 def differential_inverse(

@@ -99,8 +99,8 @@ def jacobian(arm: Arm, q: ArrayLike, frame: Axes = "base") -> Array:
     scalars = per_joint(q)
     columns = jacobian_columns(arm, scalars)
     if frame == "tool":
-        R_TB = _tool_turned_back(arm, scalars)
-        columns = [_turned(R_TB, column) for column in columns]
+        R_TB = _base_rotation_in_tool(arm, scalars)
+        columns = [_rotated(R_TB, column) for column in columns]
     return _stack_columns(columns, q.shape[:-1])
 
 
@@ -134,9 +134,9 @@ def jacobian_rate(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -
     if frame == "tool":
         own = jacobian_columns(arm, scalars)
         w = add(*(scale(rate, column[3:]) for rate, column in zip(rates, own, strict=True)))
-        R_TB = _tool_turned_back(arm, scalars)
+        R_TB = _base_rotation_in_tool(arm, scalars)
         columns = [
-            _turned(R_TB, subtract(column, [*cross(w, still[:3]), *cross(w, still[3:])]))
+            _rotated(R_TB, subtract(column, [*cross(w, still[:3]), *cross(w, still[3:])]))
             for column, still in zip(columns, own, strict=True)
         ]
     return _stack_columns(columns, q.shape[:-1])
@@ -174,12 +174,12 @@ def known_axes(frame: str) -> None:
         raise InvalidValueError(f"frame: expected 'base' or 'tool', got {shown(frame)}")
 
 
-def _tool_turned_back(arm: Arm, q: Sequence[Scalar]) -> Matrix:
+def _base_rotation_in_tool(arm: Arm, q: Sequence[Scalar]) -> Matrix:
     R_BT, _ = tool_frame(arm, link_frames(arm, q)[-1])
     return transpose(R_BT)
 
 
-def _turned(R: Matrix, column: Vector) -> Vector:
+def _rotated(R: Matrix, column: Vector) -> Vector:
     return apply(R, column[:3]) + apply(R, column[3:])
 
 

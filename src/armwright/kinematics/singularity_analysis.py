@@ -66,11 +66,6 @@ class Singularities:
         return bool(self.near)
 
 
-def factor_names(geometry: ClosedFormGeometry) -> tuple[str, str, str]:
-    """Return what the three factors of a build are called."""
-    return ("shoulder", "slide" if geometry.family == "stanford" else "elbow", "wrist")
-
-
 def determinant_factors(geometry: ClosedFormGeometry, angles: Sequence[Scalar]) -> Vector:
     """Return the three factors of the determinant of the Jacobian, over abstract scalars.
 
@@ -173,8 +168,8 @@ def _factors(arm: Arm, q: Array, threshold: float) -> tuple[Factor, ...]:
         return ()
     values = singularity_factors(arm, q).tolist()
     reach = geometry.max_reach if np.isfinite(geometry.max_reach) else 1.0
-    fore = 1.0 if geometry.family == "stanford" else float(np.hypot(*geometry.forearm))
+    second, fore = ("slide", 1.0) if geometry.family == "stanford" else ("elbow", float(np.hypot(*geometry.forearm)))
     return tuple(
         Factor(name=name, value=value, scale=scale, near=abs(value) < threshold * scale)
-        for name, value, scale in zip(factor_names(geometry), values, (reach, fore, 1.0), strict=True)
+        for name, value, scale in zip(("shoulder", second, "wrist"), values, (reach, fore, 1.0), strict=True)
     )

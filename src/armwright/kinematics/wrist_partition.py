@@ -11,7 +11,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike
-from armwright.kinematics.differential import FACTORS, SINGULAR_FACTOR, SingularConfigurationError, puma_geometry
+from armwright.kinematics.differential import check_regular, puma_geometry
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
 from armwright.kinematics.singularity_analysis import determinant_factors
 
@@ -69,9 +69,7 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
     geometry = puma_geometry(arm, "wrist-partitioned Jacobian", "jacobian")
     q = positions(arm, q)
     factors = np.stack(np.broadcast_arrays(*determinant_factors(geometry, _angles(geometry, q))), axis=-1)
-    for index in np.argwhere(np.abs(factors) < SINGULAR_FACTOR).tolist():
-        *which, factor = index
-        raise SingularConfigurationError(FACTORS[factor], float(factors[*index]), tuple(which))
+    check_regular(factors)
     J = _blocks(geometry, q)
     out, plane, bend = factors[..., 0], geometry.upper_arm * factors[..., 1], factors[..., 2]
     inverse = np.zeros_like(J)

@@ -7,11 +7,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse_kinematics.revolutions import (
-    equivalent_configurations,
-    joint_distance,
-    joint_distances,
-)
+from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations, joint_distances
 from armwright.kinematics.inverse_kinematics.solution import InverseSolution
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.obstruction import PathError, cause_of
@@ -35,8 +31,8 @@ def allowed_configurations(solution: InverseSolution) -> list[LabelledConfigurat
 
 def nearest_configurations(solution: InverseSolution, near: Array) -> list[Array]:
     """Return the configurations (n,) of a solution inside the limits, revolutions included, nearest first."""
-    configurations = (each.q for each in allowed_configurations(solution))
-    return sorted(configurations, key=lambda q: joint_distance(solution.arm, near, q))
+    configurations = [each.q for each in allowed_configurations(solution)]
+    return sorted(configurations, key=lambda q: float(joint_distances(solution.arm, near, q)))
 
 
 def configurations_at(arm: Arm, X: Array, near: Array) -> list[list[LabelledConfiguration]]:

@@ -180,11 +180,9 @@ def rounded_move(
     if corner is not None:
         widths = _widths(legs, half, corner, line_deviation)
     miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (legs.bend, legs.twist))
-    bound = (
-        Tolerance(line_deviation + miss, ROTATION_PER_METRE * line_deviation + twist)
-        if corner is None
-        else tolerance(corner)
-    )
+    bound = Tolerance(line_deviation + miss, ROTATION_PER_METRE * line_deviation + twist)
+    if corner is not None:
+        bound = tolerance(corner)
     task = _Task(arm, path, legs, widths, q_start, deviation, speed, closer, line_deviation, bound)
     return _without_stop(task) if corner is None else _never_slower(task)
 
@@ -292,16 +290,15 @@ def _tightened(task: _Task, most: float) -> tuple[CertifiedMotion, float]:
 
 def _certificate(task: _Task, widths: Array, tracking: Tracking, run: Timed) -> Certificate:
     """Return what a run keeps of its straight legs."""
-    legs = farthest_from_legs(solver_of(task.arm), tracking.trajectory, task.legs.poses[:, :3, 3], task.legs.times)
-    deviation, twist = (
-        float((MISS * widths * change).max(initial=0.0)) for change in (task.legs.bend, task.legs.twist)
-    )
-    time = run.when(legs.time) * run.trajectory.duration
+    legs = task.legs
+    distance = farthest_from_legs(solver_of(task.arm), tracking.trajectory, legs.poses[:, :3, 3], legs.times)
+    deviation, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (legs.bend, legs.twist))
+    time = run.when(distance.time) * run.trajectory.duration
     return attrs.evolve(
         certificate_of(task.arm, run.trajectory, tracking.error, task.allowed, time=time),
         # Poses that are passed with others are as near to them.
-        deviation=min(task.off + deviation, legs.bound + task.off - task.closer),
-        deviation_sampled=legs.sampled,
+        deviation=min(task.off + deviation, distance.bound + task.off - task.closer),
+        deviation_sampled=distance.sampled,
         rotation=ROTATION_PER_METRE * task.off + twist,
         rotation_sampled=None,
         factor=max(run.factor, 1.0),

@@ -7,17 +7,7 @@ from itertools import pairwise
 import attrs
 import numpy as np
 
-from armwright.arrays import (
-    Array,
-    ArrayLike,
-    floats,
-    integer,
-    not_negative,
-    number,
-    positive,
-    read_only,
-    reduce_by_fields,
-)
+from armwright.arrays import Array, ArrayLike, floats, integer, not_negative, positive, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import one_way
 from armwright.motion.polynomials import derivative, extremes, peaks, shifted
@@ -265,7 +255,7 @@ def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:
     for part in parts:
         if not isinstance(part, Trajectory):
             raise KindError(f"join: expected trajectories, got {shown(part)}")
-    gap = number(gap, "gap")
+    gap = not_negative(gap, "gap")
     if not parts:
         raise ShapeError("join: expected at least one trajectory, got none")
     for i, (last, part) in enumerate(pairwise(parts), 1):

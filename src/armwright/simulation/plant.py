@@ -99,19 +99,15 @@ class Plant:
         return self.arm.motor_values("viscous")
 
     @cached_property
-    def forward(self) -> Array:
-        """Dry friction against motion forward, (n,)."""
-        return self.arm.motor_values("coulomb_forward")
-
-    @cached_property
-    def backward(self) -> Array:
-        """Dry friction against motion backward, (n,)."""
-        return self.arm.motor_values("coulomb_backward")
+    def coulomb(self) -> tuple[Array, Array]:
+        """Dry friction against motion forward and backward, (n,) each."""
+        return self.arm.motor_values("coulomb_forward"), self.arm.motor_values("coulomb_backward")
 
     @property
     def dry(self) -> Flags:
         """Which joints have dry friction, (n,)."""
-        return (self.forward > 0) | (self.backward > 0)
+        forward, backward = self.coulomb
+        return (forward > 0) | (backward > 0)
 
     def moment(self, t: float, q: Array, qd: Array, phase: Phase) -> Moment:
         """Return what the joints feel at one moment of a phase."""
@@ -128,7 +124,8 @@ class Plant:
         """Return mass matrix, efforts of drives, of friction, and the remainder for acceleration."""
         M, bias = self.compiled.mass_and_bias(q, qd)
         tau = np.clip(np.asarray(self.controller(t, q, qd), dtype=np.float64), -self.effort, self.effort)
-        dry = np.where(direction > 0, self.forward, np.where(direction < 0, -self.backward, 0.0))
+        forward, backward = self.coulomb
+        dry = np.where(direction > 0, forward, np.where(direction < 0, -backward, 0.0))
         friction = np.where(locked, 0.0, -self.viscous * qd - dry)
         return M, tau, friction, tau + friction - bias
 
@@ -159,8 +156,8 @@ class Plant:
         touched = at_lower | at_upper | braked
         at_rest = (touched | self.dry) & (np.abs(qd) <= 10 * STILL)
         qd = np.where(at_rest, 0.0, qd)
-        lower = np.where(at_upper | braked, -np.inf, -self.forward)
-        upper = np.where(at_lower | braked, np.inf, self.backward)
+        lower = np.where(at_upper | braked, -np.inf, -self.coulomb[0])
+        upper = np.where(at_lower | braked, np.inf, self.coulomb[1])
         M, _, _, surplus = self._pushed(t, q, qd, np.where(at_rest, 0.0, np.sign(qd)), at_rest)
         direction = solve_complementarity(M, surplus, at_rest, lower, upper).direction
         locked = at_rest & (direction == 0)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, of_shape
+from armwright.spatial.rotations import elementary_rotation
 
 # Below this sine of theta only phi + psi, or phi - psi, is determined.
 _SINGULAR = 1e-9
@@ -82,6 +83,11 @@ def matlab_zyz(R: ArrayLike) -> Array:
     phi = np.where(singular, 0.0, -np.arctan2(R[..., 1, 2], -R[..., 0, 2]))
     psi = np.where(singular, -np.arctan2(-R[..., 1, 0], R[..., 1, 1]), -np.arctan2(R[..., 2, 1], R[..., 2, 0]))
     return np.stack([phi, -np.arctan2(sine, R[..., 2, 2]), psi], axis=-1)
+
+
+def from_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation (3, 3) about the fixed axes x, y and z by three angles [rad]; right angles are exact."""
+    return elementary_rotation(2, yaw) @ elementary_rotation(1, pitch) @ elementary_rotation(0, roll)
 
 
 def to_rpy(R: Array) -> Array:

@@ -36,11 +36,6 @@ def elementary_rotation(axis: int, angle: float) -> Array:
     return R
 
 
-def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation (3, 3) about the fixed axes x, y and z by three angles [rad]; right angles are exact."""
-    return elementary_rotation(2, yaw) @ elementary_rotation(1, pitch) @ elementary_rotation(0, roll)
-
-
 def orthonormality_error(R: ArrayLike) -> Array:
     """Return how far R is from a rotation.
 

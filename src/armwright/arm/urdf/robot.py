@@ -14,8 +14,9 @@ from armwright.arm.urdf.elements import Element, read_elements
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
 from armwright.files.limits import limit, limit_message
+from armwright.spatial.euler import from_rpy
 from armwright.spatial.poses import homogeneous
-from armwright.spatial.rotations import rotation_from_rpy, rotation_from_vector
+from armwright.spatial.rotations import rotation_from_vector
 
 # URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
 NO_LIMIT = 1e30
@@ -189,7 +190,7 @@ def origin_of(element: Element) -> Array:
     if origin is None:
         return np.eye(4)
     rpy, xyz = (origin.vector(key, (0.0, 0.0, 0.0)) for key in ("rpy", "xyz"))
-    return homogeneous(rotation_from_rpy(*rpy), xyz)
+    return homogeneous(from_rpy(*rpy), xyz)
 
 
 def axis_of(joint: UrdfJoint) -> Array:

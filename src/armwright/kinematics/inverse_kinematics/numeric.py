@@ -168,8 +168,7 @@ def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
     rank = int((sigma > _IDLE * sigma[0]).sum())
     joints: set[int] = set()
     for idle in Vt[rank:]:
-        endless = np.full(task.arm.n, np.inf)
-        loose = attrs.evolve(task, lower=-endless, upper=endless)
+        loose = _unlimited(task.arm, task.X)
         moved = _descend(loose, (q + _FREE_WAY * idle)[None])[0]
         if len(_reaching(loose, moved[None])) and np.linalg.norm(moved - q) > _FREE_WAY / 2:
             joints.update(int(i) + 1 for i in np.flatnonzero(np.abs(moved - q) > _SAME_CONFIGURATION))

@@ -60,7 +60,7 @@ def _nearest_by_turning(geometry: ClosedFormGeometry, p: Array, R: Array) -> Arr
     """Search the angles of joint 1: at each the nearest position is that of a ring in the plane of the arm."""
     rows: list[list[float]] = R.tolist()
     flips: tuple[Sign, ...] = (1, -1) if geometry.family == "parallel" else (1,)
-    best: tuple[float, Array] | None = None
+    optima: list[tuple[float, Array]] = []
     for flip in flips:
         nearest = _nearest_by_angle(geometry, p, rows, flip)
         theta, width = np.linspace(-np.pi, np.pi, _SAMPLES, endpoint=False), 2 * np.pi / _SAMPLES
@@ -69,10 +69,8 @@ def _nearest_by_turning(geometry: ClosedFormGeometry, p: Array, R: Array) -> Arr
             distances = np.linalg.norm(points - p, axis=-1)
             k = int(distances.argmin())
             theta, width = theta[k] + np.linspace(-width, width, 2 * _FINER + 1), width / _FINER
-        if best is None or distances[k] < best[0]:
-            best = float(distances[k]), points[k]
-    assert best is not None  # noqa: S101 - there is at least one flip
-    return best[1]
+        optima.append((float(distances[k]), points[k]))
+    return min(optima, key=lambda optimum: optimum[0])[1]
 
 
 def _nearest_by_angle(

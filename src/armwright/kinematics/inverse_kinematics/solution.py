@@ -145,7 +145,7 @@ class InverseSolution:
                 f"the pose is {self.distance * 1e3:.1f} mm{turned} out of reach of '{self.arm.name}'; "
                 f"the nearest in reach has its origin at {position_text(self.nearest_pose[:3, 3])}"
             )
-        least = min(self.branches, key=_worst_violation)
+        least = min(self.branches, key=lambda branch: max((fault.excess for fault in branch.violations), default=0.0))
         faults = "; ".join(str(violation) for violation in least.violations)
         return f"no configuration of '{self.arm.name}' is inside the joint limits; in the closest, {faults}"
 
@@ -174,7 +174,3 @@ def violations(arm: Arm, q: ArrayLike) -> tuple[Violation, ...]:
         if abs(value - limit) > _AT_LIMIT * max(1.0, abs(limit)):
             violated.append(Violation(joint=i, value=value, limit=limit, revolute=joint.revolute, name=joint.name))
     return tuple(violated)
-
-
-def _worst_violation(branch: Branch) -> float:
-    return max((violation.excess for violation in branch.violations), default=0.0)
