@@ -24,7 +24,7 @@ from armwright.program.syntax.statement_list import (
     skip_to_statement,
     statements,
 )
-from armwright.program.syntax.token_stream import NestingError, PanicModeError, TokenStream, describe_token
+from armwright.program.syntax.token_stream import PanicModeError, TokenStream, describe_token
 
 _CONDITION = "a condition"
 _EVENT = "the name of an EVENT"
@@ -39,8 +39,7 @@ def block(tokens: TokenStream) -> tree.Block:
     start = tokens.current
     tokens.accept("BEGIN")
     body = statements(tokens, "END")
-    end = expect_closer(tokens, "END", start)
-    return tree.Block(tokens.span_since(start), body, end or tokens.gap_span())
+    return tokens.node(tree.Block, start, body, expect_closer(tokens, "END", start) or tokens.gap_span())
 
 
 def head_expression(tokens: TokenStream, wants: str, where: str, *ends: str) -> tree.Expression:
@@ -49,51 +48,41 @@ def head_expression(tokens: TokenStream, wants: str, where: str, *ends: str) -> 
     Args:
         tokens: at the expression.
         wants: what is expected, in words.
-        where: the pose in words.
+        where: the position in words.
         ends: the words that may stand behind it.
 
     Raises:
-        LostError: the statement ends there.
+        PanicModeError: the statement ends there.
     """
-    start, depth = tokens.current, tokens.depth
-    try:
-        body = expression(tokens, wants, where)
-        if wants == _CONDITION:
-            tokens.note_expected_words("AND", "OR")
-        while wants == _CONDITION and _replace_misspelt_connective(tokens):
-            sign = tokens.take()
-            right = expression(tokens, wants, "")
-            body = tree.Binary(tokens.span_since(start), sign.key, body, right)
-    except NestingError:
-        raise
-    except PanicModeError:
-        tokens.depth = depth
+    start = tokens.current
+    read = _condition if wants == _CONDITION else expression
+    body = tokens.attempt(lambda tokens: read(tokens, wants, where))
+    if body is None:
         return _skip_head(tokens, start, ends)
-    if (
-        tokens.current.kind in _OPERANDS
-        and _follows_soon(tokens, ends)
-        and not closest(tokens.current.text, (*ends, _DOWNTO))
-    ):
-        tokens.report_once(
-            "E117",
-            f"{describe_token(tokens.current)} does not belong here",
-            tokens.current.span,
-            f"expected `{ends[0]}`",
-        )
+    token = tokens.current
+    if token.kind in _OPERANDS and _follows_soon(tokens, ends) and not closest(token.text, (*ends, _DOWNTO)):
+        text = f"{describe_token(token)} does not belong here"
+        tokens.report_once("E117", text, token.span, f"expected `{ends[0]}`")
         _skip_head(tokens, start, ends)
+    return body
+
+
+def _condition(tokens: TokenStream, wants: str, where: str) -> tree.Expression:
+    """Read a condition, also where AND and OR are misspelt."""
+    start = tokens.current
+    body = expression(tokens, wants, where)
+    tokens.note_expected_words("AND", "OR")
+    while _replace_misspelt_connective(tokens):
+        sign = tokens.take()
+        body = tokens.node(tree.Binary, start, sign.key, body, expression(tokens, wants, ""))
     return body
 
 
 def _follows_soon(tokens: TokenStream, ends: tuple[str, ...]) -> bool:
     """Whether one of these words stands near, before anything that starts or ends a statement."""
-    stops = (";", *tokens.vocabulary.block_ends, *tokens.vocabulary.statements)
-    for steps in range(1, 8):
-        key = tokens.peek(steps).key
-        if key in ends:
-            return True
-        if key in stops:
-            return False
-    return False
+    stops = (*ends, ";", *tokens.vocabulary.block_ends, *tokens.vocabulary.statements)
+    keys = (tokens.peek(steps).key for steps in range(1, 8))
+    return next((key for key in keys if key in stops), "") in ends
 
 
 def _replace_misspelt_connective(tokens: TokenStream) -> bool:
@@ -109,12 +98,9 @@ def _replace_misspelt_connective(tokens: TokenStream) -> bool:
 def _skip_head(tokens: TokenStream, start: Token, ends: tuple[str, ...]) -> tree.Poison:
     """Pass over the rest of the head of a statement; the next word of it may be missing without a further message."""
     names = set()
-    stops = (";", *tokens.vocabulary.block_ends, *tokens.vocabulary.statements)
-    while not tokens.matches(*ends):
-        if tokens.is_at_end or tokens.matches(";", *tokens.vocabulary.block_ends):
+    while not tokens.matches(*ends, *tokens.vocabulary.statements):
+        if tokens.is_at_statement_end:
             raise PanicModeError
-        if tokens.matches(*stops):
-            break
         if tokens.current.kind in (TokenKind.NAME, TokenKind.ARM):
             names.add(tokens.current.key)
         tokens.take()
@@ -161,19 +147,16 @@ def _accept_else(tokens: TokenStream) -> bool:
         return True
     token, after = tokens.current, tokens.peek()
     if token.key == ";" and after.key == "ELSE":
-        tokens.report_once(
-            "E124", "no `;` is allowed before ELSE", token.span, "leave it out", fixes=(Fix(token.span, ""),)
-        )
+        fix = Fix(token.span, "")
+        tokens.report_once("E124", "no `;` is allowed before ELSE", token.span, "leave it out", fixes=(fix,))
         tokens.take()
         tokens.take()
         return True
     if token.kind is not TokenKind.NAME or after.key in ("=", ":=", "(", "["):
         return False
     if token.key in _ELSE_IF_SPELLINGS:
-        text = f"unknown statement `{token.text}`"
-        tokens.report(
-            "E105", text, token.span, "not a statement", advice="write `ELSE IF`", fixes=(Fix(token.span, "ELSE IF"),)
-        )
+        text, fix = f"unknown statement `{token.text}`", Fix(token.span, "ELSE IF")
+        tokens.report("E105", text, token.span, "not a statement", advice="write `ELSE IF`", fixes=(fix,))
         tokens.replace_current("IF")
         return True
     if closest(token.text, ("ELSE", *tokens.vocabulary.statements)) == "ELSE":
@@ -190,8 +173,7 @@ def while_(tokens: TokenStream) -> tree.While:
     condition = head_expression(tokens, _CONDITION, "after WHILE", "DO")
     head = tokens.span_since(start)
     tokens.expect("DO", "after the condition", statement=True)
-    body = nested_statement(tokens, "DO")
-    return tree.While(tokens.span_since(start), head, condition, body)
+    return tokens.node(tree.While, start, head, condition, nested_statement(tokens, "DO"))
 
 
 # "REPEAT" statements "UNTIL" expr
@@ -223,8 +205,7 @@ def for_(tokens: TokenStream) -> tree.For:
     step = head_expression(tokens, "a number", "after STEP", "DO") if tokens.accept("STEP") else None
     head = tokens.span_since(start)
     tokens.expect("DO", "after the last number", statement=True)
-    body = nested_statement(tokens, "DO")
-    return tree.For(tokens.span_since(start), head, counter, first, last, step, body)
+    return tokens.node(tree.For, start, head, counter, first, last, step, nested_statement(tokens, "DO"))
 
 
 def _loop_variable(tokens: TokenStream) -> tree.Name | tree.Poison:
@@ -249,34 +230,33 @@ def _loop_variable(tokens: TokenStream) -> tree.Name | tree.Poison:
 def cobegin(tokens: TokenStream) -> tree.Cobegin:
     """Read one COBEGIN."""
     start = tokens.take()
-    body: list[tree.Branch] = []
-    depth, level = tokens.depth, len(tokens.open_closers)
+    branches: list[tree.Branch] = []
     tokens.open_closers.append(("COEND", "PRIORITY"))
     tokens.note_expected_words("BEGIN", "PRIORITY", "COEND", starts_statement=True)
     while not (tokens.is_at_end or tokens.matches("COEND", "UNTIL", "RECOVER")):
         index = tokens.index
         if tokens.matches("END") and not _skip_surplus_end(tokens):
             break
-        try:
-            body.append(_branch(tokens))
-            _branch_separator(tokens)
-            if tokens.previous.key == ";":
-                tokens.note_expected_words("BEGIN", "PRIORITY", "COEND", starts_statement=True)
-        except NestingError:
-            raise
-        except PanicModeError:
-            del tokens.open_closers[level + 1 :]
-            tokens.depth = depth
+        if not tokens.attempt(lambda tokens: _branch_and_separator(tokens, branches)):
             skip_to_statement(tokens)
             tokens.accept(";")
             tokens.suppress_reports()
         if tokens.index == index:
             tokens.take()
     tokens.open_closers.pop()
-    if not body and tokens.matches("COEND"):
+    if not branches and tokens.matches("COEND"):
         tokens.report_once("E126", "COBEGIN has no branches", tokens.current.span, "expected `BEGIN ... END`")
     end = expect_closer(tokens, "COEND", start)
-    return tree.Cobegin(tokens.span_since(start), tuple(body), end or tokens.gap_span())
+    return tokens.node(tree.Cobegin, start, tuple(branches), end or tokens.gap_span())
+
+
+def _branch_and_separator(tokens: TokenStream, branches: list[tree.Branch]) -> bool:
+    """Read one more branch, and the ``;`` behind it."""
+    branches.append(_branch(tokens))
+    _branch_separator(tokens)
+    if tokens.previous.key == ";":
+        tokens.note_expected_words("BEGIN", "PRIORITY", "COEND", starts_statement=True)
+    return True
 
 
 # branch = [ "PRIORITY" number ":" ] block ;
@@ -285,9 +265,8 @@ def _branch(tokens: TokenStream) -> tree.Branch:
     priority = None
     if tokens.accept("PRIORITY"):
         if tokens.current.kind is not TokenKind.NUMBER:
-            tokens.report_once(
-                "E111", "expected a number after PRIORITY", tokens.current.span, "a number without a sign, such as `2`"
-            )
+            text = "expected a number after PRIORITY"
+            tokens.report_once("E111", text, tokens.current.span, "a number without a sign, such as `2`")
         priority = _priority(tokens)
         head = tokens.span_since(start)
         tokens.expect(":", "after the priority", statement=True)
@@ -295,14 +274,15 @@ def _branch(tokens: TokenStream) -> tree.Branch:
         head = start.span
     tokens.note_expected_words("BEGIN", starts_statement=True)
     body = block(tokens) if tokens.matches("BEGIN") else _branch_without_block(tokens)
-    return tree.Branch(tokens.span_since(start), head, priority, body)
+    return tokens.node(tree.Branch, start, head, priority, body)
 
 
 def _priority(tokens: TokenStream) -> tree.Number | None:
     """Read what stands for a priority."""
-    if tokens.current.kind is TokenKind.NUMBER or tokens.peek().kind is TokenKind.NUMBER:
-        return number(tokens) if tokens.current.kind is TokenKind.NUMBER or tokens.matches("-", "+") else None
-    if tokens.current.kind is TokenKind.NAME:
+    is_number_next = tokens.peek().kind is TokenKind.NUMBER
+    if tokens.current.kind is TokenKind.NUMBER or (is_number_next and tokens.matches("-", "+")):
+        return number(tokens)
+    if tokens.current.kind is TokenKind.NAME and not is_number_next:
         tokens.take()
     return None
 
@@ -312,16 +292,14 @@ def _branch_without_block(tokens: TokenStream) -> tree.Block:
     token = tokens.current
     if token.key == ";":
         tokens.fail("a `;` is allowed only between two branches", "expected `BEGIN`", code="E126")
-    advice = "write `BEGIN ... END` around the statements of each branch"
-    tokens.report_once(
-        "E126", "a branch of COBEGIN is a block", token.span, "expected `BEGIN` before this", advice=advice
-    )
+    text, advice = "a branch of COBEGIN is a block", "write `BEGIN ... END` around the statements of each branch"
+    tokens.report_once("E126", text, token.span, "expected `BEGIN` before this", advice=advice)
     body = statements(tokens, "END")
     if tokens.matches("END") and tokens.peek().key != ".":
         tokens.take()
     else:
         tokens.suppress_reports()
-    return tree.Block(tokens.span_since(token), body, tokens.gap_span())
+    return tokens.node(tree.Block, token, body, tokens.gap_span())
 
 
 def _skip_surplus_end(tokens: TokenStream) -> bool:
@@ -359,8 +337,7 @@ def lock(tokens: TokenStream) -> tree.Lock:
     targets = parenthesised_list(tokens, variable, "the name of a variable", "after LOCK")
     head = tokens.span_since(start)
     tokens.expect("DO", "after the names", statement=True)
-    body = nested_statement(tokens, "DO")
-    return tree.Lock(tokens.span_since(start), head, targets, body)
+    return tokens.node(tree.Lock, start, head, targets, nested_statement(tokens, "DO"))
 
 
 # "TRY" statements "RECOVER" statements "END"
@@ -392,9 +369,7 @@ def retry(tokens: TokenStream) -> tree.Retry:
 # "SIGNAL" lvalue
 def signal(tokens: TokenStream) -> tree.Signal:
     """Read one SIGNAL."""
-    start = tokens.take()
-    event = variable(tokens, _EVENT, "after SIGNAL")
-    return tree.Signal(tokens.span_since(start), event)
+    return tokens.node(tree.Signal, tokens.take(), variable(tokens, _EVENT, "after SIGNAL"))
 
 
 # "WAIT" lvalue
@@ -405,16 +380,13 @@ def wait(tokens: TokenStream) -> tree.Wait:
         text = tokens.current.text
         advice = f"to let {text} seconds pass, write `PAUSE {text}`"
         tokens.fail(f"expected {_EVENT} after WAIT", f"found `{text}`", advice=advice)
-    event = variable(tokens, _EVENT, "after WAIT")
-    return tree.Wait(tokens.span_since(start), event)
+    return tokens.node(tree.Wait, start, variable(tokens, _EVENT, "after WAIT"))
 
 
 # "PAUSE" expr
 def pause(tokens: TokenStream) -> tree.Pause:
     """Read one PAUSE."""
-    start = tokens.take()
-    duration = expression(tokens, "a number of seconds", "after PAUSE")
-    return tree.Pause(tokens.span_since(start), duration)
+    return tokens.node(tree.Pause, tokens.take(), expression(tokens, "a number of seconds", "after PAUSE"))
 
 
 # "HALT"
@@ -428,4 +400,4 @@ def call(tokens: TokenStream) -> tree.Call:
     """Read the call of a procedure."""
     name = tokens.take_name()
     arguments = expression_list(tokens, "a value", f"after {name.text}", empty=True)
-    return tree.Call(tokens.span_since(name.span), name, arguments)
+    return tokens.node(tree.Call, name.span, name, arguments)

@@ -1,27 +1,24 @@
 """Parsing declarations: VAR parts, types, and what is wrong with them."""
 
 import math
+from functools import partial
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, did_you_mean
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import number, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.token_stream import PanicModeError, TokenStream, describe_token
+from armwright.program.syntax.token_stream import PanicModeError, TokenStream, describe_token, either
 
 
 def skip_declaration(tokens: TokenStream, names: list[tree.Name]) -> tree.Declaration:
     """Pass over the rest of a declaration; return what was perhaps declared, of no known type."""
-    start = tokens.current
-    stops = ("BEGIN", *tokens.vocabulary.headers, *tokens.vocabulary.statements)
-    while not tokens.is_at_end and not tokens.matches(";", "END", *stops):
-        if tokens.current.kind is TokenKind.NAME:
-            names.append(tokens.take_name())
-        else:
-            tokens.take()
+    start, first = tokens.current, tokens.index
+    tokens.skip_to(";", "END", "BEGIN", *tokens.vocabulary.headers, *tokens.vocabulary.statements)
+    skipped = tokens.tokens[first : tokens.index]
+    names += [tree.Name(token.span, token.text, token.key) for token in skipped if token.kind is TokenKind.NAME]
     tokens.accept(";")
-    span = tokens.span_since(start)
-    return tree.Declaration(span, tuple(names), tree.TypeName(span, "", None))
+    return tokens.node(tree.Declaration, start, tuple(names), tokens.node(tree.TypeName, start, "", None))
 
 
 # var_part = "VAR" decl { decl } ;
@@ -47,15 +44,10 @@ def _is_reserved_as_name(tokens: TokenStream) -> bool:
 def declarations(tokens: TokenStream) -> list[tree.Declaration]:
     """Read declarations, as many as there are."""
     read = []
-    depth = tokens.depth
     while _starts_declaration(tokens):
         index = tokens.index
         names: list[tree.Name] = []
-        try:
-            read.append(_declaration(tokens, names))
-        except PanicModeError:
-            tokens.depth = depth
-            read.append(skip_declaration(tokens, names))
+        read.append(tokens.attempt(partial(_declaration, names=names)) or skip_declaration(tokens, names))
         if tokens.index == index:
             tokens.take()
     return read
@@ -77,19 +69,18 @@ def _starts_declaration(tokens: TokenStream) -> bool:
 def _declaration(tokens: TokenStream, names: list[tree.Name]) -> tree.Declaration:
     """Read one declaration; put its names also where they are safe if the rest makes no sense."""
     start = tokens.current
-    name_list(tokens, names)
-    kind = type_name(tokens)
-    span = tokens.span_since(start)
+    kind = names_and_type(tokens, names)
+    declaration = tokens.node(tree.Declaration, start, tuple(names), kind)
     _end_declaration(tokens)
-    return tree.Declaration(span, tuple(names), kind)
+    return declaration
 
 
-# name { "," name } ":"
-def name_list(tokens: TokenStream, names: list[tree.Name]) -> None:
-    """Read what is declared, up to the type.
+# name { "," name } ":" type
+def names_and_type(tokens: TokenStream, names: list[tree.Name]) -> tree.TypeName:
+    """Read what is declared, and its type.
 
     Raises:
-        LostError: there is no type.
+        PanicModeError: there is no type.
     """
     _declared_name(tokens, names)
     while True:
@@ -109,6 +100,7 @@ def name_list(tokens: TokenStream, names: list[tree.Name]) -> None:
         tokens.report("E112", "missing `:` before the type", gap, "expected `:` and a type here")
         if not tokens.matches(*tokens.vocabulary.types, "ARRAY"):
             raise PanicModeError
+    return _type_name(tokens)
 
 
 def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
@@ -132,27 +124,21 @@ def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
 
 
 # type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;
-def type_name(tokens: TokenStream) -> tree.TypeName:
-    """Read a type.
-
-    Raises:
-        LostError: there is none.
-    """
+def _type_name(tokens: TokenStream) -> tree.TypeName:
     start = tokens.current
     tokens.note_expected_words(*tokens.vocabulary.types)
     sizes = _array_sizes(tokens) if tokens.accept("ARRAY") else ()
     token = tokens.current
-    types, offered = tokens.vocabulary.types, tokens.standard_vocabulary.types
-    expected = f"expected {', '.join(offered[:-1])} or {offered[-1]}"
+    types, expected = tokens.vocabulary.types, f"expected {either(tokens.standard_vocabulary.types)}"
     if tokens.accept(*types):
         span = tokens.span_since(start)
         return tree.TypeName(span, tokens.source.slice(span), token.key, sizes)
     if token.kind is not TokenKind.NAME:
-        tokens.fail("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
+        tokens.fail(f"expected a type after `{'OF' if sizes else ':'}`", expected)
     near = closest(token.text, types)
     tokens.report("E205", f"unknown type `{token.text}`", token.span, expected, advice=did_you_mean(near))
     tokens.take()
-    return tree.TypeName(tokens.span_since(start), token.text, near, sizes)
+    return tokens.node(tree.TypeName, start, token.text, near, sizes)
 
 
 def _array_sizes(tokens: TokenStream) -> tuple[tree.Number, ...]:
@@ -184,12 +170,8 @@ def _array_size(tokens: TokenStream, wants: str, where: str) -> tree.Number:
 
 
 def _end_declaration(tokens: TokenStream) -> None:
-    if tokens.accept(";"):
+    if tokens.accept_semicolon("after the declaration", once=False):
         return
-    gap = tokens.gap_span()
-    text = "missing `;` after the declaration"
-    advice = f"insert `;` after `{tokens.previous.text}`"
-    tokens.report("E104", text, gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
     words = tokens.vocabulary
     if not tokens.matches("BEGIN", *words.headers, *words.statements) and tokens.peek().key not in (",", ":", "="):
         raise PanicModeError

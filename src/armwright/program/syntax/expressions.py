@@ -34,11 +34,11 @@ def expression(tokens: TokenStream, wants: str = "a value", where: str = "here",
     Args:
         tokens: at its first token.
         wants: what is expected, in words.
-        where: the pose in words, such as ``after TO``.
+        where: the position in words, such as ``after TO``.
         lowest: how strongly its operations must hold together.
 
     Raises:
-        LostError: there is none, or it is too deep.
+        PanicModeError: there is none, or it is too deep.
     """
     start, outer = tokens.current, tokens.operand_context
     if wants != "a value" or where not in ("", "here"):
@@ -131,7 +131,7 @@ def number(tokens: TokenStream) -> tree.Number:
     """Read a number with its sign.
 
     Raises:
-        LostError: there is none.
+        PanicModeError: there is none.
     """
     start = token = tokens.current
     if start.key in ("-", "+"):
@@ -196,7 +196,7 @@ def mobile(tokens: TokenStream, wants: str, where: str) -> tree.Mobile:
     """Read a variable, an element of an array, or an arm.
 
     Raises:
-        LostError: there is none.
+        PanicModeError: there is none.
     """
     return _arm(tokens) if tokens.current.kind is _ARM else _lvalue(tokens, wants, where)
 
@@ -214,7 +214,7 @@ def variable(tokens: TokenStream, wants: str, where: str) -> tree.Variable:
     """Read a variable or an element of an array.
 
     Raises:
-        LostError: there is none.
+        PanicModeError: there is none.
     """
     if tokens.current.kind is _ARM:
         tokens.report_once("E111", f"expected {wants} {where}".rstrip(), tokens.current.span, "this is an arm")
@@ -248,7 +248,7 @@ def parenthesised_list(
         tokens: at the opening parenthesis.
         item: how to read one.
         wants: what one is, in words.
-        where: the pose in words, such as ``after VIA``.
+        where: the position in words, such as ``after VIA``.
         opening: what opens the list.
         empty: whether nothing is needed between them.
 
@@ -256,7 +256,7 @@ def parenthesised_list(
         What stands in it; empty also where that has been reported.
 
     Raises:
-        LostError: what stands there makes no sense, or lies too deep.
+        PanicModeError: what stands there makes no sense, or lies too deep.
     """
     closing = _CLOSING[opening]
     start = tokens.current
@@ -345,7 +345,7 @@ def _report_missing_value(tokens: TokenStream, wants: str, where: str) -> tree.P
     """Say that there is no value here; go on where it is clear what was meant to be one.
 
     Raises:
-        LostError: it is not.
+        PanicModeError: it is not.
     """
     token = tokens.current
     where = where or f"after `{tokens.previous.text}`"

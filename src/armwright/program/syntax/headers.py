@@ -1,15 +1,16 @@
 """Parsing what stands in front of the statements: VAR parts, IMPORT, UNITS, procedures, and BEGIN itself."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, Label, did_you_mean
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import block
-from armwright.program.syntax.declarations import declarations, name_list, skip_declaration, type_name, var_part
+from armwright.program.syntax.declarations import declarations, names_and_type, skip_declaration, var_part
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.token_stream import PanicModeError, TokenStream, describe_token
+from armwright.program.syntax.token_stream import TokenStream, describe_token
 
 # What other languages call a procedure.
 _FOREIGN_PROCEDURE_KEYWORDS = ("FUNCTION", "PROC", "SUB", "SUBROUTINE", "DEF")
@@ -29,35 +30,27 @@ def parse_headers(tokens: TokenStream) -> list[tree.Header]:
             headers_ += parse_header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
             gap = Span(token.start, token.start)
-            tokens.report(
-                "E112", "missing `VAR` before the declarations", gap, "expected `VAR` here", fixes=(Fix(gap, "VAR "),)
-            )
+            text, fix = "missing `VAR` before the declarations", Fix(gap, "VAR ")
+            tokens.report("E112", text, gap, "expected `VAR` here", fixes=(fix,))
             headers_ += declarations(tokens)
         elif word := _intended_header(tokens):
             _replace_misspelt_keyword(tokens, word)
             headers_ += parse_header(tokens)
-        elif (
-            tokens.index < tokens.next_begin()
-            and not tokens.matches(*tokens.vocabulary.statements)
-            and after.key != "="
-        ):
-            headers_.append(_skip_nonsense(tokens))
-        else:
+        elif tokens.matches(*tokens.vocabulary.statements) or after.key == "=" or tokens.index >= tokens.next_begin():
             break
+        else:
+            headers_.append(_skip_nonsense(tokens))
     _accept_begin(tokens)
     return headers_
 
 
 def parse_header(tokens: TokenStream) -> Sequence[tree.Header]:
     """Read one part of what stands in front of BEGIN; what makes no sense is passed over."""
-    index, level, depth = tokens.index, len(tokens.open_closers), tokens.depth
-    try:
-        tokens.overflow_index = -1
-        return _HEADERS[tokens.current.key](tokens)
-    except PanicModeError:
-        del tokens.open_closers[level:]
-        tokens.depth = depth
-        skip_declaration(tokens, [])
+    index, tokens.overflow_index = tokens.index, -1
+    headers_ = tokens.attempt(_HEADERS[tokens.current.key])
+    if headers_ is not None:
+        return headers_
+    skip_declaration(tokens, [])
     if tokens.index == index:
         tokens.take()
     return []
@@ -77,19 +70,15 @@ def _intended_header(tokens: TokenStream) -> str | None:
     token, after = tokens.current, tokens.peek()
     if token.kind is not TokenKind.NAME or after.kind not in (TokenKind.NAME, TokenKind.STRING):
         return None
-    near = (
-        "PROCEDURE"
-        if token.key in _FOREIGN_PROCEDURE_KEYWORDS
-        else closest(token.text, (*tokens.vocabulary.headers, "BEGIN"))
-    )
+    foreign = token.key in _FOREIGN_PROCEDURE_KEYWORDS
+    near = "PROCEDURE" if foreign else closest(token.text, (*tokens.vocabulary.headers, "BEGIN"))
     return near if near != "BEGIN" and (after.kind is TokenKind.NAME or near == "IMPORT") else None
 
 
 def _replace_misspelt_keyword(tokens: TokenStream, near: str) -> None:
     token = tokens.current
-    tokens.report(
-        "E105", f"unknown keyword `{token.text}`", token.span, "not a keyword of RLO", advice=did_you_mean(near)
-    )
+    text = f"unknown keyword `{token.text}`"
+    tokens.report("E105", text, token.span, "not a keyword of RLO", advice=did_you_mean(near))
     tokens.replace_current(near)
 
 
@@ -121,30 +110,27 @@ def _import(tokens: TokenStream) -> list[tree.Header]:
     if token.kind is not TokenKind.STRING:
         advice = 'write `IMPORT "cell.json" ;`'
         tokens.fail("expected the name of a file after IMPORT", f"found {describe_token(token)}", advice=advice)
-    tokens.take()
-    path = tree.String(token.span, token.text[1:-1])
-    span = tokens.span_since(start)
-    _end_header(tokens, "after the import")
-    return [tree.Import(span, path)]
+    node = tokens.node(tree.Import, start, tree.String(tokens.take().span, token.text[1:-1]))
+    tokens.accept_semicolon("after the import")
+    return [node]
 
 
 # units = "UNITS" unitname { "," unitname } ";" ;
 def _units(tokens: TokenStream) -> list[tree.Header]:
     start = tokens.take()
-    tokens.note_expected_operand("a unit")
     units = [_unit(tokens)]
     while tokens.current.key == "," or (tokens.current.kind is TokenKind.NAME and tokens.peek().key in (",", ";")):
         if not tokens.accept(","):
             tokens.insert_missing(",", "between two units")
-        tokens.note_expected_operand("a unit")
         units.append(_unit(tokens))
-    span = tokens.span_since(start)
-    _end_header(tokens, "after the units")
-    return [tree.Units(span, tuple(units))]
+    node = tokens.node(tree.Units, start, tuple(units))
+    tokens.accept_semicolon("after the units")
+    return [node]
 
 
 def _unit(tokens: TokenStream) -> tree.Name:
     token = tokens.current
+    tokens.note_expected_operand("a unit")
     if token.kind is not TokenKind.NAME:
         advice = "write `UNITS MM, DEG ;`"
         tokens.fail(f"expected a unit after `{tokens.previous.text}`", f"found {describe_token(token)}", advice=advice)
@@ -157,19 +143,18 @@ def _procedure(tokens: TokenStream) -> list[tree.Header]:
     name = _procedure_name(tokens)
     tokens.procedures.add(name.key)
     parameters = _parameters(tokens) if tokens.matches("(") else []
-    above = tokens.span_since(start)
+    head = tokens.span_since(start)
     _skip_result_type(tokens)
-    _end_header(tokens, "after the head of the procedure")
+    tokens.accept_semicolon("after the head of the procedure")
     tokens.note_expected_words("VAR", "BEGIN", starts_statement=True)
     own = var_part(tokens) if tokens.matches("VAR") else []
     while tokens.matches("VAR"):
-        again = tokens.current
-        fix = Fix(again.span, "")
-        tokens.report("E118", "a procedure has one VAR part", again.span, "remove this word", fixes=(fix,))
+        span = tokens.current.span
+        tokens.report("E118", "a procedure has one VAR part", span, "remove this word", fixes=(Fix(span, ""),))
         own += var_part(tokens)
     tokens.note_expected_words("BEGIN", starts_statement=True)
-    body = _procedure_body(tokens, above, name)
-    procedure = tree.Procedure(tokens.span_since(start), above, name, tuple(parameters), tuple(own), body)
+    body = _procedure_body(tokens, head, name)
+    procedure = tokens.node(tree.Procedure, start, head, name, tuple(parameters), tuple(own), body)
     if tokens.matches("END") and tokens.peek().key != ".":
         tokens.report_once("E127", "`END` without BEGIN", tokens.current.span, "the procedure has ended before")
         tokens.take()
@@ -178,7 +163,7 @@ def _procedure(tokens: TokenStream) -> list[tree.Header]:
         tokens.report_once("E104", "a procedure ends with `;`", tokens.current.span, "write `;`", fixes=(fix,))
         tokens.take()
     else:
-        _end_header(tokens, "after the procedure")
+        tokens.accept_semicolon("after the procedure")
     return [procedure]
 
 
@@ -199,7 +184,7 @@ def _procedure_name(tokens: TokenStream) -> tree.Name:
 
 # param = name { "," name } ":" type ;
 def _parameters(tokens: TokenStream) -> list[tree.Declaration]:
-    opening, depth = tokens.take(), tokens.depth
+    opening = tokens.take()
     parameters: list[tree.Declaration] = []
     if tokens.matches(")"):
         fix = Fix(opening.span.to(tokens.current.span), "")
@@ -214,15 +199,11 @@ def _parameters(tokens: TokenStream) -> list[tree.Declaration]:
             tokens.report_once("E117", text, start.span, "leave it out", note=_NOTE_ON_RESULTS)
             tokens.take()
         names: list[tree.Name] = []
-        try:
-            name_list(tokens, names)
-            kind = type_name(tokens)
-        except PanicModeError:
-            tokens.depth = depth
-            while not tokens.is_at_end and not tokens.matches(")", ";", "BEGIN", *tokens.vocabulary.headers):
-                tokens.take()
-            kind = tree.TypeName(tokens.span_since(start), "", None)
-        parameters.append(tree.Declaration(tokens.span_since(start), tuple(names), kind))
+        kind = tokens.attempt(partial(names_and_type, names=names))
+        if kind is None:
+            tokens.skip_to(")", ";", "BEGIN", *tokens.vocabulary.headers)
+            kind = tokens.node(tree.TypeName, start, "", None)
+        parameters.append(tokens.node(tree.Declaration, start, tuple(names), kind))
         if not _parameter_separator(tokens):
             break
     if not tokens.accept(")"):
@@ -235,11 +216,9 @@ def _skip_result_type(tokens: TokenStream) -> None:
     if not tokens.matches(":"):
         return
     start = tokens.take()
-    while not tokens.is_at_end and not tokens.matches(";", "VAR", "BEGIN"):
-        tokens.take()
-    tokens.report_once(
-        "E117", "a procedure returns no value", tokens.span_since(start), "leave this out", note=_NOTE_ON_RESULTS
-    )
+    tokens.skip_to(";", "VAR", "BEGIN")
+    span = tokens.span_since(start)
+    tokens.report_once("E117", "a procedure returns no value", span, "leave this out", note=_NOTE_ON_RESULTS)
 
 
 def _parameter_separator(tokens: TokenStream) -> bool:
@@ -258,7 +237,7 @@ def _parameter_separator(tokens: TokenStream) -> bool:
     return False
 
 
-def _procedure_body(tokens: TokenStream, above: Span, name: tree.Name) -> tree.Block:
+def _procedure_body(tokens: TokenStream, head: Span, name: tree.Name) -> tree.Block:
     """Read the statements of a procedure, also where BEGIN or END is missing."""
     token = tokens.current
     if token.kind is TokenKind.NAME and token.key not in tokens.declared and closest(token.text, ("BEGIN",)):
@@ -273,10 +252,10 @@ def _procedure_body(tokens: TokenStream, above: Span, name: tree.Name) -> tree.B
     tokens.enclosing_procedure = name.key or "?"
     body = block(tokens)
     tokens.enclosing_procedure = ""
-    return _restore_main_program(tokens, above, body)
+    return _restore_main_program(tokens, head, body)
 
 
-def _restore_main_program(tokens: TokenStream, above: Span, body: tree.Block) -> tree.Block:
+def _restore_main_program(tokens: TokenStream, head: Span, body: tree.Block) -> tree.Block:
     """Give back the statements of the program itself, which a procedure without END has swallowed."""
     last = body.statements[-1] if body.statements else None
     open_ended = isinstance(last, tree.Block) and last.end.start == last.end.end
@@ -285,18 +264,10 @@ def _restore_main_program(tokens: TokenStream, above: Span, body: tree.Block) ->
     tokens.rewind_to_offset(last.span.start)
     tokens.diagnostics[:] = [diagnostic for diagnostic in tokens.diagnostics if diagnostic.span.start < last.span.start]
     gap = tokens.gap_span()
-    label = Label(above, "this procedure")
+    label = Label(head, "this procedure")
     tokens.report_once("E115", "the procedure has no END", gap, "expected `END ;` here", secondary=(label,))
     tokens.suppress_reports()
-    return tree.Block(tokens.span_since(body.span), body.statements[:-1], gap)
-
-
-def _end_header(tokens: TokenStream, where: str) -> None:
-    if tokens.accept(";"):
-        return
-    gap = tokens.gap_span()
-    advice = f"insert `;` after `{tokens.previous.text}`"
-    tokens.report_once("E104", f"missing `;` {where}", gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
+    return tokens.node(tree.Block, body.span, body.statements[:-1], gap)
 
 
 def late_header(tokens: TokenStream) -> tree.Statement:

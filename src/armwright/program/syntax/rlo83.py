@@ -59,7 +59,7 @@ def check_conformance(
         tokens: of the text, as the parser has read them.
 
     Returns:
-        The program with a poison in the pose of each part that belongs to RLO-2, and what is wrong with both.
+        The program with a poison in place of each part that belongs to RLO-2, and what is wrong with both.
     """
     visitor = _ConformanceVisitor(source, tokens, program)
     headers = tuple(node_ for header in program.headers if (node_ := visitor.header(header)) is not None)
@@ -298,7 +298,7 @@ class _ConformanceVisitor:
     # ---- expressions
 
     def _operand(self, node: tree.Expression, wants: str) -> tree.Name | tree.ArmName | tree.Poison:
-        """Return a name or an arm; a poison in the pose of any other expression."""
+        """Return a name or an arm; a poison in place of any other expression."""
         if isinstance(node, tree.Name | tree.ArmName) and self._with_parentheses(node.span) == node.span:
             return node
         return self._poison(node, wants)

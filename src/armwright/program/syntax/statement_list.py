@@ -1,7 +1,7 @@
 """Parsing a stretch of statements: what separates them, what ends them, and how to go on after nonsense."""
 
 from collections.abc import Callable
-from typing import NoReturn, TypeVar
+from typing import TypeVar
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, did_you_mean, labels
@@ -9,20 +9,16 @@ from armwright.program.language.source import Span
 from armwright.program.language.words import BLOCK_CLOSERS, BLOCK_OPENERS, FOREIGN_STATEMENTS, UNSUPPORTED_STATEMENTS
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.token_stream import (
-    ANY_VALUE,
-    MAX_DEPTH,
-    NestingError,
-    PanicModeError,
-    TokenStream,
-    describe_token,
-)
+from armwright.program.syntax.token_stream import ANY_VALUE, NestingError, PanicModeError, TokenStream, describe_token
 
 _Parsed = TypeVar("_Parsed")
 _NAME, _KEYWORD, _ARM, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.NUMBER
 _BEFORE_STATEMENTS = frozenset((";", "BEGIN", "TRY", "RECOVER", "REPEAT"))
 # What stands behind a name that is given a value.
 ASSIGNMENT_SIGNS = ("=", ":=", "==")
+_STATEMENT_FORMS = (
+    "statements begin with a keyword such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
+)
 # What opens the stretch that a word ends, for one that ends none.
 _OPENER_OF = {
     "UNTIL": "REPEAT",
@@ -127,17 +123,15 @@ def statement(tokens: TokenStream) -> tree.Statement:
     """Read one statement.
 
     Raises:
-        LostError: there is none.
+        PanicModeError: there is none.
     """
     token = tokens.current
     tokens.operand_context, tokens.assignment_target = ANY_VALUE, ""
     if token.kind is _KEYWORD and token.key in tokens.rules:
         if tokens.peek().key in ASSIGNMENT_SIGNS:
             return _assignment_to_reserved_word(tokens)
-        tokens.depth += 1
-        tokens.statement_depth = tokens.depth
-        if tokens.depth > MAX_DEPTH:
-            tokens.fail_too_deep()
+        tokens.statement_depth = tokens.depth + 1
+        tokens.enter_level()
         read = tokens.rules[token.key](tokens)
         tokens.depth -= 1
         return read
@@ -157,18 +151,19 @@ def _statement_from_name(tokens: TokenStream, after: Token) -> tree.Statement:
     if after.key == "(" and tokens.peek(2).kind is not TokenKind.STRING:
         return tokens.rules["("](tokens)
     known = _is_known(tokens, token)
-    elsewhere = not known and (token.key in FOREIGN_STATEMENTS or token.key in UNSUPPORTED_STATEMENTS)
-    near = None if elsewhere or known else closest(token.text, tokens.vocabulary.statements)
+    foreign = not known and (token.key in FOREIGN_STATEMENTS or token.key in UNSUPPORTED_STATEMENTS)
+    near = None if foreign or known else closest(token.text, tokens.vocabulary.statements)
     # In front of a number or a matrix only the sign of equality is missing.
     number = tokens.peek(2) if after.key in ("(", "-") else after
     valued = number.kind is _NUMBER or (number.key == "-" and number is not after)
-    if valued and not elsewhere and not near:
+    if valued and not foreign and not near:
         return tokens.rules["="](tokens)
     if number.kind is TokenKind.STRING and number is not after:
         near = "PRINT"
-    if near:
-        replace_misspelt_statement(tokens, near)
-    return statement(tokens) if near else _report_no_statement(tokens)
+    if not near:
+        return _report_no_statement(tokens)
+    replace_misspelt_statement(tokens, near)
+    return statement(tokens)
 
 
 def _assignment_to_reserved_word(tokens: TokenStream) -> tree.Statement:
@@ -195,28 +190,15 @@ def _report_no_statement(tokens: TokenStream) -> tree.Statement:
         tokens.insert_missing("()", "after the name of a procedure")
         return tree.Call(name.span, name, ())
     if _is_known(tokens, token):
-        _report_missing_value(tokens)
-    if token.key in FOREIGN_STATEMENTS:
-        advice = did_you_mean(FOREIGN_STATEMENTS[token.key])
-    else:
-        general = (
-            "statements begin with a keyword such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
-        )
-        advice = UNSUPPORTED_STATEMENTS.get(token.key, general)
+        # A variable alone is no statement.
+        sign = tokens.peek().key
+        advice = f"write `{token.text} = {token.text} {sign} ...`" if sign in ("+", "-", "*", "/") else ""
+        text = f"`{token.text}` needs `=` and a value"
+        tokens.fail(text, "a name alone is not a statement", code="E109", advice=advice)
+    advice = did_you_mean(FOREIGN_STATEMENTS.get(token.key)) or UNSUPPORTED_STATEMENTS.get(token.key, _STATEMENT_FORMS)
     note = "line numbers are allowed only if the first line has one" if token.kind is _NUMBER else ""
     tokens.report("E105", text, token.span, label, note=note, advice=advice)
     raise PanicModeError
-
-
-def _report_missing_value(tokens: TokenStream) -> NoReturn:
-    """Say that a variable alone is no statement.
-
-    Raises:
-        LostError: always.
-    """
-    name, sign = tokens.current.text, tokens.peek().key
-    advice = f"write `{name} = {name} {sign} ...`" if sign in ("+", "-", "*", "/") else ""
-    tokens.fail(f"`{name}` needs `=` and a value", "a name alone is not a statement", code="E109", advice=advice)
 
 
 def nested_statement(tokens: TokenStream, behind: str, *words: str) -> tree.Statement:
@@ -229,7 +211,7 @@ def nested_statement(tokens: TokenStream, behind: str, *words: str) -> tree.Stat
     """
     token = tokens.current
     tokens.note_expected_words(*(words or tokens.vocabulary.statements), starts_statement=True)
-    if tokens.is_at_end or token.key == ";" or (token.kind is _KEYWORD and token.key in tokens.vocabulary.block_ends):
+    if tokens.is_at_statement_end:
         gap = tokens.gap_span()
         tokens.report_once("E111", f"expected a statement after {behind}", gap, "expected a statement here")
         tokens.suppress_reports()
@@ -239,17 +221,11 @@ def nested_statement(tokens: TokenStream, behind: str, *words: str) -> tree.Stat
 
 def parse_or_skip(tokens: TokenStream, read: Callable[[TokenStream], _Parsed]) -> _Parsed | None:
     """Read something; pass over to the next statement where it makes no sense."""
-    depth, level = tokens.depth, len(tokens.open_closers)
-    try:
-        return read(tokens)
-    except NestingError:
-        raise
-    except PanicModeError:
-        del tokens.open_closers[level:]
-        tokens.depth = depth
+    parsed = tokens.attempt(read)
+    if parsed is None:
         skip_to_statement(tokens)
         tokens.suppress_reports()
-        return None
+    return parsed
 
 
 def expect_closer(tokens: TokenStream, key: str, opening: Token) -> Span | None:
@@ -285,10 +261,7 @@ def expect_closer(tokens: TokenStream, key: str, opening: Token) -> Span | None:
 def _statement_separator(tokens: TokenStream) -> None:
     """Read ``;``; put it in where the next statement begins without one."""
     token = tokens.current
-    if token.key == ";":
-        tokens.take()
-        return
-    if tokens.is_at_end or (token.kind is _KEYWORD and token.key in tokens.vocabulary.block_ends):
+    if tokens.accept(";") or tokens.is_at_statement_end:
         return
     if token.kind is _NAME and _replace_misspelt_end(tokens):
         return
@@ -322,12 +295,8 @@ def _is_known(tokens: TokenStream, token: Token) -> bool:
 
 def skip_to_statement(tokens: TokenStream) -> None:
     """Pass over tokens up to the next ``;``, word that ends something, or start of a statement."""
-    stops = {";", "BEGIN", *tokens.vocabulary.block_ends, *tokens.vocabulary.headers, *tokens.vocabulary.statements}
-    while not tokens.is_at_end:
-        token = tokens.current
-        if token.key in stops and (token.kind is _KEYWORD or token.key == ";"):
-            return
-        tokens.take()
+    words = tokens.vocabulary
+    tokens.skip_to(";", "BEGIN", *words.block_ends, *words.headers, *words.statements)
 
 
 def _skip_nested_statement(tokens: TokenStream, index: int) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate
-from typing import NoReturn, TypeAlias, Unpack
+from typing import Concatenate, NoReturn, ParamSpec, TypeAlias, TypeVar, Unpack
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Details, DiagnosticList, Fix, did_you_mean
@@ -18,6 +18,8 @@ MAX_DEPTH = 100
 # What an expression is for where nothing more is known.
 ANY_VALUE = ("a value", "")
 
+_Parsed = TypeVar("_Parsed")
+_Parts = ParamSpec("_Parts")
 _NAME, _KEYWORD, _SYMBOL, _END = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.SYMBOL, TokenKind.END
 
 
@@ -25,7 +27,7 @@ class PanicModeError(Exception):
     """The parser has said what is wrong and cannot go on here; it looks for the next statement."""
 
 
-class NestingError(PanicModeError):
+class NestingError(Exception):
     """Statements lie too deep in one another; the outermost is passed over."""
 
 
@@ -109,6 +111,11 @@ class TokenStream:
         """Whether everything has been read."""
         return self.current.kind is _END
 
+    @property
+    def is_at_statement_end(self) -> bool:
+        """Whether the next token ends a statement: a ``;``, a word that ends a stretch of them, or the end."""
+        return self.is_at_end or self.matches(";", *self.vocabulary.block_ends)
+
     def take(self) -> Token:
         """Read one token; the end stays."""
         token = self.current
@@ -147,10 +154,9 @@ class TokenStream:
 
     def accept(self, *keys: str) -> Token | None:
         """Read the next token if it is one of these keywords or symbols."""
-        token = self.current
-        if token.key in keys and (token.kind is _SYMBOL or token.kind is _KEYWORD):
+        if self.matches(*keys):
             return self.take()
-        if token.kind is _END:
+        if self.is_at_end:
             self.note_expected_words(*keys)
         return None
 
@@ -164,14 +170,14 @@ class TokenStream:
             starts_statement: whether they start a statement or a part of the program.
             present_clauses: the clauses of a MOVE that there are already, by their words.
         """
-        if self.expected is not None and self._is_at_cursor():
+        if self._is_at_cursor() and self.expected is not None:
             self.expected.present_clauses |= present_clauses
             self.expected.words += (key for key in keys if key[0].isalpha())
             self.expected.starts_statement |= starts_statement
 
     def note_expected_operand(self, wants: str, where: str = "") -> None:
         """Take note that a value or name may stand at the end of the text; the arguments are those of ``mobile``."""
-        if self.expected is not None and self._is_at_cursor():
+        if self._is_at_cursor() and self.expected is not None:
             self.expected.operand = wants, where
 
     def discard_expected(self) -> None:
@@ -180,16 +186,10 @@ class TokenStream:
             self._expected_error_count = -1
 
     def _is_at_cursor(self) -> bool:
-        if (
-            self.current.kind is not _END
-            or len(self.diagnostics) != self._expected_error_count
-            or self.expected is None
-        ):
+        if self.expected is None or not self.is_at_end or len(self.diagnostics) != self._expected_error_count:
             return False
-        self.expected.assignment_target, self.expected.enclosing_procedure = (
-            self.assignment_target,
-            self.enclosing_procedure,
-        )
+        self.expected.assignment_target = self.assignment_target
+        self.expected.enclosing_procedure = self.enclosing_procedure
         self.expected.is_in_recovery = self.recover_depth > 0
         return True
 
@@ -230,13 +230,44 @@ class TokenStream:
         """Whether the next token stands in the line of the one read last."""
         return self.source.line(self.previous.start) == self.source.line(self.current.start)
 
+    def node(
+        self,
+        kind: Callable[Concatenate[Span, _Parts], _Parsed],
+        start: Token | Span,
+        *parts: _Parts.args,
+        **named: _Parts.kwargs,
+    ) -> _Parsed:
+        """Return a node of the tree that reaches from ``start`` to the token read last."""
+        return kind(self.span_since(start), *parts, **named)
+
+    # ---- going on after mistakes
+
+    def attempt(self, rule: "Callable[[TokenStream], _Parsed]") -> _Parsed | None:
+        """Read something; None where it makes no sense: what has been read of it is passed over.
+
+        Raises:
+            NestingError: statements lie too deep in one another.
+        """
+        depth, level = self.depth, len(self.open_closers)
+        try:
+            return rule(self)
+        except PanicModeError:
+            del self.open_closers[level:]
+            self.depth = depth
+            return None
+
+    def skip_to(self, *keys: str) -> None:
+        """Pass over tokens up to one of these keywords or symbols, or to the end of the text."""
+        while not (self.is_at_end or self.matches(*keys)):
+            self.take()
+
     # ---- depth
 
     def enter_level(self) -> None:
         """Go one step deeper.
 
         Raises:
-            LostError: it would be too deep.
+            PanicModeError: it would be too deep.
         """
         self.depth += 1
         if self.depth > MAX_DEPTH:
@@ -246,7 +277,7 @@ class TokenStream:
         """Say that the nesting is too deep.
 
         Raises:
-            LostError: always; where most of the depth is that of statements, all of them are to be given up.
+            PanicModeError: always; where most of the depth is that of statements, all of them are to be given up.
         """
         statement = self.statement_depth > MAX_DEPTH // 2
         what = "statements" if statement else "parentheses and operations"
@@ -279,51 +310,62 @@ class TokenStream:
         """Say what is missing at the next token, unless that was reported before, and give up the statement.
 
         Raises:
-            LostError: always.
+            PanicModeError: always.
         """
         # At the end of the text there is nothing to mark; the gap before it is the pose.
         span = self.gap_span() if self.is_at_end else self.current.span
         self.report_once(code, message, span, label, advice=advice)
         raise PanicModeError
 
-    def insert_missing(self, key: str, what: str, *, code: str = "E112", advice: str = "", alone: bool = True) -> None:
+    def insert_missing(self, key: str, what: str, *, advice: str = "", alone: bool = True) -> None:
         """Say that ``key`` is missing behind the token read last, and go on as if it had been there.
 
         Args:
             key: what is missing.
-            what: the pose in words.
-            code: of the diagnostic.
+            what: the position in words.
             advice: of the diagnostic.
             alone: whether nothing else is missing, so that putting it in is a cure.
         """
         gap = self.gap_span()
         # A word needs blanks around it; a sign goes where it is missing.
         fixes = (Fix(gap, f" {key}" if key[0].isalpha() else key),) if alone else ()
-        self.report_once(code, f"missing `{key}` {what}", gap, f"expected `{key}` here", advice=advice, fixes=fixes)
+        self.report_once("E112", f"missing `{key}` {what}", gap, f"expected `{key}` here", advice=advice, fixes=fixes)
+
+    def accept_semicolon(self, where: str, *, once: bool = True) -> bool:
+        """Read ``;``, or say that it is missing; return whether it stands there.
+
+        Args:
+            where: the position in words, such as ``after the import``.
+            once: whether to say so only if nothing has been reported at this position, nor to report more there.
+        """
+        if self.accept(";"):
+            return True
+        report = self.report_once if once else self.report
+        gap, advice = self.gap_span(), f"insert `;` after `{self.previous.text}`"
+        text = f"missing `;` {where}"
+        report("E104", text, gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
+        return False
 
     def expect(self, key: str, where: str, *, statement: bool = False) -> None:
         """Read ``key``; or say that it is missing, and go on as if it had been there.
 
         Args:
             key: a keyword or symbol.
-            where: the pose in words, such as ``after the name``.
+            where: the position in words, such as ``after the name``.
             statement: whether statements follow.
 
         Raises:
-            LostError: nothing that could stand behind ``key`` follows either.
+            PanicModeError: nothing that could stand behind ``key`` follows either.
         """
         if self.accept(key):
             return
         if self._is_misspelt(key):
-            self.report(
-                "E112", f"expected `{key}` {where}", self.current.span, f"expected `{key}`", advice=f"write `{key}`"
-            )
+            text, advice = f"expected `{key}` {where}", f"write `{key}`"
+            self.report("E112", text, self.current.span, f"expected `{key}`", advice=advice)
             self.take()
             return
-        closing = key in (")", "]")
-        ends = (
-            not closing and not statement and (self.is_at_end or self.matches(";", "END", *self.vocabulary.statements))
-        )
+        follows = statement or key in (")", "]")
+        ends = not follows and (self.is_at_end or self.matches(";", "END", *self.vocabulary.statements))
         # What a word stands in front of begins with no sign but a parenthesis.
         alone = not key[0].isalpha() or not (ends or (self.current.kind is _SYMBOL and self.current.key != "("))
         self.insert_missing(key, where, advice=f"insert `{key}` after `{self.previous.text}`", alone=alone)
@@ -366,6 +408,11 @@ class TokenStream:
 
 
 Rule: TypeAlias = Callable[[TokenStream], tree.Statement]
+
+
+def either(words: Sequence[str]) -> str:
+    """Return words as the choices of a message, such as ``SCALAR, TRANS or FRAME``."""
+    return f"{', '.join(words[:-1])} or {words[-1]}"
 
 
 def describe_token(token: Token) -> str:
