@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import chi2, mannwhitneyu
 
 from armwright.arrays import Array, Flags, positive
-from armwright.calibration.fitting import CHECKS, PRIOR_SIGMA_ANGLE, PRIOR_SIGMA_LENGTH, Calibration
+from armwright.calibration.fitting import CHECKS, PRIOR_SIGMA, Calibration
 from armwright.calibration.readings import Readings
 
 # Level of significance; the smallest number of outliers that is tested; and the largest part of outliers.
@@ -46,12 +46,12 @@ def find_contradictions(calibration: Calibration, measured: Readings, noise: flo
             f"{count} of {len(measured)} readings are outliers, so many that the residuals of the others do not "
             f"confirm the model: {CHECKS}"
         )
-    lengths = dict(zip(calibration.model.names, calibration.model.is_length, strict=True))
+    is_length = calibration.model.is_length[list(calibration.identifiability.fitted)]
+    limits = _MAX_SIGMAS * np.where(is_length, *PRIOR_SIGMA)
     impossible = [
-        f"{name} {value * 1e3:+.3g} {'mm' if lengths[name] else 'mrad'}"
-        for name, value in zip(calibration.names, calibration.values, strict=True)
-        if name.startswith("joint")
-        and abs(value) > _MAX_SIGMAS * (PRIOR_SIGMA_LENGTH if lengths[name] else PRIOR_SIGMA_ANGLE)
+        f"{name} {value * 1e3:+.3g} {'mm' if length else 'mrad'}"
+        for name, value, length, limit in zip(calibration.names, calibration.values, is_length, limits, strict=True)
+        if name.startswith("joint") and abs(value) > limit
     ]
     if impossible:
         yield f"{', '.join(impossible)}: larger than any manufacturing error of a link; {CHECKS}"

@@ -16,7 +16,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.writer import urdf_text
 from armwright.arrays import Array, ArrayLike
-from armwright.calibration.chain import Chain, Element, kinematic_chain
+from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.calibration.fitting import Calibration
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.spatial.euler import to_rpy
@@ -66,14 +66,11 @@ def corrected_tables(calibration: Calibration) -> dict[str, str]:
         InvalidValueError: an error model of a joint was fitted.
     """
     arm, tilts = _corrected_without_tilts(calibration), _tilts(calibration)
-    tables = {"hayati": _csv_table(arm.base, arm.joints, arm.tool, tilts)}
-    if not any(tilts):
-        rows, last = to_modified(arm.joints)
-        tables = {
-            "standard": _csv_table(arm.base, arm.joints, arm.tool),
-            "modified": _csv_table(arm.base, rows, last @ arm.tool),
-        }
-    return tables
+    if any(tilts):
+        return {"hayati": _csv_table(arm.base, arm.joints, arm.tool, tilts)}
+    rows, last = to_modified(arm.joints)
+    standard = _csv_table(arm.base, arm.joints, arm.tool)
+    return {"standard": standard, "modified": _csv_table(arm.base, rows, last @ arm.tool)}
 
 
 def position_covariance(arm: Arm, q: ArrayLike) -> Array:
@@ -135,17 +132,10 @@ def _error_pose(chain: Chain, by_name: dict[str, float], part: str) -> Array:
     X = np.eye(4)
     for element in chain.elements:
         if element.name.startswith(f"{part}."):
-            X = X @ _transform(element, by_name[element.name])
+            vector, zero = by_name[element.name] * np.eye(3)[element.axis], np.zeros(3)
+            moves = element.kind == "translation"
+            X = X @ homogeneous(rotation_from_vector(zero if moves else vector), vector if moves else zero)
     return X
-
-
-def _transform(element: Element, value: float) -> Array:
-    along = value * np.eye(3)[element.axis]
-    return (
-        homogeneous(np.eye(3), along)
-        if element.kind == "translation"
-        else homogeneous(rotation_from_vector(along), np.zeros(3))
-    )
 
 
 def _corrected_uncertainty(calibration: Calibration, corrected: Arm) -> Uncertainty:

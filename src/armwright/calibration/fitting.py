@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
+from typing import Any
 
 import attrs
 import numpy as np
@@ -22,8 +23,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.calibration.chain import Chain, JointErrorModel
 from armwright.calibration.identifiability import (
-    MAX_STANDARD_ERROR_ANGLE,
-    MAX_STANDARD_ERROR_LENGTH,
+    MAX_STANDARD_ERROR,
     FixedParameter,
     Identifiability,
     is_overdetermined,
@@ -51,13 +51,12 @@ _ROUNDS, _REWEIGHTINGS = 8, 30
 _NOISE_DECREASE = 0.9
 # Reweighting ends when no weight changes by more.
 _WEIGHT_TOLERANCE = 1e-3
-# A fit ends when its cost decreases by less than this part; its error is then far below the standard errors.
-_COST_TOLERANCE = 1e-11
-# A fit takes some ten evaluations; readings that make no sense could take minutes.
-_MAX_EVALUATIONS = 100
+# A fit ends when its cost decreases by less than a part of 1e-11; its error is then far below the standard errors. It
+# takes some ten evaluations; readings that make no sense could take minutes.
+_SOLVER_OPTIONS: dict[str, Any] = {"x_scale": "jac", "ftol": 1e-11, "xtol": 1e-11, "gtol": None, "max_nfev": 100}
 # Standard deviation of the prior of errors [m], [rad]. It binds errors that readings hardly identify: two such errors
 # can otherwise run away together. One whose standard error is a tenth of it is moved by a hundredth of that at most.
-PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE = 0.02, 0.05
+PRIOR_SIGMA = (0.02, 0.05)
 # Errors of joints have a twentieth of that: gears run true to an arc minute or a few.
 _JOINT_ERROR_FACTOR = 0.05
 # What may be wrong where an arm and its readings do not belong together.
@@ -218,9 +217,8 @@ def calibrate(
     if measured.q.shape[1] != arm.n:
         raise ShapeError(f"expected readings of {arm.n} joints, as {arm.name} has, got {measured.q.shape[1]}")
     model = initial_guess(arm, measured, base=base, joint_errors=joint_errors)
-    selected, errors, noise = _select_and_fit(
-        model, measured, *_candidate_errors(model, only, without), robust=robust, progress=progress
-    )
+    first, allowed = _candidate_errors(model, only, without)
+    selected, errors, noise = _select_and_fit(model, measured, first, allowed, robust=robust, progress=progress)
     if robust and selected.fitted:
         # Each outlier, though its weight is small, still pulls as hard as a usual reading, and many pull together.
         errors = _fit(model, measured, list(selected.fitted), errors, noise, robust=True, strict=True)
@@ -243,7 +241,7 @@ def _candidate_errors(
             raise UnknownNameError("error", word, [*names, *parts])
         return matches
 
-    setup = set(model.setup_indices)
+    setup = set(range(len(model.chain.names), len(names)))
     allowed = set(range(len(names))) if only is None else setup.union(*map(matching_errors, only))
     # An arm without parallel axes has no beta to leave out.
     parts = {part for name in names for part in (name, *name.split("."))}
@@ -261,7 +259,7 @@ def _select_and_fit(
     progress: Callable[[str], None] | None,
 ) -> tuple[Identifiability, Array, Noise]:
     """Return which errors are identifiable, the errors, and the noise, which depend on one another."""
-    max_standard_error = _by_error_type(model, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE)
+    largest = _by_error_type(model, *MAX_STANDARD_ERROR)
     errors, fitted = np.zeros(len(model.names)), tuple[int, ...]()
     rounds: list[tuple[Identifiability, Array, Noise]] = []
     # Before anything is fitted, the residuals do not estimate the noise.
@@ -269,22 +267,19 @@ def _select_and_fit(
     noise = before = Noise(*map(min, start, TYPICAL_NOISE))
     for _ in range(_ROUNDS):
         residuals = model.residuals(measured, errors)
-        J = residuals.jacobian * length_scales(residuals, noise)[:, None]
-        count = len(residuals.values)
+        J, count = residuals.jacobian * length_scales(residuals, noise)[:, None], len(residuals.values)
         # What is fitted already comes first: of two nearly collinear errors, one would displace the other and run away.
+        order = list(dict.fromkeys([*fitted, *first]))
         select = partial(
-            select_identifiable,
-            model.names,
-            J,
-            model.is_length,
-            noise.length,
-            first=list(dict.fromkeys([*fitted, *first])),
-            max_standard_error=max_standard_error,
+            select_identifiable, model.names, J, model.is_length, noise.length, first=order, max_standard_error=largest
         )
         selected = select(allowed=allowed)
         if fitted and not is_overdetermined(count, len(selected.fitted)):
             # The residuals of so few readings are next to nothing, and more errors seem identifiable than are.
-            selected = _restrict_to_fitted(selected, select(allowed=set(fitted)))
+            reason = "so few readings have no degree of freedom left to distinguish it from noise"
+            restricted = select(allowed=set(fitted))
+            new = (FixedParameter(model.names[i], reason, ()) for i in selected.fitted if i not in restricted.fitted)
+            selected = attrs.evolve(restricted, fixed=(*selected.fixed, *new))
         settled = all(now > _NOISE_DECREASE * then for now, then in zip(noise, before, strict=True))
         if selected.fitted == fitted and settled:
             rounds[-1:] = [(selected, errors, noise)]
@@ -308,13 +303,6 @@ def _select_and_fit(
     return best if best[2].length < _NOISE_DECREASE * noise.length else rounds[-1]
 
 
-def _restrict_to_fitted(selected: Identifiability, before: Identifiability) -> Identifiability:
-    """Return what was fitted before; whatever else seems identifiable is fixed."""
-    reason = "so few readings have no degree of freedom left to distinguish it from noise"
-    new = (FixedParameter(selected.names[i], reason, ()) for i in selected.fitted if i not in before.fitted)
-    return attrs.evolve(before, fixed=(*selected.fixed, *new))
-
-
 def _fit(
     model: MeasurementModel,
     measured: Readings,
@@ -332,7 +320,7 @@ def _fit(
     """
     errors = start.copy()
     errors[[i for i in range(len(errors)) if i not in fitted]] = 0.0
-    prior = noise.length * np.diag(1 / _prior_sigma(model)[fitted])
+    prior = noise.length * np.diag(1 / _by_error_type(model, *PRIOR_SIGMA)[fitted])
     scales = weights = length_scales(model.residuals(measured, errors), noise)
 
     # Residuals, weights and the Jacobian are asked for at the same errors, one after the other.
@@ -350,20 +338,10 @@ def _fit(
     for _ in range(_REWEIGHTINGS):
         if robust:
             weights = scales * robust_weights(residuals_at(errors[fitted].tobytes()), noise, strict=strict)
-        solution = least_squares(
-            cost_residuals,
-            errors[fitted].copy(),
-            cost_jacobian,
-            x_scale="jac",
-            ftol=_COST_TOLERANCE,
-            xtol=_COST_TOLERANCE,
-            gtol=None,
-            max_nfev=_MAX_EVALUATIONS,
-        )
-        errors[fitted] = solution.x
+        errors[fitted] = least_squares(cost_residuals, errors[fitted].copy(), cost_jacobian, **_SOLVER_OPTIONS).x
         if not robust:
             break
-        reweighted = scales * robust_weights(residuals_at(solution.x.tobytes()), noise, strict=strict)
+        reweighted = scales * robust_weights(residuals_at(errors[fitted].tobytes()), noise, strict=strict)
         if np.all(np.abs(reweighted - weights) <= _WEIGHT_TOLERANCE * scales):
             break
     return errors
@@ -379,7 +357,7 @@ def _with_covariance(
     fitted = list(selected.fitted)
     residuals = model.residuals(measured, errors)
     noise, outlying, degrees_of_freedom = noise_and_outliers(residuals, len(measured), len(fitted), robust=robust)
-    sigma, prior_sigma = standard_deviations(residuals, noise), _prior_sigma(model)[fitted]
+    sigma, prior_sigma = standard_deviations(residuals, noise), _by_error_type(model, *PRIOR_SIGMA)[fitted]
     counted = ~outlying[residuals.reading]
     A = residuals.jacobian[counted][:, fitted] / sigma[counted, None] * prior_sigma
     covariance = np.linalg.inv(A.T @ A + np.eye(len(fitted))) * np.outer(prior_sigma, prior_sigma)
@@ -394,11 +372,6 @@ def _with_covariance(
         degrees_of_freedom=degrees_of_freedom,
         outliers=tuple(np.flatnonzero(outlying).tolist()),
     )
-
-
-def _prior_sigma(model: MeasurementModel) -> Array:
-    """Return (k,) the standard deviations of the prior of all errors [m], [rad]."""
-    return _by_error_type(model, PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE)
 
 
 def _by_error_type(model: MeasurementModel, length: float, angle: float) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from armwright.arrays import Array
 
 # An error is fitted where its standard error would be below this [m], [rad].
-MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE = 2e-3, 5e-3
+MAX_STANDARD_ERROR = (2e-3, 5e-3)
 # A column of which a smaller part is independent of the others is collinear with them but for rounding.
 _ROUNDING = 1e-9
 # How many collinear errors are named, and from what share on.
@@ -78,7 +78,7 @@ def select_identifiable(
         max_standard_error: (k,) with which an error is fitted [m], [rad]; 2 mm or 5 mrad when left out.
     """
     if max_standard_error is None:
-        max_standard_error = np.where(is_length, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE)
+        max_standard_error = np.where(is_length, *MAX_STANDARD_ERROR)
     # R of a QR decomposition has the same lengths and angles between columns, and few rows.
     A: Array = np.asarray(np.linalg.qr(jacobian * max_standard_error, mode="r"), dtype=np.float64)
     basis: list[Array] = []

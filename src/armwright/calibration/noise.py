@@ -89,9 +89,8 @@ def noise_and_outliers(residuals: Residuals, readings: int, fitted: int, *, robu
     for _ in range(2):
         degrees_of_freedom = max(1, int(counted.sum()) - fitted)
         correction = float(np.sqrt(counted.sum() / degrees_of_freedom))
-        noise = _estimate_noise(
-            residuals, counted, degrees_of_freedom, partial(_trimmed_scale, correction=correction, robust=robust)
-        )
+        scale = partial(_trimmed_scale, correction=correction, robust=robust)
+        noise = _estimate_noise(residuals, counted, degrees_of_freedom, scale)
         if robust:
             scaled = residuals.values / standard_deviations(residuals, noise)
             outlying = _is_outlier(*_squares_by_reading(residuals.reading, scaled))
@@ -109,20 +108,15 @@ def _estimate_noise(
     if degrees_of_freedom < _MIN_DEGREES_OF_FREEDOM:
         scaled = residuals.values / standard_deviations(residuals, TYPICAL_NOISE)
         common = scale(residuals.reading[counted], scaled[counted])
-        return Noise(*(max(common * typical, least) for typical, least in zip(TYPICAL_NOISE, LEAST_NOISE, strict=True)))
+        return Noise(*map(max, (common * typical for typical in TYPICAL_NOISE), LEAST_NOISE))
     kinds = (~residuals.is_rotation & counted, residuals.is_rotation & counted)
-    return Noise(
-        *(
-            max(scale(residuals.reading[kind], residuals.values[kind]), least)
-            for kind, least in zip(kinds, LEAST_NOISE, strict=True)
-        )
-    )
+    scales = (scale(residuals.reading[kind], residuals.values[kind]) for kind in kinds)
+    return Noise(*map(max, scales, LEAST_NOISE))
 
 
 def _squares_by_reading(reading: Numbers, values: Array) -> tuple[Array, Array]:
     """Return by reading the sum of its squared residuals, and how many they are; 0 for readings without any."""
-    square, size = np.bincount(reading, values**2), np.bincount(reading)
-    return np.asarray(square, dtype=np.float64), np.asarray(size, dtype=np.float64)
+    return np.bincount(reading, values**2).astype(np.float64), np.bincount(reading).astype(np.float64)
 
 
 def _chi2_limit(size: Array) -> Array:
@@ -144,7 +138,8 @@ def _trimmed_scale(reading: Numbers, values: Array, *, correction: float, robust
         return 0.0
     if not robust:
         return float(np.sqrt(np.mean(values**2))) * correction
-    square, size = _squares_and_sizes(reading, values)
+    square, size = _squares_by_reading(reading, values)
+    square, size = square[size > 0], size[size > 0]
     limit = _chi2_limit(size)
     near = square <= limit * (_median_scale(reading, values) * correction) ** 2
     # The tail that is cut off a normal distribution would have made the mean larger.
@@ -155,11 +150,6 @@ def _trimmed_scale(reading: Numbers, values: Array, *, correction: float, robust
 
 def _median_scale(reading: Numbers, values: Array) -> float:
     """Return the standard deviation about 0 of the median reading, which outliers do not move."""
-    square, size = _squares_and_sizes(reading, values)
-    return float(np.sqrt(np.median(square / chi2.ppf(0.5, size)))) if len(size) else 0.0
-
-
-def _squares_and_sizes(reading: Numbers, values: Array) -> tuple[Array, Array]:
-    """Return squares and sizes of those readings that have residuals at all."""
     square, size = _squares_by_reading(reading, values)
-    return square[size > 0], size[size > 0]
+    measured = size > 0
+    return float(np.sqrt(np.median(square[measured] / chi2.ppf(0.5, size[measured])))) if measured.any() else 0.0

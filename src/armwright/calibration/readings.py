@@ -26,10 +26,6 @@ Numbers: TypeAlias = npt.NDArray[np.intp]
 _ROTATION_TOLERANCE = 1e-3
 
 
-def _nan_array(m: int, *shape: int) -> Array:
-    return np.full((m, *shape), np.nan)
-
-
 def _nan_or_read_only(array: Array) -> Array:
     """Return a read-only copy; an array of nothing but NaN shares a single NaN in memory."""
     return np.broadcast_to(np.nan, array.shape) if np.isnan(array).all() else read_only(array)
@@ -111,27 +107,27 @@ def readings(
     """
     configurations = np.atleast_2d(floats(q, "q"))
     m, n = configurations.shape
-    positions, rotations = _nan_array(m, 3), _nan_array(m, 3, 3)
+    positions, rotations = np.full((m, 3), np.nan), np.full((m, 3, 3), np.nan)
+    lengths, others = np.full(m, np.nan), np.full((m, n), np.nan)
     if points is not None:
         measured = floats(points, "points")
         measured = measured[None] if measured.shape in {(3,), (4, 4)} else measured
-        if measured.shape == (m, 4, 4):
-            positions, rotations = measured[:, :3, 3], measured[:, :3, :3]
+        if measured.shape not in {(m, 3), (m, 4, 4)}:
+            expected = f"({m}, 3) points or ({m}, 4, 4) poses for as many q"
+            raise ShapeError(f"points: expected {expected}, got {measured.shape}")
+        positions = measured[:, :3, 3] if measured.ndim == 3 else measured
+        if measured.ndim == 3:
             _check_poses(measured)
-        elif measured.shape == (m, 3):
-            positions = measured
-        else:
-            raise ShapeError(
-                f"points: expected ({m}, 3) points or ({m}, 4, 4) poses for as many q, got {measured.shape}"
-            )
-    lengths = _nan_array(m) if distances is None else exact_shape(distances, (m,), "distances")
+            rotations = measured[:, :3, :3]
     if points is None and plane is None and distances is None:
         raise InvalidValueError("expected points, poses, planes or distances, got none of them")
-    if (distances is not None) != ((anchor is not None) or (other is not None)) or None not in (anchor, other):
-        raise InvalidValueError(
-            "distances: expected an anchor or another configuration for each, and distances for these"
-        )
-    others = _nan_array(m, n) if other is None else exact_shape(np.atleast_2d(floats(other, "other")), (m, n), "other")
+    if (distances is None) != (anchor is None and other is None) or None not in (anchor, other):
+        expected = "an anchor or another configuration for each, and distances for these"
+        raise InvalidValueError(f"distances: expected {expected}")
+    if distances is not None:
+        lengths = exact_shape(distances, (m,), "distances")
+    if other is not None:
+        others = exact_shape(np.atleast_2d(floats(other, "other")), (m, n), "other")
     frames = [""] * m if frame is None and points is not None else _label_list(frame, m, "frame")
     labels = number_labels(frame=frames, plane=_label_list(plane, m, "plane"), anchor=_label_list(anchor, m, "anchor"))
     return Readings(q=configurations, points=positions, rotations=rotations, distances=lengths, other=others, **labels)
@@ -153,10 +149,9 @@ def concatenate(*parts: Readings) -> Readings:
     Raises:
         ShapeError: they are of arms with different numbers of joints.
     """
-    if len({part.q.shape[1] for part in parts}) != 1:
-        raise ShapeError(
-            f"readings of arms with {sorted({part.q.shape[1] for part in parts})} joints are not of one arm"
-        )
+    joints = sorted({part.q.shape[1] for part in parts})
+    if len(joints) != 1:
+        raise ShapeError(f"readings of arms with {joints} joints are not of one arm")
     columns: dict[str, Any] = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _MEASURED}
     for key in _LABELS:
         names = tuple(dict.fromkeys(name for part in parts for name in getattr(part, f"{key}s")))
@@ -181,15 +176,13 @@ def refuse_unlocated(fitted: Readings, others: Readings) -> None:
             )
 
 
-def _check_poses(given: Array) -> None:
+def _check_poses(poses: Array) -> None:
     """Refuse matrices (m, 4, 4) that are no poses: a rotation that is mirrored, scaled, or not one at all."""
-    error = orthonormality_error(given[:, :3, :3]) + np.abs(given[:, 3] - (0, 0, 0, 1)).max(axis=1)
+    error = orthonormality_error(poses[:, :3, :3]) + np.abs(poses[:, 3] - (0, 0, 0, 1)).max(axis=1)
     worst = int(np.argmax(error)) if len(error) else 0
     if len(error) and error[worst] > _ROTATION_TOLERANCE:
-        raise InvalidValueError(
-            f"points: expected a rotation, a position and the row 0 0 0 1 in every pose, got {given[worst].tolist()} "
-            f"as number {worst + 1}"
-        )
+        got = f"{poses[worst].tolist()} as number {worst + 1}"
+        raise InvalidValueError(f"points: expected a rotation, a position and the row 0 0 0 1 in every pose, got {got}")
 
 
 def _label_list(names: ArrayLike | None, m: int, what: str) -> list[str | None]:

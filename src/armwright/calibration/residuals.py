@@ -95,11 +95,6 @@ class MeasurementModel:
         setup = [not name.rpartition(".")[2].startswith("r") for name in self.names[len(self.chain.names) :]]
         return np.array([*self.chain.is_length, *setup], dtype=np.bool_)
 
-    @property
-    def setup_indices(self) -> range:
-        """Numbers of the errors that belong to the setup, not to the arm."""
-        return range(len(self.chain.names), len(self.names))
-
     def residuals(self, readings: Readings, errors: ArrayLike | None = None) -> Residuals:
         """Return the residuals of readings and their Jacobian.
 
