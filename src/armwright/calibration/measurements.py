@@ -100,9 +100,8 @@ def read_measurements(
             The text has file, line and column.
         UnknownNameError: there are no such ``units``.
     """
-    header, position, orientation = read_columns(
-        path, arm, columns=columns, units=default_units(*units) if units else {}
-    )
+    default = default_units(*units) if units else {}
+    header, position, orientation = read_columns(path, arm, columns=columns, units=default)
     joints = joint_columns(arm)
     table = header.rows(
         filled=[*joints, *header.columns_present(["set"])],
@@ -117,7 +116,7 @@ def read_measurements(
         readings=readings,
         names=_names(table),
         check=_check_flags(table),
-        warnings=_warnings(arm, readings, table.lines, headings),
+        warnings=tuple(_warnings(arm, readings, table.lines, headings)),
     )
 
 
@@ -225,52 +224,43 @@ def _refuse_other_units(table: UnitTable, arm: Arm, q: Array, headings: Sequence
     """Refuse joint positions that look as if they were in another unit."""
     for i, (joint, heading) in enumerate(zip(arm.joints, headings, strict=True)):
         worst = int(np.argmax(np.abs(q[:, i])))
-        if joint.revolute:
-            alone = np.zeros(arm.n)
-            alone[i] = q[worst, i]
-            mistake = degrees_by_mistake(arm, alone) if heading.unit == "rad" else ""
-            if mistake:
-                raise table.error(worst, heading.column.name, f"{mistake}; are the units right?")
-            continue
-        lower, upper = joint.limits.lower, joint.limits.upper
-        if math.isfinite(upper - lower) and max(q[worst, i] - upper, lower - q[worst, i]) > _MAX_LIMIT_EXCESS * (
-            upper - lower
-        ):
-            raise table.error(
-                worst,
-                heading.column.name,
-                f"{arm.called(i)} of {arm.name} is at {q[worst, i]:.4g} m, and its limits are {lower:.4g} to "
-                f"{upper:.4g} m; are the units right?",
-            )
+        position, lower, upper = q[worst, i], joint.limits.lower, joint.limits.upper
+        mistake = ""
+        if joint.revolute and heading.unit == "rad":
+            mistake = degrees_by_mistake(arm, np.where(np.arange(arm.n) == i, position, 0.0))
+        elif not joint.revolute and max(position - upper, lower - position) > _MAX_LIMIT_EXCESS * (upper - lower):
+            limits = f"{lower:.4g} to {upper:.4g} m"
+            mistake = f"{arm.called(i)} of {arm.name} is at {position:.4g} m, and its limits are {limits}"
+        if mistake:
+            raise table.error(worst, heading.column.name, f"{mistake}; are the units right?")
 
 
-def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequence[Heading]) -> tuple[str, ...]:
-    """Return warnings of unusual readings."""
-    texts, q = [], readings.q
+def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequence[Heading]) -> Iterator[str]:
+    """Give warnings of unusual readings."""
+    q = readings.q
     for i, (joint, heading) in enumerate(zip(arm.joints, headings, strict=True)):
         scale, unit = heading.scale, heading.unit
         if len(q) > 1 and np.ptp(q[:, i]) < _MIN_MOTION:
-            texts.append(
+            yield (
                 f"{arm.called(i)} never moved: it is at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. Its errors "
                 f"cannot be distinguished from those of its neighbours"
             )
         beyond = (q[:, i] < joint.limits.lower - _MIN_MOTION) | (q[:, i] > joint.limits.upper + _MIN_MOTION)
         if beyond.any():
-            texts.append(
+            yield (
                 f"{arm.called(i)} is beyond its limits of {joint.limits.lower / scale:.6g} to "
                 f"{joint.limits.upper / scale:.6g} {unit} in {_lines_of_rows(np.flatnonzero(beyond).tolist(), lines)}"
             )
-    turning = [i for i, joint in enumerate(arm.joints) if joint.revolute]
-    if turning and all(headings[i].unit == "deg" for i in turning) and len(q) > 1:
-        largest = float(np.degrees(np.abs(q[:, turning]).max()))
+    revolute = [i for i, joint in enumerate(arm.joints) if joint.revolute]
+    if revolute and all(headings[i].unit == "deg" for i in revolute) and len(q) > 1:
+        largest = float(np.degrees(np.abs(q[:, revolute]).max()))
         if largest < _MAX_RADIANS:
-            texts.append(f"no joint is farther than {largest:.3g} degrees from 0; are these radians?")
-    texts.extend(_duplicate_warnings(readings, lines))
-    return tuple(texts)
+            yield f"no joint is farther than {largest:.3g} degrees from 0; are these radians?"
+    yield from _duplicate_warnings(readings, lines)
 
 
-def _duplicate_warnings(readings: Readings, lines: Sequence[int]) -> list[str]:
-    """Return a warning of rows that are equal to the last digit, which independent measurements never are."""
+def _duplicate_warnings(readings: Readings, lines: Sequence[int]) -> Iterator[str]:
+    """Give a warning of rows that are equal to the last digit, which independent measurements never are."""
     quantities = [readings.q, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
 
     def row_bytes(rows: slice) -> list[bytes]:
@@ -279,23 +269,15 @@ def _duplicate_warnings(readings: Readings, lines: Sequence[int]) -> list[str]:
     # Whole rows are compared where their hashes agree alone: those of a million rows take little room.
     blocks = (slice(start, start + _BLOCK_ROWS) for start in range(0, len(readings), _BLOCK_ROWS))
     hashes = np.fromiter((hash(row) for rows in blocks for row in row_bytes(rows)), dtype=np.int64, count=len(readings))
-    _, place, count = np.unique(hashes, return_inverse=True, return_counts=True)
+    _, which, count = np.unique(hashes, return_inverse=True, return_counts=True)
     first: dict[bytes, int] = {}
-    copies: list[int] = []
-    originals: list[int] = []
-    for i in np.flatnonzero(count[place] > 1).tolist():
-        original = first.setdefault(row_bytes(slice(i, i + 1))[0], i)
-        if original != i:
-            copies.append(i)
-            originals.append(original)
-    if not copies:
-        return []
-    return [
-        (
-            f"{_lines_of_rows(copies, lines)} {'equals' if len(copies) == 1 else 'equal'} "
-            f"{_lines_of_rows(originals, lines)} to the last digit: a copied row adds weight, but no information"
-        )
-    ]
+    alike = np.flatnonzero(count[which] > 1).tolist()
+    originals = {i: first.setdefault(row_bytes(slice(i, i + 1))[0], i) for i in alike}
+    copies = {i: original for i, original in originals.items() if original != i}
+    if copies:
+        equal = f"{'equals' if len(copies) == 1 else 'equal'} {_lines_of_rows([*copies.values()], lines)}"
+        reason = "a copied row adds weight, but no information"
+        yield f"{_lines_of_rows([*copies], lines)} {equal} to the last digit: {reason}"
 
 
 def _lines_of_rows(numbers: Sequence[int], lines: Sequence[int]) -> str:
