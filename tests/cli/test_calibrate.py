@@ -95,7 +95,7 @@ def test_json(measured: Path) -> None:
         (("calibrate", ARM, "MEASURED", "--seed", "-1"), 2, "greater than or equal to 0"),
         (("plan-poses", ARM, "--seed", "-1"), 2, "greater than or equal to 0"),
         (("plan-poses", ARM, "-n", "4"), 2, "poses or more, got 4"),
-        (("plan-poses", ARM, "--index", "O7"), 2, "no index 'O7'"),
+        (("plan-poses", ARM, "--index", "O7"), 2, "'O7' is not one of 'O1', 'O2', 'O3', 'O4', 'O5'"),
     ],
 )
 def test_mistakes(measured: Path, arguments: tuple[str, ...], status: int, says: str) -> None:

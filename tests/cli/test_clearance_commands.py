@@ -233,7 +233,7 @@ def test_estimates_that_are_none(text: str, tmp_path: Path) -> None:
 MISTAKES = [
     (("sweep", "five-bar", "--paths", "y15"), "no test path 'y15'. Did you mean 'y1'?"),
     (("sweep", "five-bar", "--paths", "pick-and-place"), "no test path 'pick-and-place'"),
-    (("sweep", "five-bar", "--design", "lsh"), "no design 'lsh'. Did you mean 'lhs'?"),
+    (("sweep", "five-bar", "--design", "lsh"), "'lsh' is not one of 'factorial', 'lhs', 'sobol'"),
     (("sweep", "five-bar", "--design", "factorial", "--levels", "1"), "levels: expected an integer of at least"),
     (("sweep", "five-bar", "--design", "factorial", "--from-mm", "0"), "contact needs them above 0, got 0 mm"),
     (("sweep", "five-bar", "-n", "100"), "a Sobol design needs a power of two of points, got 100"),

@@ -11,7 +11,7 @@ from armwright.cli.options import ArmName, Json, OutputFolder, Quiet
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import warn_of_stray, write_results
-from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
+from armwright.cli.tables import ColumnMap, SkipIncomplete, Units, columns_of
 from armwright.cli.tool_options import MeasuredPoint, with_tool
 from armwright.errors import DoubtfulError
 
@@ -19,7 +19,7 @@ from armwright.errors import DoubtfulError
 def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
     measured: Annotated[Path, typer.Argument(help="CSV of joint positions and measured points (docs/calibration.md).")],
-    units: Annotated[str | None, typer.Option(help="Units of a file whose header has none, as in mm,deg.")] = None,
+    units: Units = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,

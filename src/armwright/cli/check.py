@@ -1,17 +1,16 @@
 """``armwright check``: the diagnostics of programs, and the stages of their compilation."""
 
-import enum
 import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import typer
 
 from armwright.cli.options import Json
 from armwright.cli.output import print_json
-from armwright.cli.programs import Std, Strict
+from armwright.cli.programs import CheckedCell, Std, Strict
 from armwright.errors import ExitStatus, FileFormatError
 from armwright.program.language.words import Standard
 
@@ -22,38 +21,23 @@ if TYPE_CHECKING:
 _SUFFIX = ".rlo"
 
 
-class Emit(enum.StrEnum):
-    """A stage of the compilation that can be printed."""
-
-    CODE = "code"
-    TREE = "tree"
-    TOKENS = "tokens"
-
-
-class Format(enum.StrEnum):
-    """How diagnostics are printed."""
-
-    TEXT = "text"
-    JSON = "json"
-    SARIF = "sarif"
+# The stages of the compilation that can be printed.
+Stage: TypeAlias = Literal["code", "tree", "tokens"]
 
 
 def check(  # noqa: PLR0917 - Typer reads one parameter per option
     programs: Annotated[
         list[Path], typer.Argument(help="Programs in RLO, or folders; all files *.rlo of a folder are checked.")
     ],
-    cell: Annotated[
-        Path | None,
-        typer.Option(
-            "--cell", help="Cell in which the programs will run; frames, arms and devices are then checked too."
-        ),
-    ] = None,
+    cell: CheckedCell = None,
     emit: Annotated[
-        Emit | None, typer.Option(help="Stage of the compilation to print; diagnostics then go to the error output.")
+        Stage | None, typer.Option(help="Stage of the compilation to print; diagnostics then go to the error output.")
     ] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
-    output_format: Annotated[Format, typer.Option("--format", help="How to print diagnostics.")] = Format.TEXT,
+    output_format: Annotated[
+        Literal["text", "json", "sarif"], typer.Option("--format", help="How to print diagnostics.")
+    ] = "text",
     as_json: Json = False,
 ) -> None:
     """Check RLO programs without running them.
@@ -67,10 +51,10 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
 
     paths, option_cell = _program_files(programs), read_cell_option(cell)
     compilations = [compile_program(path, option_cell, strict=strict, std=std) for path in paths]
-    if as_json or output_format is Format.JSON:
+    if as_json or output_format == "json":
         results = [_as_data(compilation, emit) for compilation in compilations]
         print_json(results[0] if len(results) == 1 else _combine_data(results, paths))
-    elif output_format is Format.SARIF:
+    elif output_format == "sarif":
         from armwright.program.diagnostics.sarif import to_sarif
 
         pairs = zip(compilations, paths, strict=True)
@@ -113,7 +97,7 @@ def _programs_below(folder: Path) -> list[Path]:
     return sorted(path for path in files if path.suffix == _SUFFIX and path.is_file())
 
 
-def _print(compilation: "Compilation", emit: Emit | None) -> None:
+def _print(compilation: "Compilation", emit: Stage | None) -> None:
     from armwright.cli.programs import print_diagnostics
 
     for line in _stage_lines(compilation, emit) if emit else ():
@@ -141,15 +125,15 @@ def _combine_data(results: list[dict[str, Any]], paths: list[Path]) -> dict[str,
     }
 
 
-def _stage_lines(compilation: "Compilation", emit: Emit) -> Iterator[str]:
+def _stage_lines(compilation: "Compilation", emit: Stage) -> Iterator[str]:
     """Return a stage of the compilation as lines; a program with errors has no lines of code."""
     from armwright.program.bytecode.instructions import listing
     from armwright.program.syntax.tree import dump
 
     source = compilation.source
-    if emit is Emit.CODE:
+    if emit == "code":
         yield from listing(compilation.code).splitlines() if compilation.code else ()
-    elif emit is Emit.TREE:
+    elif emit == "tree":
         yield from dump(compilation.tree)
     else:
         for token in compilation.tokens:
@@ -157,12 +141,12 @@ def _stage_lines(compilation: "Compilation", emit: Emit) -> Iterator[str]:
             yield f"{location:>8}  {token.kind.value:<11}  {token.text}".rstrip()
 
 
-def _as_data(compilation: "Compilation", emit: Emit | None) -> dict[str, Any]:
+def _as_data(compilation: "Compilation", emit: Stage | None) -> dict[str, Any]:
     from armwright.cli.programs import diagnostics_data
     from armwright.program.bytecode.instructions import shown_operands
 
     data = diagnostics_data(compilation)
-    if emit is Emit.CODE and compilation.code:
+    if emit == "code" and compilation.code:
         code = compilation.code
         data["constants"] = list(code.constants)
         data["code"] = [
@@ -175,5 +159,5 @@ def _as_data(compilation: "Compilation", emit: Emit | None) -> dict[str, Any]:
             for step in code.instructions
         ]
     elif emit:
-        data[emit.value] = list(_stage_lines(compilation, emit))
+        data[emit] = list(_stage_lines(compilation, emit))
     return data

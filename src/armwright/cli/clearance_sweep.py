@@ -1,7 +1,7 @@
 """``armwright clearance sweep``: error-curve features of a linkage at many clearances, stored in a folder."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -9,7 +9,6 @@ from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, set
 from armwright.cli.options import Json, Quiet
 from armwright.cli.output import print_result
 from armwright.cli.progress import sweep_bar, waiting
-from armwright.cli.shell_completion import one_of
 
 if TYPE_CHECKING:
     from armwright.clearance.feature_sweep import FeatureSweep
@@ -21,11 +20,8 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the sweep; it must hold nothing else.")],
     paths: Annotated[str, typer.Option(help="Test paths, separated by commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
     design: Annotated[
-        str,
-        typer.Option(
-            help="Design of the experiment: factorial, lhs (Latin hypercube) or sobol.",
-            autocompletion=one_of("factorial", "lhs", "sobol"),
-        ),
+        Literal["factorial", "lhs", "sobol"],
+        typer.Option(help="Design of the experiment: factorial, lhs (Latin hypercube) or sobol."),
     ] = "sobol",
     from_mm: Annotated[float, typer.Option(help="Smallest radial clearance in mm.")] = 0.1,
     to_mm: Annotated[float, typer.Option(help="Largest radial clearance in mm.")] = 0.5,
@@ -112,10 +108,8 @@ def _plan(
     import numpy as np
 
     from armwright.arrays import integer
-    from armwright.errors import one_of
     from armwright.sweep.designs import full_factorial, latin_hypercube, sobol
 
-    one_of("design", design, ("factorial", "lhs", "sobol"))
     integer(levels, "levels", least=2)
     bounds = dict.fromkeys(task.parameters, clearances)
     units = dict.fromkeys(task.parameters, "m")

@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.failures import failure_data
 from armwright.cli.options import Json
-from armwright.cli.output import print_json
-from armwright.cli.programs import ProgramFiles, Std
-from armwright.errors import ArmwrightError, ExitStatus, counted
+from armwright.cli.programs import CheckedCell, ProgramFiles, Std
+from armwright.errors import counted
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
@@ -20,10 +18,7 @@ if TYPE_CHECKING:
 
 def fix(
     programs: ProgramFiles,
-    cell: Annotated[
-        Path | None,
-        typer.Option("--cell", help="Cell in which the programs will run; remaining errors are checked against it."),
-    ] = None,
+    cell: CheckedCell = None,
     diff: Annotated[
         bool, typer.Option("--diff", "--dry-run", help="Write nothing; print the changes and the remaining errors.")
     ] = False,
@@ -40,39 +35,32 @@ def fix(
     **Example:** `armwright fix examples/bench.rlo --diff`
     """
     from armwright.cli.programs import read_cell_option
-    from armwright.cli.source_files import is_stream, print_difference, read_source, write_back
+    from armwright.cli.source_files import is_stream, print_difference, read_source, rewrite_all, write_back
     from armwright.cli.terminal import print_verbatim
     from armwright.program import compile as compile_program
     from armwright.program.api import import_reader
     from armwright.program.diagnostics.fixes import apply_fixes
 
     option_cell = read_cell_option(cell)
-    rows: list[dict[str, Any]] = []
-    for path in programs:
-        printed = is_stream(path)
-        try:
-            source = read_source(path)
-            read = import_reader(path.parent)
-            result = apply_fixes(source, partial(compile_program, cell=option_cell, std=std, read_import=read))
-            if result.applied and not (diff or printed):
-                write_back(source, path, result.text)
-        except ArmwrightError as error:
-            rows.append({"program": str(path), "errors": 1, **failure_data(error.exit_status, error, str(error))})
-            if not as_json:
-                print(f"armwright: {error}", file=sys.stderr)
-            continue
-        rows.append(_as_data(result) | ({"text": result.text} if printed else {}))
+
+    def rewrite(path: Path, row: dict[str, Any]) -> None:
+        # An unreadable file counts as one error.
+        row["errors"] = 1
+        source, printed = read_source(path), is_stream(path)
+        read = import_reader(path.parent)
+        result = apply_fixes(source, partial(compile_program, cell=option_cell, std=std, read_import=read))
+        if result.applied and not (diff or printed):
+            write_back(source, path, result.text)
+        row |= _as_data(result) | ({"text": result.text} if printed else {})
         if as_json:
-            continue
+            return
         if diff and result.applied:
             print_difference(source, result.text)
         elif printed and not diff:
             print_verbatim(result.text)
         _print(result, verb="could be corrected" if diff else "corrected", to_errors=printed and not diff)
-    if as_json:
-        print_json(rows)
-    if any(row["exit_status"] for row in rows):
-        raise typer.Exit(max(row["exit_status"] for row in rows))
+
+    rewrite_all(programs, rewrite, as_json=as_json)
 
 
 def _print(result: "FixResult", *, verb: str, to_errors: bool) -> None:
@@ -95,6 +83,4 @@ def _as_data(result: "FixResult") -> dict[str, Any]:
     from armwright.program.language.diagnostic import to_json
 
     cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.description} for cure in result.applied]
-    data = diagnostics_data(result.compilation)
-    status = ExitStatus.PROGRAM_ERRORS if data["errors"] else ExitStatus.DONE
-    return {**data, "exit_status": status, "cures": cures}
+    return {**diagnostics_data(result.compilation), "cures": cures}

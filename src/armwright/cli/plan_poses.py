@@ -1,15 +1,14 @@
 """``armwright plan-poses``: propose configurations at which an arm should be measured."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from armwright.cli.numbers import units_of
 from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_result
-from armwright.cli.shell_completion import one_of
-from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
+from armwright.cli.tables import ColumnMap, SkipIncomplete, Units, columns_of
 from armwright.cli.tool_options import MeasuredPoint, with_tool
 
 if TYPE_CHECKING:
@@ -21,20 +20,15 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
     count: Annotated[int, typer.Option("-n", "--count", help="Number of poses.")] = 30,
     index: Annotated[
-        str,
-        typer.Option(
-            help="Observability index to maximize: O1 to O5 (docs/calibration.md).",
-            autocompletion=one_of("O1", "O2", "O3", "O4", "O5"),
-        ),
+        Literal["O1", "O2", "O3", "O4", "O5"],
+        typer.Option(help="Observability index to maximize: O1 to O5 (docs/calibration.md)."),
     ] = "O1",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the candidates.")] = 0,
     orientations: Annotated[
         bool, typer.Option("--orientations", help="Orientations are measured too, not positions alone.")
     ] = False,
     after: Annotated[Path | None, typer.Option(help="CSV of measurements to which the poses are added.")] = None,
-    units: Annotated[
-        str | None, typer.Option(help="Units of that file where its header has none, as in mm,deg.")
-    ] = None,
+    units: Units = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,
@@ -64,7 +58,7 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
         measured = read_measurements(
             after, model, units=units_of(units), columns=columns_of(columns), skip_incomplete=skip_incomplete
         ).q
-    plan = planned(model, count, index=index, seed=seed, rotations=orientations, measured=measured)  # type: ignore[arg-type]
+    plan = planned(model, count, index=index, seed=seed, rotations=orientations, measured=measured)
     if output is not None:
         write_file(output, _csv(model, plan))
     print_result(plan, as_json=as_json)

@@ -24,6 +24,10 @@ CellFile: TypeAlias = Annotated[
         "--cell", help="Cell in which the program runs, TOML or JSON; the default is what the program IMPORTs."
     ),
 ]
+CheckedCell: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--cell", help="Cell in which the programs will run; frames, arms and devices are then checked too."),
+]
 Std: TypeAlias = Annotated[
     Standard, typer.Option(help="Version of the language: RLO-2, or only the RLO-83 of the report.")
 ]

@@ -54,11 +54,6 @@ def install(shell: Shell) -> Path:
 # ---- completions ---------------------------------------------------------------------------------------------------
 
 
-def one_of(*words: str) -> Complete:
-    """Return a function that completes a word of a list."""
-    return lambda incomplete: _beginning(words, incomplete)
-
-
 def listed_in(module: str, name: str, *, or_file: bool = False) -> Complete:
     """Return a function that completes a word of a list, whose module is imported only then.
 

@@ -1,26 +1,32 @@
 """Reading programs, printing differences and writing programs back, for the commands that change them."""
 
+import difflib
+import sys
+from codecs import BOM_UTF8
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from armwright.program.language.source import Source
+import typer
+
+from armwright.cli.failures import outcome
+from armwright.cli.output import print_json
+from armwright.cli.terminal import console
+from armwright.errors import ArmwrightError, ExitStatus, OutputError
+from armwright.files.inputs import decode, read_bytes, read_program, read_typed_program
+from armwright.files.output import descriptor, write_file
+from armwright.program.language.source import Source
 
 # The path that denotes the standard input.
 INPUT = Path("-")
 
 
-def read_source(path: Path) -> "Source":
+def read_source(path: Path) -> Source:
     """Read a program, from the standard input for ``-``.
 
     Raises:
         FileFormatError: the program cannot be read, is larger than the limit, or is not UTF-8 text.
     """
-    import sys
-
-    from armwright.files.inputs import read_program, read_typed_program
-    from armwright.program.language.source import Source
-
     if path == INPUT:
         return Source("standard input", read_typed_program(sys.stdin.buffer))
     return Source(str(path), read_program(path))
@@ -28,30 +34,49 @@ def read_source(path: Path) -> "Source":
 
 def is_stream(path: Path) -> bool:
     """Whether a program comes from the standard input, a pipe or a device, so that its new text is printed."""
-    from armwright.files.output import descriptor
-
     return path == INPUT or descriptor(path) is not None or (path.exists() and not path.is_file())
 
 
-def print_difference(source: "Source", after: str) -> None:
+def rewrite_all(programs: Iterable[Path], rewrite: Callable[[Path, dict[str, Any]], None], *, as_json: bool) -> None:
+    """Rewrite programs one by one; a failure is reported, and does not keep the next ones from being rewritten.
+
+    Args:
+        programs: paths of the programs.
+        rewrite: rewrites the program at a path, and adds its results to a row of the JSON document.
+        as_json: whether the rows are printed as JSON.
+
+    Raises:
+        Exit: the exit status of a program is not 0; it has the highest of all.
+    """
+    rows: list[dict[str, Any]] = []
+    for path in programs:
+        row: dict[str, Any] = {"program": str(path), "exit_status": ExitStatus.DONE}
+        rows.append(row)
+        try:
+            rewrite(path, row)
+        except ArmwrightError as error:
+            row |= outcome(error)
+            if not as_json:
+                print(f"armwright: {error}", file=sys.stderr)
+    if as_json:
+        print_json(rows)
+    if status := max(row["exit_status"] for row in rows):
+        raise typer.Exit(status)
+
+
+def print_difference(source: Source, after: str) -> None:
     """Print the changes of a program as ``diff -u`` does, in colour on a terminal."""
-    import difflib
-
-    from rich.text import Text
-
-    from armwright.cli.terminal import console as clean_console
-
     before, new = source.text.split("\n"), after.split("\n")
-    console = clean_console()
+    terminal = console()
     styles = {"+": "green", "-": "red", "@": "cyan"}
     for line in difflib.unified_diff(before, new, source.name, f"{source.name} (changed)", lineterm=""):
-        if console.is_terminal:
-            console.print(Text(line, style=styles.get(line[0], "")), soft_wrap=True)
+        if terminal.is_terminal:
+            terminal.print(line, style=styles.get(line[0]), soft_wrap=True)
         else:
             print(line)
 
 
-def write_back(source: "Source", path: Path, text: str) -> None:
+def write_back(source: Source, path: Path, text: str) -> None:
     """Replace the text of a program in its file, completely or not at all; links and permissions are preserved.
 
     The most frequent line ending of the file is used, and a byte order mark is preserved.
@@ -65,12 +90,6 @@ def write_back(source: "Source", path: Path, text: str) -> None:
         FileFormatError: the file cannot be read any more.
         OutputError: the file cannot be written, or has changed since; the message has the reason.
     """
-    from codecs import BOM_UTF8
-
-    from armwright.errors import OutputError
-    from armwright.files.inputs import decode, read_bytes
-    from armwright.files.output import write_file
-
     data = read_bytes(path, "program_mb")
     if decode(data, path) != source.text:
         raise OutputError(f"cannot write '{path}': it has changed since it was read; nothing was written")

@@ -6,6 +6,9 @@ from typing import Annotated, NamedTuple, TypeAlias
 
 import typer
 
+Units: TypeAlias = Annotated[
+    str | None, typer.Option(help="Units of measurements whose header has none, as in mm,deg.")
+]
 ColumnMap: TypeAlias = Annotated[
     str | None,
     typer.Option(
