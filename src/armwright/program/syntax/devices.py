@@ -19,9 +19,8 @@ def open_(tokens: TokenStream) -> tree.Open:
     """Read one OPEN."""
     start = tokens.take()
     arm = mobile(tokens, _ARM, "after OPEN")
-    word = tokens.accept("TO")
-    width = expression(tokens, "a width", "after TO") if word else None
-    return tree.Open(tokens.span_since(start), arm, width)
+    width = expression(tokens, "a width", "after TO") if tokens.accept("TO") else None
+    return tokens.node(tree.Open, start, arm, width)
 
 
 # grasp = "GRASP" [ arm ] ;
@@ -34,14 +33,13 @@ def grasp(tokens: TokenStream) -> tree.Grasp:
     near = kind is TokenKind.ARM or (kind is TokenKind.NAME and tokens.is_on_same_line())
     if near and not _starts_other_statement(tokens):
         arm = mobile(tokens, _ARM, "after GRASP")
-    return tree.Grasp(tokens.span_since(start), arm)
+    return tokens.node(tree.Grasp, start, arm)
 
 
 def _starts_other_statement(tokens: TokenStream) -> bool:
-    after = tokens.peek().key
-    return (
-        after in ("=", ":=", "(", "[") or closest(tokens.current.text, ("ELSE", *tokens.open_closers[-1])) is not None
-    )
+    if tokens.peek().key in ("=", ":=", "(", "["):
+        return True
+    return closest(tokens.current.text, ("ELSE", *tokens.open_closers[-1])) is not None
 
 
 # operate = "OPERATE" name [ "ON" | "OFF" ] ;
@@ -52,7 +50,7 @@ def operate(tokens: TokenStream) -> tree.Operate:
     if isinstance(device, tree.Name):
         tokens.check_name_length(device)
     word = tokens.accept("ON", "OFF")
-    return tree.Operate(tokens.span_since(start), device, word is None or word.key == "ON")
+    return tokens.node(tree.Operate, start, device, word is None or word.key == "ON")
 
 
 # read = "READ" "VISIONS" "(" lvalue { "," lvalue } ")" | "READ" "SYSTEM" "(" arm ")" ;
@@ -71,9 +69,8 @@ def read(tokens: TokenStream) -> tree.ReadVisions | tree.ReadSystem:
         tokens.fail("READ does not say what to read", "expected VISIONS or SYSTEM")
     tokens.take()
     if sensor == "VISIONS":
-        targets = parenthesised_list(tokens, mobile, _FRAME, "after VISIONS")
-        return tree.ReadVisions(tokens.span_since(start), targets)
+        return tokens.node(tree.ReadVisions, start, parenthesised_list(tokens, mobile, _FRAME, "after VISIONS"))
     arms = parenthesised_list(tokens, mobile, _ARM, "after SYSTEM")
     if len(arms) > 1:
         tokens.report("E117", "READ SYSTEM reads one arm", arms[1].span, "does not belong here")
-    return tree.ReadSystem(tokens.span_since(start), arms[0] if arms else tree.Poison(tokens.gap_span()))
+    return tokens.node(tree.ReadSystem, start, arms[0] if arms else tree.Poison(tokens.gap_span()))

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from armwright.program.language.diagnostic import Fix
-from armwright.program.language.source import Span
 from armwright.program.language.words import PRECEDENCE, PRECEDENCE_OF_NOT
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -67,9 +66,9 @@ def expression(tokens: TokenStream, wants: str = "a value", where: str = "here",
         if chained and isinstance(left_operand, tree.Binary):
             # What was meant is that both hold.
             right = tree.Binary(right.span, sign.key, left_operand.right, right)
-            left_operand = tree.Binary(tokens.span_since(start), "AND", left_operand, right)
+            left_operand = tokens.node(tree.Binary, start, "AND", left_operand, right)
         else:
-            left_operand = tree.Binary(tokens.span_since(start), sign.key, left_operand, right)
+            left_operand = tokens.node(tree.Binary, start, sign.key, left_operand, right)
     tokens.operand_context = outer
     return left_operand
 
@@ -77,10 +76,9 @@ def expression(tokens: TokenStream, wants: str = "a value", where: str = "here",
 def _replace_foreign_operator(tokens: TokenStream) -> bool:
     """Put the sign that was meant in the pose of one of another language."""
     token = tokens.current
-    meant = FOREIGN_OPERATORS[token.key]
-    blank = " " if meant.isalpha() else ""
-    text = f"`{token.text}` is not a symbol of RLO"
-    tokens.report_once("E123", text, token.span, f"write `{meant}`", fixes=(Fix(token.span, f"{blank}{meant}{blank}"),))
+    meant, text = FOREIGN_OPERATORS[token.key], f"`{token.text}` is not a symbol of RLO"
+    fix = Fix(token.span, f" {meant} " if meant.isalpha() else meant)
+    tokens.report_once("E123", text, token.span, f"write `{meant}`", fixes=(fix,))
     tokens.replace_current(meant)
     return True
 
@@ -88,9 +86,8 @@ def _replace_foreign_operator(tokens: TokenStream) -> bool:
 def _report_chained_comparison(tokens: TokenStream, start: Token) -> None:
     first = tokens.source.slice(tokens.span_since(start))
     advice = "join two comparisons with AND" if "\n" in first or len(first) > 20 else f"write `{first} AND ...`"
-    tokens.report_once(
-        "E122", "a comparison cannot be compared", tokens.current.span, "second comparison", advice=advice
-    )
+    text = "a comparison cannot be compared"
+    tokens.report_once("E122", text, tokens.current.span, "second comparison", advice=advice)
 
 
 # nega = "NOT" nega | rel ;   unary = "-" unary | prim ;
@@ -111,9 +108,8 @@ def _unary(tokens: TokenStream, wants: str, where: str, lowest: int) -> tree.Exp
         text = f"NOT needs parentheses after `{tokens.previous.text}`"
         tokens.report_once("E122", text, token.span, "put `( )` around NOT and what follows")
     if token.key == "+":
-        tokens.report_once(
-            "E113", "a value has no `+` in front", token.span, "leave it out", fixes=(Fix(token.span, ""),)
-        )
+        fix = Fix(token.span, "")
+        tokens.report_once("E113", "a value has no `+` in front", token.span, "leave it out", fixes=(fix,))
     tokens.take()
     tokens.enter_level()
     operand = expression(tokens, "a value", "", PRECEDENCE_OF_NOT if token.key == "NOT" else PRECEDENCE["*"] + 1)
@@ -121,9 +117,7 @@ def _unary(tokens: TokenStream, wants: str, where: str, lowest: int) -> tree.Exp
     tokens.height += 1
     if token.key == "+":
         return operand
-    return (
-        tree.Poison(tokens.span_since(token)) if misplaced else tree.Unary(tokens.span_since(token), token.key, operand)
-    )
+    return tokens.node(tree.Poison, token) if misplaced else tokens.node(tree.Unary, token, token.key, operand)
 
 
 # number = digits [ "." digits ] [ "E" ["+"|"-"] digits ] [ unit ] ;
@@ -144,12 +138,11 @@ def number(tokens: TokenStream) -> tree.Number:
         tokens.fail("expected a number", f"found {describe_token(token)}")
     tokens.take()
     tokens.height = 1
-    text, key = token.text, token.key
-    value = math.nan if token.damaged else float(key)
-    unit = text[len(key) :].upper() if len(text) > len(key) and not token.damaged else None
+    value = math.nan if token.damaged else float(token.key)
+    unit = None if token.damaged else token.text[len(token.key) :].upper() or None
     if start.key == "-":
-        return tree.Number(Span(start.start, token.end), f"-{text}", -value, unit)
-    return tree.Number(Span(start.start, token.end), text, value, unit)
+        return tokens.node(tree.Number, start, f"-{token.text}", -value, unit)
+    return tokens.node(tree.Number, start, token.text, value, unit)
 
 
 # prim = number | arm | lvalue | name "(" expr { "," expr } ")" | "(" expr { "," expr } ")" ;
@@ -158,15 +151,14 @@ def _name_or_call(tokens: TokenStream) -> tree.Expression:
     if tokens.current.kind is _ARM:
         return _arm(tokens)
     name = tokens.take_name()
-    behind = tokens.current.key
-    if behind == "[":
+    if tokens.current.key == "[":
         return _index(tokens, name)
-    if behind == "(":
-        arguments = expression_list(tokens, "a value", f"after {name.text}")
-        tokens.height += 1
-        span = tokens.span_since(name.span)
-        return tree.Function(span, name, arguments) if arguments else tree.Poison(span)
-    return name
+    if tokens.current.key != "(":
+        return name
+    arguments = expression_list(tokens, "a value", f"after {name.text}")
+    tokens.height += 1
+    start = name.span
+    return tokens.node(tree.Function, start, name, arguments) if arguments else tokens.node(tree.Poison, start)
 
 
 def _arm(tokens: TokenStream) -> tree.ArmName:
@@ -187,8 +179,7 @@ def _parenthesised(tokens: TokenStream) -> tree.Expression:
     if len(items) == 1:
         return items[0]
     tokens.height += 1
-    span = tokens.span_since(start)
-    return tree.Matrix(span, items) if items else tree.Poison(span)
+    return tokens.node(tree.Matrix, start, items) if items else tokens.node(tree.Poison, start)
 
 
 # mobile = arm | lvalue ;
@@ -225,7 +216,7 @@ def variable(tokens: TokenStream, wants: str, where: str) -> tree.Variable:
 def expression_list(
     tokens: TokenStream, wants: str, where: str, opening: str = "(", *, empty: bool = False
 ) -> tuple[tree.Expression, ...]:
-    """Read expressions in parentheses; the arguments are those of ``listed``."""
+    """Read expressions in parentheses; the arguments are those of ``parenthesised_list``."""
     items = parenthesised_list(tokens, expression, wants, where, opening, empty=empty)
     if items and tokens.peek(-2).key == ",":
         # Nothing follows the last comma; it has been reported, and counts as a value.
@@ -327,14 +318,11 @@ def _close_list(tokens: TokenStream, start: Token, closing: str) -> None:
     """Put in a closing parenthesis, or pass over what stands before it in the same line."""
     token = tokens.current
     if token.kind in _OPERANDS or token.key in ("(", "[", ")", "]", ".", ":", "+"):
-        steps = 0
-        while tokens.peek(steps).key not in (closing, ";", "") and steps < 20:
-            steps += 1
+        steps = next((n for n in range(20) if tokens.peek(n).key in (closing, ";", "")), 20)
         line = tokens.source.line
         if tokens.peek(steps).key == closing and line(tokens.peek(steps).start) == line(start.start):
-            tokens.report_once(
-                "E117", f"{describe_token(token)} does not belong here", token.span, f"expected `,` or `{closing}`"
-            )
+            text = f"{describe_token(token)} does not belong here"
+            tokens.report_once("E117", text, token.span, f"expected `,` or `{closing}`")
             for _ in range(steps + 1):
                 tokens.take()
             return

@@ -18,8 +18,7 @@ def assign(tokens: TokenStream) -> tree.Assign:
     written = tokens.source.slice(tokens.span_since(token))
     expect_equals(tokens, f"`{written}`", written)
     tokens.assignment_target = token.key
-    value = expression(tokens, "a value", "")
-    return tree.Assign(tokens.span_since(token), target, value)
+    return tokens.node(tree.Assign, token, target, expression(tokens, "a value", ""))
 
 
 def expect_equals(tokens: TokenStream, what: str, written: str) -> None:
@@ -46,11 +45,9 @@ def affix(tokens: TokenStream) -> tree.Affix:
     tokens.expect("TO", "after the frame that follows")
     parent = mobile(tokens, "the name of a FRAME or an arm", "after TO")
     link = tokens.span_since(start)
-    position = expression(tokens, "a TRANS", "after AT") if tokens.accept("AT") else None
+    at = expression(tokens, "a TRANS", "after AT") if tokens.accept("AT") else None
     rigid = tokens.accept("RIGIDLY", "NONRIGIDLY")
-    return tree.Affix(
-        tokens.span_since(start), link, child, parent, position, rigid is not None and rigid.key == "RIGIDLY"
-    )
+    return tokens.node(tree.Affix, start, link, child, parent, at, rigid is not None and rigid.key == "RIGIDLY")
 
 
 # unfix = "UNFIX" lvalue [ "FROM" mobile ] ;
@@ -60,10 +57,8 @@ def unfix(tokens: TokenStream) -> tree.Unfix:
     child = mobile(tokens, _FRAME, "after UNFIX")
     tokens.note_expected_words("FROM")
     over = tokens.is_at_end or tokens.current.key in (";", *tokens.vocabulary.block_ends)
-    if over or (
-        tokens.current.key != "FROM" and (tokens.current.kind is TokenKind.KEYWORD or not tokens.is_on_same_line())
-    ):
-        return tree.Unfix(tokens.span_since(start), child, None)
+    elsewhere = tokens.current.kind is TokenKind.KEYWORD or not tokens.is_on_same_line()
+    if over or (elsewhere and tokens.current.key != "FROM"):
+        return tokens.node(tree.Unfix, start, child, None)
     tokens.expect("FROM", "after the frame to detach")
-    parent = mobile(tokens, "the name of a FRAME or an arm", "after FROM")
-    return tree.Unfix(tokens.span_since(start), child, parent)
+    return tokens.node(tree.Unfix, start, child, mobile(tokens, "the name of a FRAME or an arm", "after FROM"))

@@ -13,16 +13,12 @@ from armwright.program.syntax.expressions import expression, mobile, parenthesis
 from armwright.program.syntax.frames import expect_equals
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.statement_list import nested_statement
-from armwright.program.syntax.token_stream import TokenStream, describe_token
+from armwright.program.syntax.token_stream import TokenStream, describe_token, either
 
 _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Print, tree.Poison)
 _ACTION_WORDS = ("HALT", "SIGNAL", "PRINT", "BEGIN")
 _VALUED_CLAUSES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
-    "APPROACH": tree.Approach,
-    "DEPARTURE": tree.Departure,
-    "SPEED": tree.Speed,
-    "BLEND": tree.Blend,
-    "DURATION": tree.Duration,
+    tree.clause_word(kind): kind for kind in (tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration)
 }
 
 
@@ -45,7 +41,7 @@ def move(tokens: TokenStream) -> tree.Move:
             break
         if (clause := _clause(tokens, clauses)) is not None:
             clauses.append(clause)
-    return tree.Move(tokens.span_since(start), moved, goal, tuple(clauses))
+    return tokens.node(tree.Move, start, moved, goal, tuple(clauses))
 
 
 def _clause_words(clauses: list[tree.Clause]) -> frozenset[str]:
@@ -77,13 +73,9 @@ def _starts_clause(tokens: TokenStream) -> bool:
 #        | "ON" expr "DO" action ;
 def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | None:
     """Read one clause behind others; None when it has been reported and passed over."""
-    token = tokens.current
-    if token.kind is TokenKind.NAME:
-        if not _replace_misspelt_clause(tokens, token):
-            _skip_clause(tokens)
-            return None
-        token = tokens.current
-    key = token.key
+    if tokens.current.kind is TokenKind.NAME and not _replace_misspelt_clause(tokens):
+        return None
+    token, key = tokens.current, tokens.current.key
     if key == "ON":
         return _guard(tokens)
     tokens.take()
@@ -93,26 +85,23 @@ def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | Non
     if key in tokens.vocabulary.with_clauses:
         gap = Span(token.start, token.start)
         if not token.damaged:
-            text = f"{key} needs WITH before it"
-            advice = f"write `WITH {key} = ...`"
-            tokens.report(
-                "E116", text, token.span, "expected WITH before this", advice=advice, fixes=(Fix(gap, "WITH "),)
-            )
+            text, advice, fix = f"{key} needs WITH before it", f"write `WITH {key} = ...`", Fix(gap, "WITH ")
+            tokens.report("E116", text, token.span, "expected WITH before this", advice=advice, fixes=(fix,))
         return _valued_clause(tokens, token, key)
     return _plain_clause(tokens, token, key)
 
 
-def _replace_misspelt_clause(tokens: TokenStream, token: Token) -> bool:
-    """Put the clause word that a misspelt one was meant to be in its pose; whether there is one."""
+def _replace_misspelt_clause(tokens: TokenStream) -> bool:
+    """Put the clause word that was meant in place of a misspelt one; pass over a clause for which there is none."""
+    token = tokens.current
     near = closest(token.text, tokens.vocabulary.clauses)
-    advice = (
-        f"did you mean `{near}`?"
-        if near
-        else f"clauses are {', '.join((*tokens.standard_vocabulary.plain_clauses, 'WITH ...'))}"
-    )
+    known = f"clauses are {', '.join((*tokens.standard_vocabulary.plain_clauses, 'WITH ...'))}"
+    advice = did_you_mean(near) or known
     tokens.report("E108", f"unknown clause `{token.text}`", token.span, "not a clause of MOVE", advice=advice)
     if near:
         tokens.replace_current(near)
+    else:
+        _skip_clause(tokens)
     return near is not None
 
 
@@ -122,18 +111,15 @@ def _plain_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause | 
     if key == "STRAIGHTLY":
         return tree.Straightly(start.span)
     if key == "VIA":
-        points = parenthesised_list(tokens, expression, "a pose", "after VIA")
-        return tree.Via(tokens.span_since(start), points)
+        return tokens.node(tree.Via, start, parenthesised_list(tokens, expression, "a pose", "after VIA"))
     return None
 
 
 def _with_clause(tokens: TokenStream, start: Token) -> tree.Clause | None:
     """Read what follows WITH."""
     token = tokens.current
-    plain, with_words = tokens.vocabulary.plain_clauses, tokens.vocabulary.with_clauses
-    offered = tokens.standard_vocabulary.with_clauses
-    expected = f"expected {', '.join(offered[:-1])} or {offered[-1]}"
-    if tokens.matches(*plain):
+    with_words, expected = tokens.vocabulary.with_clauses, f"expected {either(tokens.standard_vocabulary.with_clauses)}"
+    if tokens.matches(*tokens.vocabulary.plain_clauses):
         text, advice = f"{token.key} is written without WITH", f"write `{token.key}` alone"
         fix = Fix(Span(start.start, token.start), "")
         tokens.report("E116", text, start.span, "WITH does not belong here", advice=advice, fixes=(fix,))
@@ -154,8 +140,8 @@ def _with_clause(tokens: TokenStream, start: Token) -> tree.Clause | None:
 
 def _valued_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause:
     expect_equals(tokens, f"`WITH {key}`", f"WITH {key}")
-    value = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a pose", f"after {key} =")
-    return _VALUED_CLAUSES[key](tokens.span_since(start), value)
+    wants = "a pose" if key in ("APPROACH", "DEPARTURE") else "a value"
+    return tokens.node(_VALUED_CLAUSES[key], start, expression(tokens, wants, f"after {key} ="))
 
 
 # "ON" expr "DO" action
@@ -174,7 +160,7 @@ def _guard(tokens: TokenStream) -> tree.On:
         certain = not isinstance(action, tree.Move) or not action.clauses
         fixes = (Fix(Span(word.start, word.start), "BEGIN "), Fix(tokens.gap_span(), " END")) if certain else ()
         tokens.report("E121", text, word.span, label, advice=advice, fixes=fixes)
-    return tree.On(tokens.span_since(start), head, condition, action)
+    return tokens.node(tree.On, start, head, condition, action)
 
 
 def _skip_clause(tokens: TokenStream) -> None:

@@ -10,8 +10,7 @@ from armwright.program.syntax.token_stream import TokenStream
 def print_(tokens: TokenStream) -> tree.Print:
     """Read one PRINT."""
     start = tokens.take()
-    items = parenthesised_list(tokens, _print_item, "a value or a text", "after PRINT")
-    return tree.Print(tokens.span_since(start), items)
+    return tokens.node(tree.Print, start, parenthesised_list(tokens, _print_item, "a value or a text", "after PRINT"))
 
 
 def _print_item(tokens: TokenStream, wants: str, where: str) -> tree.Expression | tree.String:

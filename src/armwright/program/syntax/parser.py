@@ -66,40 +66,39 @@ def parse(
         declared: names of variables that were declared before this text.
         procedures: names of procedures that were.
     """
-    cursor, torn = _token_stream(source, tokens, standard, declared)
-    cursor.procedures.update(procedures)
-    tree_, slips = program(cursor), cursor.diagnostics
+    stream, split = _token_stream(source, tokens, standard, declared)
+    stream.procedures.update(procedures)
+    program, diagnostics = _program(stream), stream.diagnostics
     if standard is Standard.RLO_83:
-        tree_, slips = rlo83.check_conformance(tree_, slips, source, cursor.tokens)
-    return tree_, [*torn, *slips]
+        program, diagnostics = rlo83.check_conformance(program, diagnostics, source, stream.tokens)
+    return program, [*split, *diagnostics]
 
 
 def expected_tokens(
     source: Source, tokens: Sequence[Token], standard: Standard = Standard.RLO_2, *, declared: Collection[str] = ()
 ) -> ExpectedTokens:
     """Return what may stand behind the last token of a text; the arguments are those of ``parse``."""
-    cursor, _ = _token_stream(source, tokens, standard, declared)
-    cursor.expected = ExpectedTokens()
-    program(cursor)
-    return cursor.expected
+    stream, _ = _token_stream(source, tokens, standard, declared)
+    stream.expected = ExpectedTokens()
+    _program(stream)
+    return stream.expected
 
 
 def _token_stream(
     source: Source, tokens: Sequence[Token], standard: Standard, declared: Collection[str]
 ) -> tuple[TokenStream, list[Diagnostic]]:
     """Stand in front of the first token; return what is wrong with names that blanks tear apart, too."""
-    tokens, torn = join_split_names(source, tokens, declared)
+    tokens, split = join_split_names(source, tokens, declared)
     if standard is Standard.RLO_83:
         tokens = rlo83.reserve_rlo_2_words(tokens, {*declared, *declared_names(tokens)})
-    cursor = TokenStream(source, tokens, _RULES, standard)
-    cursor.declared.update(declared)
-    return cursor, torn
+    stream = TokenStream(source, tokens, _RULES, standard)
+    stream.declared.update(declared)
+    return stream, split
 
 
 # program = { header } block "." ;
 # block   = "BEGIN" statements "END" ;
-def program(tokens: TokenStream) -> tree.Program:
-    """Read a whole program."""
+def _program(tokens: TokenStream) -> tree.Program:
     start = tokens.current
     headers = parse_headers(tokens)
     read: list[tree.Statement] = []
@@ -115,7 +114,8 @@ def program(tokens: TokenStream) -> tree.Program:
         text = "the program has no statements" if headers else "there is no program here"
         text, missing = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
         tokens.report("E115", text, span, f"expected `{missing}`")
-    return tree.Program(tokens.span_since(start), (*headers, *tokens.late_headers), tuple(read), tokens.previous.span)
+    headers += tokens.late_headers
+    return tokens.node(tree.Program, start, tuple(headers), tuple(read), tokens.previous.span)
 
 
 def _statements(tokens: TokenStream) -> tuple[tree.Statement, ...]:
@@ -132,11 +132,9 @@ def _end_program(tokens: TokenStream) -> bool:
     gap = tokens.gap_span()
     if tokens.accept("."):
         if not tokens.is_at_end:
-            last = tokens.current
-            tokens.report("E114", "text after the end of the program", last.span, "the program ended with `END.`")
-            while not tokens.is_at_end:
-                tokens.take()
-            return True
+            span = tokens.current.span
+            tokens.report("E114", "text after the end of the program", span, "the program ended with `END.`")
+            tokens.skip_to()
     elif tokens.is_at_end or (tokens.matches(";") and tokens.peek().kind is TokenKind.END):
         if not tokens.current.damaged:
             semicolon = tokens.accept(";")
