@@ -91,7 +91,7 @@ class MeasurementPlan(NamedTuple):
 
 def observability(chain: Chain, q: Array, fitted: list[int], *, rotations: bool = False) -> Observability:
     """Return the observability of the errors with these numbers by poses (m, n), or by their positions alone."""
-    return _indices(_jacobians(chain, q, rotations=rotations)[:, :, fitted].reshape(-1, len(fitted)), len(q))
+    return _observability(_jacobians(chain, q, rotations=rotations)[:, :, fitted], range(len(q)))
 
 
 def plan_poses(
@@ -129,24 +129,23 @@ def plan_poses(
     if not 1 <= count <= _MAX_POSES:
         expected = "1 pose or more" if count < 1 else f"{_MAX_POSES:,} poses or fewer"
         raise InvalidValueError(f"count: expected {expected}, got {count}")
-    chain = kinematic_chain(arm)
-    rng = np.random.default_rng(seed)
-    if candidates is None:
-        candidates = max(_CANDIDATES, _PER_POSE * count)
+    chain, rng = kinematic_chain(arm), np.random.default_rng(seed)
+    candidates = max(_CANDIDATES, _PER_POSE * count) if candidates is None else candidates
     if candidates < count:
         raise InvalidValueError(f"candidates: expected {count} or more, got {candidates}")
     lower, upper = ranges(arm)
     q = lower + (upper - lower) * rng.random((candidates, arm.n))
     before = np.zeros((0, arm.n)) if measured is None else np.atleast_2d(joint_array(measured, arm.n, "measured"))
     every = _jacobians(chain, np.vstack([q, before]), rotations=rotations)
-    J = every.reshape(-1, len(chain.names))
-    selected = select_identifiable(
-        chain.names, J, chain.is_length, _NOISE_LENGTH, first=preferred_parameters(chain.names)
+    J, first = every.reshape(-1, len(chain.names)), preferred_parameters(chain.names)
+    fitted = list(select_identifiable(chain.names, J, chain.is_length, _NOISE_LENGTH, first=first).fitted)
+    # A calibration is assessed by poses that it was not fitted to: the others have to be enough.
+    fewest = next(
+        poses
+        for poses in itertools.count(FOLDS)
+        if is_overdetermined(every.shape[1] * (poses - math.ceil(poses / FOLDS)), len(fitted))
     )
-    fitted = list(selected.fitted)
-    numbers, poses = every.shape[1], count + len(before)
-    fewest = _minimum_poses(numbers, len(fitted))
-    if poses < fewest:
+    if count + len(before) < fewest:
         raise InvalidValueError(
             f"count: {arm.name} has {len(fitted)} errors that {'poses' if rotations else 'points'} identify, and one "
             f"in {FOLDS} poses is held out to assess a calibration; expected {fewest - len(before)} poses or "
@@ -156,24 +155,13 @@ def plan_poses(
     selection = _select_greedily(jacobians, count, fixed, progress)
     selection = _exchange_poses(jacobians, selection, fixed, INDICES.index(index))
     draws = [
-        _indices(_stack(jacobians, [*rng.choice(candidates, count, replace=False).tolist(), *fixed]), poses)
-        for _ in range(15)
+        _observability(jacobians, [*rng.choice(candidates, count, replace=False).tolist(), *fixed]) for _ in range(15)
     ]
     return MeasurementPlan(
         q=q[selection],
-        observability=_indices(_stack(jacobians, [*selection, *fixed]), poses),
-        random=Observability(*(float(np.median([draw[i] for draw in draws])) for i in range(len(INDICES)))),
+        observability=_observability(jacobians, [*selection, *fixed]),
+        random=Observability(*(float(np.median(values)) for values in zip(*draws, strict=True))),
         names=tuple(chain.names[i] for i in fitted),
-    )
-
-
-def _minimum_poses(numbers: int, errors: int) -> int:
-    """Return how many poses are enough for so many errors, each measured by so many numbers.
-
-    A calibration is judged by poses that it has not seen: those that are left have to be enough.
-    """
-    return next(
-        more for more in itertools.count(FOLDS) if is_overdetermined(numbers * (more - math.ceil(more / FOLDS)), errors)
     )
 
 
@@ -189,12 +177,13 @@ def _stack(jacobians: Array, selection: Sequence[int]) -> Array:
     return np.asarray(jacobians[list(selection)].reshape(-1, jacobians.shape[-1]), dtype=np.float64)
 
 
-def _indices(A: Array, poses: int) -> Observability:
-    s = np.linalg.svd(A, compute_uv=False)
-    if len(s) < A.shape[1] or s[-1] <= 1e-12 * s[0]:
+def _observability(jacobians: Array, selection: Sequence[int]) -> Observability:
+    """Return the observability by some of the poses whose Jacobians these are."""
+    s = np.linalg.svd(_stack(jacobians, selection), compute_uv=False)
+    if len(s) < jacobians.shape[-1] or s[-1] <= 1e-12 * s[0]:
         return Observability(0.0, 0.0, 0.0, 0.0, 0.0)
     return Observability(
-        O1=float(np.exp(np.log(s).mean()) / np.sqrt(poses)),
+        O1=float(np.exp(np.log(s).mean()) / np.sqrt(len(selection))),
         O2=float(s[-1] / s[0]),
         O3=float(s[-1]),
         O4=float(s[-1] ** 2 / s[0]),
@@ -225,13 +214,13 @@ def _select_greedily(
 def _exchange_poses(jacobians: Array, selection: list[int], fixed: list[int], index: int) -> list[int]:
     """Exchange single poses for others as long as the index gets better."""
     rng = np.random.default_rng(0)
-    best = _indices(_stack(jacobians, [*selection, *fixed]), len(selection) + len(fixed))[index]
+    best = _observability(jacobians, [*selection, *fixed])[index]
     others = [i for i in range(len(jacobians) - len(fixed)) if i not in selection]
     for _ in range(min(_MAX_EXCHANGES, len(others) * len(selection))):
         position, other = int(rng.integers(len(selection))), int(rng.integers(len(others)))
         tried = selection.copy()
         tried[position] = others[other]
-        value = _indices(_stack(jacobians, [*tried, *fixed]), len(tried) + len(fixed))[index]
+        value = _observability(jacobians, [*tried, *fixed])[index]
         if value > best:
             others[other], selection, best = selection[position], tried, value
     return selection

@@ -52,19 +52,19 @@ def initial_guess(
         InvalidValueError: ``base`` has no rotation in it.
         ShapeError: ``base`` is not (4, 4).
     """
-    is_base_known = base is not None
-    base = None if base is None else one_pose(base, "base")
     chain = kinematic_chain(arm)
     first = readings.with_point & (readings.frame == 0)
     _refuse_other_units(chain, readings, first)
-    if base is None:
-        base = register_base(chain, readings.q[first], readings.points[first]) if first.any() else np.eye(4)
-    chain = kinematic_chain(arm, base=base, joint_errors=joint_errors)
+    X = np.eye(4)
+    if base is not None:
+        X = one_pose(base, "base")
+    elif first.any():
+        X = register_base(chain, readings.q[first], readings.points[first])
+    chain = kinematic_chain(arm, base=X)
     frames = (np.eye(4), *(_initial_frame(chain, readings, i) for i in range(1, len(readings.frames))))
+    target = _target_rotation(chain, readings, frames)
     model = MeasurementModel(
-        chain=kinematic_chain(
-            arm, base=base, target_rotation=_target_rotation(chain, readings, frames), joint_errors=joint_errors
-        ),
+        chain=kinematic_chain(arm, base=X, target_rotation=target, joint_errors=joint_errors),
         frames=dict(zip(readings.frames or ("",), frames, strict=True)),
         planes={name: _initial_plane(chain, readings, i) for i, name in enumerate(readings.planes)},
         anchors={name: _initial_anchor(chain, readings, i) for i, name in enumerate(readings.anchors)},
@@ -74,12 +74,13 @@ def initial_guess(
     if distance > _MAX_DISTANCE:
         raise ContradictionError(
             f"the median distance of the points from the tool of {arm.name} is {distance * 1e3:.4g} mm"
-            f"{'' if is_base_known else ' with its base best-fitted'}: are these its joints, in this order and these "
+            f"{' with its base best-fitted' if base is None else ''}: are these its joints, in this order and these "
             f"units?"
         )
     angles = errors.angle[readings.with_rotation]
     # Points on a line leave a rotation of the base about it free, which the fit estimates.
-    if len(angles) and np.median(angles) > _MAX_ANGLE and (is_base_known or not _are_collinear(readings.points[first])):
+    is_certain = base is not None or not _are_collinear(readings.points[first])
+    if len(angles) and np.median(angles) > _MAX_ANGLE and is_certain:
         raise ContradictionError(
             f"the median rotation of the poses from the tool of {arm.name} is {np.degrees(np.median(angles)):.0f} "
             f"degrees with the target best-fitted: are these its rotations, in this order and these units?"
