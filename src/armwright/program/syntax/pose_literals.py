@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import attrs
 
+from armwright.errors import counted
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.units import LENGTHS, UnitSystem
 from armwright.program.syntax import tree
@@ -30,7 +31,7 @@ def check(matrix: tree.Matrix, units: UnitSystem) -> Diagnostic | None:
     """
     values = [item.value for item in matrix.items if isinstance(item, tree.Number)]
     # A number that was reported before is NaN.
-    if any(math.isnan(value) for value in values):
+    if any(map(math.isnan, values)):
         return None
     if len(matrix.items) != 12:
         diagnostic = _wrong_number_count(matrix, values)
@@ -49,20 +50,14 @@ def check(matrix: tree.Matrix, units: UnitSystem) -> Diagnostic | None:
 
 def _inexact_rotation(matrix: tree.Matrix, values: Sequence[float], error: float) -> Diagnostic:
     if error <= REPAIR_TOLERANCE:
-        return Diagnostic(
-            code="W206",
-            message="the axes of this matrix are not quite of length 1 and at right angles",
-            span=matrix.span,
-            label=f"off by {error:.1g}; the nearest rotation is taken",
-            helps=("write more digits",),
-        )
+        text = "the axes of this matrix are not quite of length 1 and at right angles"
+        return _finding(matrix, text, f"off by {error:.1g}; the nearest rotation is taken", "write more digits", "W206")
     if len(values) == 12 and is_rotation([values[index] for index in _ROW_WISE[:9]]):
         return _suggest_order(matrix, _ROW_WISE, "this matrix is written row by row")
     if _MIRROR_PENALTY <= error <= _MIRROR_PENALTY + REPAIR_TOLERANCE:
-        return _error(
-            matrix, "this matrix is a mirror image, not a rotation", "n, o, a are left-handed", "a must be n times o"
-        )
-    return _error(matrix, "the first nine numbers are not a rotation", _describe_axis_error(values))
+        text = "this matrix is a mirror image, not a rotation"
+        return _finding(matrix, text, "n, o, a are left-handed", "a must be n times o")
+    return _finding(matrix, "the first nine numbers are not a rotation", _describe_axis_error(values))
 
 
 def pose_numbers(matrix: tree.Matrix) -> tuple[float, ...]:
@@ -100,15 +95,13 @@ def is_rotation(axes: Sequence[float]) -> bool:
 def _wrong_number_count(matrix: tree.Matrix, values: list[float]) -> Diagnostic:
     count = len(matrix.items)
     if len(values) == count == 16:
-        wholes = {
-            (values[3], values[7], values[11], values[15]): (_COLUMNS_OF_16, "this matrix includes its bottom row"),
-            (values[12], values[13], values[14], values[15]): (_ROW_WISE, "this matrix is written row by row"),
-        }
-        for row, (order, message) in wholes.items():
-            if row == (0, 0, 0, 1) and is_rotation([values[index] for index in order[:9]]):
+        for bottom_row, order, message in (
+            (values[12:], _ROW_WISE, "this matrix is written row by row"),
+            (values[3::4], _COLUMNS_OF_16, "this matrix includes its bottom row"),
+        ):
+            if bottom_row == [0, 0, 0, 1] and is_rotation([values[index] for index in order[:9]]):
                 return _suggest_order(matrix, order, message)
-    many = f"{count} number{'s' if count > 1 else ''}"
-    return _error(matrix, f"a matrix has 12 numbers, not {count}", f"{many} here")
+    return _finding(matrix, f"a matrix has 12 numbers, not {count}", f"{counted(count, 'number')} here")
 
 
 def _suggest_order(matrix: tree.Matrix, order: Sequence[int], message: str) -> Diagnostic:
@@ -116,19 +109,15 @@ def _suggest_order(matrix: tree.Matrix, order: Sequence[int], message: str) -> D
     texts = [numbers[index].text for index in order]
     literal = "(" + ", ".join(",".join(texts[i : i + 3]) for i in range(0, 12, 3)) + ")"
     is_full = len(numbers) == 12
-    return Diagnostic(
-        code="E206",
-        message=message,
-        span=matrix.span,
-        label="n, o, a are not a rotation" if is_full else "16 numbers here",
-        notes=() if is_full else ("omit the bottom row 0 0 0 1",),
-        helps=(f"write `{literal}`",),
-        fixes=(Fix(matrix.span, literal),),
-    )
+    notes = () if is_full else ("omit the bottom row 0 0 0 1",)
+    label = "n, o, a are not a rotation" if is_full else "16 numbers here"
+    finding = _finding(matrix, message, label, f"write `{literal}`")
+    return attrs.evolve(finding, notes=notes, fixes=(Fix(matrix.span, literal),))
 
 
-def _error(matrix: tree.Matrix, message: str, label: str, help_: str = "") -> Diagnostic:
-    return Diagnostic(code="E206", message=message, span=matrix.span, label=label, helps=(help_,) if help_ else ())
+def _finding(matrix: tree.Matrix, message: str, label: str, advice: str = "", code: str = "E206") -> Diagnostic:
+    helps = (advice,) if advice else ()
+    return Diagnostic(code=code, message=message, span=matrix.span, label=label, helps=helps)
 
 
 def _describe_axis_error(values: Sequence[float]) -> str:

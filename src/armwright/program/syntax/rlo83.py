@@ -22,12 +22,10 @@ _MOVED = "the name of a FRAME or an arm"
 _ARM = "an arm such as ARM_1"
 _MAX_SHOWN_LENGTH = 16
 # In front of a word of RLO-2 that stands where only a name can, and behind one that gets a value or is declared.
-_BEFORE_NAMES = frozenset(
-    (*("MOVE", "AFFIX", "UNFIX", "TO", "FROM", "AT", "OPERATE", "=", ":=", "(", "[", ","), *"+-*/<>", "<=", ">=", "<>")
-)
-_BEHIND_NAMES = frozenset(("=", ":="))
+_BEFORE_NAMES = {"MOVE", "AFFIX", "UNFIX", "TO", "FROM", "AT", "OPERATE", "=", ":=", *"([,+-*/<>", "<=", ">=", "<>"}
+_BEHIND_NAMES = {"=", ":="}
 # These stand there too, and are no names.
-_NEVER_NAMES = frozenset(("NOT", "ON", "PRIORITY"))
+_NEVER_NAMES = {"NOT", "ON", "PRIORITY"}
 
 
 def reserve_rlo_2_words(tokens: Sequence[Token], declared: Collection[str]) -> Sequence[Token]:
@@ -37,24 +35,24 @@ def reserve_rlo_2_words(tokens: Sequence[Token], declared: Collection[str]) -> S
         tokens: of a program of RLO-83.
         declared: all names that are declared in it or before it.
     """
-    tokens_ = list(tokens)
+    reserved = list(tokens)
     for index, token in enumerate(tokens):
         if token.kind is not TokenKind.NAME or token.key in declared or not is_reserved_in_rlo_2_only(token.key):
             continue
         named = index > 0 and tokens[index - 1].key in _BEFORE_NAMES and token.key not in _NEVER_NAMES
         if not named and tokens[index + 1].key not in _BEHIND_NAMES:
-            tokens_[index] = attrs.evolve(token, kind=TokenKind.KEYWORD)
-    return tokens_
+            reserved[index] = attrs.evolve(token, kind=TokenKind.KEYWORD)
+    return reserved
 
 
 def check_conformance(
-    program: tree.Program, slips: Sequence[Diagnostic], source: Source, tokens: Sequence[Token]
+    program: tree.Program, diagnostics: Sequence[Diagnostic], source: Source, tokens: Sequence[Token]
 ) -> tuple[tree.Program, DiagnosticList]:
     """Name what a program has that belongs to RLO-2.
 
     Args:
         program: as the parser has read it.
-        slips: what the parser has found wrong.
+        diagnostics: what the parser has found wrong.
         source: the text.
         tokens: of the text, as the parser has read them.
 
@@ -62,12 +60,12 @@ def check_conformance(
         The program with a poison in place of each part that belongs to RLO-2, and what is wrong with both.
     """
     visitor = _ConformanceVisitor(source, tokens, program)
-    headers = tuple(node_ for header in program.headers if (node_ := visitor.header(header)) is not None)
-    statements = tuple(visitor.statement(statement) for statement in program.statements)
-    tokens_ = DiagnosticList()
-    tokens_ += [slip for slip in slips if not visitor.is_inside(slip.span)]
-    tokens_ += visitor.diagnostics
-    return attrs.evolve(program, headers=headers, statements=statements), tokens_
+    headers = tuple(checked for header in program.headers if (checked := visitor.header(header)) is not None)
+    statements = tuple(map(visitor.statement, program.statements))
+    all_diagnostics = DiagnosticList()
+    all_diagnostics += [one for one in diagnostics if not visitor.is_inside(one.span)]
+    all_diagnostics += visitor.diagnostics
+    return attrs.evolve(program, headers=headers, statements=statements), all_diagnostics
 
 
 class _ConformanceVisitor:
@@ -89,14 +87,14 @@ class _ConformanceVisitor:
             tree.Grasp: self._grasp,
             tree.Operate: self._operate,
             tree.ReadVisions: self._read_visions,
-            tree.ReadSystem: self._read_system,
+            tree.ReadSystem: lambda node: attrs.evolve(node, arm=self._operand(node.arm, _ARM)),
             tree.Move: self._move,
             tree.Call: self._call,
         }
 
     def is_inside(self, span: Span) -> bool:
         """Whether something stands in a stretch that has been passed over, behind its first word."""
-        index = bisect_left(self._skipped_spans, span.start, key=lambda node_: node_.start) - 1
+        index = bisect_left(self._skipped_spans, span.start, key=lambda skipped: skipped.start) - 1
         return index >= 0 and span.start <= self._skipped_spans[index].end
 
     def _report(self, what: str, span: Span, instead: str) -> None:
@@ -159,9 +157,8 @@ class _ConformanceVisitor:
             return visit(node)
         word = self._first_token(node.span)
         if isinstance(node, tree.Block):
-            return self._reject_statement(
-                node, "a block inside a program", word.span, "RLO-83 has one BEGIN and one END"
-            )
+            what, instead = "a block inside a program", "RLO-83 has one BEGIN and one END"
+            return self._reject_statement(node, what, word.span, instead)
         return self._reject_statement(node, word.key, word.span, RLO_2_STATEMENTS[word.key])
 
     def _reject_statement(self, node: tree.Statement, what: str, span: Span, instead: str) -> tree.Poison:
@@ -187,19 +184,14 @@ class _ConformanceVisitor:
         return node
 
     def _operate(self, node: tree.Operate) -> tree.Operate:
-        self._report_trailing_word(
-            node.span, "OPERATE ...", "RLO-83 only starts a device; it stops at the end", "ON", "OFF"
-        )
+        self._report_last_word(node, "RLO-83 only starts a device; it stops at the end", "ON", "OFF")
         return attrs.evolve(node, device=self._operand(node.device, "the name of a device"), on=True)
 
-    def _read_system(self, node: tree.ReadSystem) -> tree.ReadSystem:
-        return attrs.evolve(node, arm=self._operand(node.arm, _ARM))
-
-    def _report_trailing_word(self, span: Span, what: str, instead: str, *words: str) -> None:
+    def _report_last_word(self, node: tree.Affix | tree.Operate, instead: str, *words: str) -> None:
         """Name a word that RLO-2 allows at the end of a statement."""
-        last = self._last_token(span)
+        last = self._last_token(node.span)
         if last.kind is TokenKind.KEYWORD and last.key in words:
-            self._report(f"{what} {last.key}", last.span, instead)
+            self._report(f"{type(node).__name__.upper()} ... {last.key}", last.span, instead)
 
     def _assign(self, node: tree.Assign) -> tree.Statement:
         if isinstance(node.target, tree.Index):
@@ -207,13 +199,12 @@ class _ConformanceVisitor:
             return self._reject_statement(node, "indexing", bracket.span, "RLO-83 has no arrays")
         value = node.value
         numbers = value.items if isinstance(value, tree.Matrix) else (value,)
-        if all(isinstance(number, tree.Number | tree.Poison) for number in numbers) and not self._is_parenthesised(
-            value
-        ):
-            bare = tuple(map(self._without_unit, numbers))
-            known = attrs.evolve(value, items=bare) if isinstance(value, tree.Matrix) else bare[0]
-            return attrs.evolve(node, value=known)
-        return attrs.evolve(node, value=self._poison(value, "a number or twelve numbers in `( )`"))
+        are_known = all(isinstance(number, tree.Number | tree.Poison) for number in numbers)
+        if not are_known or self._is_parenthesised(value):
+            return attrs.evolve(node, value=self._poison(value, "a number or twelve numbers in `( )`"))
+        bare = tuple(map(self._without_unit, numbers))
+        known = attrs.evolve(value, items=bare) if isinstance(value, tree.Matrix) else bare[0]
+        return attrs.evolve(node, value=known)
 
     def _is_parenthesised(self, value: tree.Expression) -> bool:
         """Whether parentheses stand around a value, or around a single number of a matrix."""
@@ -232,18 +223,17 @@ class _ConformanceVisitor:
 
     def _affix(self, node: tree.Affix) -> tree.Affix:
         instead = "in RLO-83 a frame follows its parent, never the reverse"
-        self._report_trailing_word(node.span, "AFFIX ...", instead, "RIGIDLY", "NONRIGIDLY")
+        self._report_last_word(node, instead, "RIGIDLY", "NONRIGIDLY")
         child, parent = self._operand(node.child, _FRAME), self._operand(node.parent, _MOVED)
         step = None if node.at is None else self._operand(node.at, "the name of a TRANS")
         return attrs.evolve(node, child=child, parent=parent, at=step, rigid=False)
 
     def _unfix(self, node: tree.Unfix) -> tree.Unfix:
         child = self._operand(node.child, _FRAME)
-        if node.parent is None:
-            gap = Span(node.span.end, node.span.end)
-            self._report("UNFIX without FROM", gap, "RLO-83 names the parent: `FROM ...`")
-            return attrs.evolve(node, child=child)
-        return attrs.evolve(node, child=child, parent=self._operand(node.parent, _MOVED))
+        if node.parent is not None:
+            return attrs.evolve(node, child=child, parent=self._operand(node.parent, _MOVED))
+        self._report("UNFIX without FROM", Span(node.span.end, node.span.end), "RLO-83 names the parent: `FROM ...`")
+        return attrs.evolve(node, child=child)
 
     def _open(self, node: tree.Open) -> tree.Open:
         if node.width is not None:
@@ -252,18 +242,17 @@ class _ConformanceVisitor:
         return attrs.evolve(node, arm=self._operand(node.arm, _ARM), width=None)
 
     def _read_visions(self, node: tree.ReadVisions) -> tree.ReadVisions:
-        first, *others = node.targets or (tree.Poison(node.span),)
-        if not others:
+        if len(node.targets) < 2:
             return attrs.evolve(node, targets=tuple(self._operand(target, _FRAME) for target in node.targets))
-        span_ = Span(others[0].span.start, others[-1].span.end)
-        self._report("reading several frames at once", span_, "RLO-83 reads one frame at a time")
-        return attrs.evolve(node, targets=(tree.Poison(span_, self._names_in(first.span.to(span_))),))
+        first, others = node.targets[0].span, node.targets[1].span.to(node.targets[-1].span)
+        self._report("reading several frames at once", others, "RLO-83 reads one frame at a time")
+        return attrs.evolve(node, targets=(tree.Poison(others, self._names_in(first.to(others))),))
 
     # ---- MOVE
 
     def _move(self, node: tree.Move) -> tree.Move:
         moved, goal = self._operand(node.moved, _MOVED), self._goal(node.goal)
-        clauses = tuple(node_ for clause in node.clauses if (node_ := self._clause(clause)) is not None)
+        clauses = tuple(checked for clause in node.clauses if (checked := self._clause(clause)) is not None)
         return attrs.evolve(node, moved=moved, goal=goal, clauses=clauses)
 
     def _clause(self, node: tree.Clause) -> tree.Clause | None:

@@ -8,9 +8,9 @@ from armwright.program.syntax.lexer import Token, TokenKind
 
 _NAME, _KEYWORD, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.NUMBER
 # Behind these words a number may stand.
-_BEFORE_NUMBERS = frozenset(("PAUSE", "STEP", "TO", "PRIORITY", "IF", "WHILE", "UNTIL", "AND", "OR", "NOT", "ON", "AT"))
+_BEFORE_NUMBERS = {"PAUSE", "STEP", "TO", "PRIORITY", "IF", "WHILE", "UNTIL", "AND", "OR", "NOT", "ON", "AT"}
 # Behind these a name stands that an IMPORT may have brought.
-_BEFORE_NAMES = frozenset(("TO", "FROM", "AFFIX", "UNFIX", "MOVE", "READ", "=", "(", ","))
+_BEFORE_NAMES = {"TO", "FROM", "AFFIX", "UNFIX", "MOVE", "READ", "=", "(", ","}
 _BLANKS = " \t"
 
 
@@ -46,19 +46,18 @@ def join_split_names(
     for pair in pairs:
         first, number = tokens[pair - 1], tokens[pair]
         key, before = f"{first.key}{number.key}", tokens[pair - 2].key if pair > 1 else ""
-        declared_here = pair in inside
         device = first.kind is _NAME and before == "OPERATE"
         counts = first.kind is _KEYWORD and first.key in _BEFORE_NUMBERS
-        torn = key in names and first.key not in names and not counts
+        certain = pair in inside or device or (key in names and first.key not in names and not counts)
         guessed = imports and first.kind is _NAME and first.key not in names and before in _BEFORE_NAMES
-        if not (declared_here or torn or device or guessed):
+        if not (certain or guessed):
             continue
         text = f"{first.text}{number.text}"
         joined_tokens += [*tokens[done : pair - 1], Token(_NAME, text, key, first.start, number.end)]
         done = pair + 1
         span = Span(first.start, number.end)
         message = f"`{' '.join(source.slice(span).split())}` is not one name"
-        fixes = (Fix(span, text),) if declared_here or torn or device else ()
+        fixes = (Fix(span, text),) if certain else ()
         findings.report("E106", message, span, "no blanks in a name", advice=f"write `{text}`", fixes=fixes)
     return [*joined_tokens, *tokens[done:]], findings
 
@@ -85,9 +84,8 @@ def _declarations(tokens: Sequence[Token], pairs: frozenset[int]) -> tuple[set[i
     for index, token in enumerate(tokens):
         if token.kind is _KEYWORD:
             # The types and words of a declaration do not end it, and neither do torn words.
-            declaring = token.key in ("VAR", "PROCEDURE") or (
-                declaring and token.key not in ("BEGIN", "IMPORT", "UNITS")
-            )
+            ends = token.key in ("BEGIN", "IMPORT", "UNITS")
+            declaring = token.key in ("VAR", "PROCEDURE") or (declaring and not ends)
         elif declaring and token.key in (",", ":") and tokens[index - 2].key not in (":", "OF"):
             if index - 1 in pairs:
                 inside.add(index - 1)
