@@ -1,10 +1,13 @@
 """The thesis' two arms, how their simulations are set so that its numbers come back, and parts of its paths."""
 
+from typing import Any
+
 import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike
 from armwright.clearance.equations import FrictionModel
+from armwright.clearance.feature_sweep import FeatureSweep
 from armwright.clearance.paths import Path
 from armwright.clearance.settings import Settings
 
@@ -26,3 +29,15 @@ def beginning(path: Path, end: float) -> Path:
     """A path up to a time [s]."""
     pieces = int(np.searchsorted(path.knots, end))
     return attrs.evolve(path, knots=np.append(path.knots[:pieces], end), pieces=path.pieces[:pieces], targets=(0.0,))
+
+
+def varied(task: FeatureSweep, **changes: Any) -> FeatureSweep:
+    """The same sweep in another way, on the paths that the first one has prepared: to prepare one takes long.
+
+    Args:
+        task: the first one.
+        changes: fields that the prepared paths do not depend on, such as ``replicates`` and ``with_friction``.
+    """
+    other = attrs.evolve(task, **changes)
+    vars(other)["tasks"] = task.tasks
+    return other

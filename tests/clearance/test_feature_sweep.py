@@ -23,7 +23,7 @@ from armwright.sweep.errors import SweepError
 from armwright.sweep.progress import Progress
 from armwright.sweep.run import run
 from armwright.sweep.task import Status, check_task, evaluate
-from clearance.arms import ARM_A, ARM_B, CENTRE
+from clearance.arms import ARM_A, ARM_B, CENTRE, varied
 
 RANGE = (0.1e-3, 0.5e-3)
 # So much friction in a pin no step can follow.
@@ -47,7 +47,7 @@ def bits(results: Any) -> dict[str, bytes]:
 
 def test_features_of_the_simulation(five_bar: Linkage, task: FeatureSweep) -> None:
     """Without runs beside it a row has the features of the simulation with those clearances, bit for bit."""
-    rows = attrs.evolve(task, replicates=0)(np.array([ARM_B, ARM_A]))
+    rows = varied(task, replicates=0)(np.array([ARM_B, ARM_A]))
 
     alone = simulate(prepare_scenario(five_bar, named_path("y1"), CENTRE), ARM_A)
     for name, value in simulation_features(alone)._asdict().items():
@@ -97,7 +97,7 @@ def test_chance_that_is_left_in_means(rng: np.random.Generator) -> None:
 
 def test_friction_is_a_parameter(five_bar: Linkage, task: FeatureSweep) -> None:
     """With friction as a parameter, its usual value gives the usual row, and another one another row."""
-    with_friction = attrs.evolve(task, with_friction=True)
+    with_friction = varied(task, with_friction=True)
     usual = five_bar.material.friction
 
     rows = with_friction(np.array([[*ARM_A, usual], [*ARM_A, 0.0]]))
@@ -161,9 +161,8 @@ def test_same_bits(task: FeatureSweep, tmp_path: Path) -> None:
     ) as cluster:
         ways: list[dict[str, Any]] = [
             {"workers": 1},
-            {"workers": 1, "block": 1},
             {"workers": 2, "block": 3},
-            {"scheduler": cluster.scheduler_address, "block": 2},
+            {"scheduler": cluster.scheduler_address, "block": 5},
         ]
         result = [bits(run(task, design, tmp_path / str(i), **way)) for i, way in enumerate(ways)]
 
@@ -173,7 +172,7 @@ def test_same_bits(task: FeatureSweep, tmp_path: Path) -> None:
 def test_diverging_run(task: FeatureSweep, tmp_path: Path) -> None:
     """A run that diverges is a row that says so; those beside it keep their bits, and the sweep goes on."""
     pytest.importorskip("xarray")
-    with_friction = attrs.evolve(task, with_friction=True)
+    with_friction = varied(task, with_friction=True)
     well = np.array([[*ARM_A, 0.05], [*ARM_B, 0.05], [*ARM_A, 0.0]])
     points = np.insert(well, 1, [*ARM_B, STUCK], axis=0)
 

@@ -13,6 +13,7 @@ from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
 from armwright.sweep.designs import sobol
 from clearance.arms import ARM_A, ARM_B, PATHS, accuracy
 from clearance.conftest import RANGE, Swept
+from samples import Sample
 
 pytest.importorskip("sklearn")
 
@@ -185,9 +186,10 @@ class TestFiveBar:
 
         assert accuracy(parameters, clearances) > 99.99 > WITHOUT_NOISE
 
-    def test_held_out(self, swept: Swept, rng: np.random.Generator) -> None:
-        """Forty held-out arms are estimated to 99.99 % on average, the worst to 99.9 %."""
-        true = rng.uniform(*RANGE, (40, 3))
+    @pytest.mark.share(0.3)
+    def test_held_out(self, swept: Swept, rng: np.random.Generator, sample: Sample) -> None:
+        """Held-out arms are estimated to 99.99 % on average, the worst to 99.9 %."""
+        true = rng.uniform(*RANGE, (sample.count(40), 3))
 
         parameters = [solve_features(swept.surrogate, row) for row in swept.features(true)]
 
@@ -195,9 +197,10 @@ class TestFiveBar:
         assert right.mean() > 99.99
         assert right.min() > 99.9 > WITHOUT_NOISE
 
-    def test_more_features_tell_more(self, swept: Swept, rng: np.random.Generator) -> None:
+    @pytest.mark.share(0.4)
+    def test_more_features_tell_more(self, swept: Swept, rng: np.random.Generator, sample: Sample) -> None:
         """One feature of three paths, as in the thesis, is less accurate than three features together, with 99 %."""
-        true = rng.uniform(*RANGE, (20, 3))
+        true = rng.uniform(*RANGE, (sample.count(20), 3))
         measured = swept.features(true)
         names = swept.surrogate.features
 

@@ -1,5 +1,7 @@
 """Data that contradict the model: what is refused, what is widened, and whether the intervals contain the truth."""
 
+from collections.abc import Sequence
+
 import attrs
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from armwright.clearance.estimation.posterior import sample_posterior
 from armwright.clearance.estimation.static_estimate import estimate_at_rest, rest_offsets
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
-from armwright.clearance.scenario import prepare_scenario
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.simulation import simulate
 from armwright.errors import ContradictionError
 from clearance.arms import ARM_A, CENTRE, PATHS, STARTS
@@ -103,10 +105,10 @@ def test_attacked_at_rest(five_bar: Linkage, fault: str, sample: Sample) -> None
         assert identified < 60 or covered >= 0.5 * identified
 
 
-def measured_on_paths(linkage: Linkage, c: Array, noise: float, rng: np.random.Generator) -> PathMeasurement:
+def measured_on_paths(tasks: Sequence[Scenario], c: Array, noise: float, rng: np.random.Generator) -> PathMeasurement:
     times, errors = {}, {}
-    for path in PATHS:
-        run = simulate(prepare_scenario(linkage, named_path(path), CENTRE), c)
+    for path, task in zip(PATHS, tasks, strict=True):
+        run = simulate(task, c)
         times[path], errors[path] = run.time, run.error + noise * rng.standard_normal(run.error.shape)
     return PathMeasurement(times=times, errors=errors)
 
@@ -121,9 +123,11 @@ def test_attacked_on_paths(swept: Swept, five_bar: Linkage, fault: str, sample: 
     same lie there with no deviation at all.
     """
     count, refused = sample.count(20), 0
+    heavy = doubled(five_bar)
+    paths = PATHS if fault == "payload" else ()
+    tasks = [prepare_scenario(heavy, named_path(path), CENTRE) for path in paths] or swept.task.tasks
     for rng in sample.cases(20):
-        model = doubled(five_bar) if fault == "payload" else five_bar
-        measured = measured_on_paths(model, rng.uniform(*RANGE, 3), 2e-6, rng)
+        measured = measured_on_paths(tasks, rng.uniform(*RANGE, 3), 2e-6, rng)
         turned = {"sign": lambda x: -x, "swapped": lambda x: x[:, ::-1]}.get(fault, lambda x: x)
         measured = attrs.evolve(measured, errors={name: turned(curve) for name, curve in measured.errors.items()})
         features = measured.features()
@@ -140,9 +144,9 @@ def test_attacked_on_paths(swept: Swept, five_bar: Linkage, fault: str, sample: 
     sample.record(f"tips on paths, fault: {fault}", count, 0, refused=refused)
 
 
-def test_beyond_the_sweep(swept: Swept, five_bar: Linkage, rng: np.random.Generator) -> None:
+def test_beyond_the_sweep(swept: Swept, rng: np.random.Generator) -> None:
     """A clearance beyond the end of the sweep is not told with the deviation that the end makes small."""
-    measured = measured_on_paths(five_bar, np.array((0.3e-3, 0.2e-3, 0.503e-3)), 2e-6, rng)
+    measured = measured_on_paths(swept.task.tasks, np.array((0.3e-3, 0.2e-3, 0.503e-3)), 2e-6, rng)
     features = measured.features()
     values = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
 
@@ -154,9 +158,9 @@ def test_beyond_the_sweep(swept: Swept, five_bar: Linkage, rng: np.random.Genera
     assert distribution.identifiable["c_J4"] is False
 
 
-def test_arm_of_the_model_is_not_refused(swept: Swept, five_bar: Linkage, rng: np.random.Generator) -> None:
+def test_arm_of_the_model_is_not_refused(swept: Swept, rng: np.random.Generator) -> None:
     """Arm A on the paths of the sweep is explained, and its clearances lie within their intervals."""
-    measured = measured_on_paths(five_bar, ARM_A, 2e-6, rng)
+    measured = measured_on_paths(swept.task.tasks, ARM_A, 2e-6, rng)
     features = measured.features()
     values = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
 

@@ -14,7 +14,7 @@ from armwright.clearance.features import Features, error_curve_features
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError
 from armwright.sweep.designs import sobol
-from clearance.arms import ARM_A, PATHS, accuracy
+from clearance.arms import ARM_A, PATHS, accuracy, varied
 from clearance.conftest import FEATURES, RANGE, Swept
 from samples import Sample
 
@@ -204,7 +204,7 @@ def test_intervals_cover(swept: Swept, rng: np.random.Generator, sample: Sample)
 def test_unknown_friction(swept: Swept) -> None:
     """Who does not know the friction knows the clearances less well, and is still right; who is sure of it errs."""
     pytest.importorskip("sklearn")
-    task = attrs.evolve(swept.task, with_friction=True)
+    task = varied(swept.task, with_friction=True)
     names = tuple(name for name in swept.surrogate.features if "offset" not in name)
     points = sobol({**dict.fromkeys(swept.task.parameters, RANGE), "friction": (0.0, 0.1)}, 64, 0).points
     three = FEATURES[:3]
