@@ -198,7 +198,7 @@ WRONG = {
     "a long text": (
         f"m = '{'x' * 200}'",
         lambda t: t.number("m"),
-        f"1: m: expected a number, got the text '{'x' * 60}...'",
+        f"1: m: expected a number, got the text '{'x' * 59}...",
     ),
     "a key that cannot be seen": (
         "' ' = 'x'",

@@ -98,10 +98,8 @@ class Chain:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The errors, in order: those of the elements, then those of the joints."""
-        return (
-            *(element.name for element in self.elements if element.name),
-            *(error.name for error in self.joint_errors),
-        )
+        parts: tuple[Element | JointErrorModel, ...] = (*self.elements, *self.joint_errors)
+        return tuple(part.name for part in parts if part.name)
 
     @property
     def is_length(self) -> Array:

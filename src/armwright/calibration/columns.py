@@ -18,7 +18,6 @@ RPY = ("roll", "pitch", "yaw")
 QUATERNION = ("qw", "qx", "qy", "qz")
 DISTANCE = "distance"
 _WORDS = (*NAMES, "set", "frame", "plane", "anchor", "to")
-_NOMINAL_GROUP = "nominal coordinates and deviations"
 
 
 def joint_columns(arm: Arm) -> list[str]:
@@ -38,13 +37,9 @@ def measured_columns(arm: Arm) -> Schema:
         for i, (name, joint) in enumerate(zip(joint_columns(arm), arm.joints, strict=True), 1)
     ]
     points = [Column(name=name, quantity=LENGTH, group="coordinates") for name in POINTS]
+    group = "nominal coordinates and deviations"
     deviations = [
-        Column(
-            name=f"{axis}_{what}",
-            quantity=LENGTH,
-            group=_NOMINAL_GROUP,
-            synonyms=(f"{axis}_{short}", f"{short}_{axis}"),
-        )
+        Column(name=f"{axis}_{what}", quantity=LENGTH, group=group, synonyms=(f"{axis}_{short}", f"{short}_{axis}"))
         for what, short in (("nominal", "t"), ("deviation", "dif"))
         for axis in POINTS
     ]
@@ -84,9 +79,7 @@ def read_columns(
     joints = joint_columns(arm)
     count = len(header.columns_present(joints))
     header.require(joints, f"{arm.name} has {arm.n} joints, and the file has {count}")
-    points, deviations, angles, quaternion = (
-        bool(header.columns_present(group)) for group in (POINTS, DEVIATIONS, RPY, QUATERNION)
-    )
+    points, deviations, angles, quaternion = map(header.columns_present, (POINTS, DEVIATIONS, RPY, QUATERNION))
     if points and deviations:
         raise header.error("x", f"give the points, or nominal points and deviations, not both: {header.listing}")
     if angles and quaternion:

@@ -143,26 +143,13 @@ class MeasurementModel:
                 [np.tile(X[:3, :3], (len(rows), 1, 1)), np.cross(axes.T, (measured - origin)[:, None]).swapaxes(1, 2)],
                 axis=2,
             )
-            yield Residuals(
-                (tool.position[rows] - measured).ravel(),
-                self._jacobian(J.reshape(-1, J.shape[2]), first, (-levers).reshape(-1, 6) if i else None),
-                np.repeat(rows, 3),
-                np.zeros(3 * len(rows), dtype=np.bool_),
-            )
+            yield self._residuals(rows, tool.position[rows] - measured, J, first, -levers if i else None)
             rows = rows[readings.with_rotation[rows]]
-            if not len(rows):
-                continue
-            values, slope = _rotation_residual(tool.rotation[rows], R @ readings.rotations[rows])
-            J = slope @ tool.rotation_jacobian[rows]
-            turns = np.concatenate([np.zeros((3, 3)), axes], axis=1)
-            yield Residuals(
-                values.ravel(),
-                self._jacobian(
-                    J.reshape(-1, J.shape[2]), first, (-slope.swapaxes(1, 2) @ turns).reshape(-1, 6) if i else None
-                ),
-                np.repeat(rows, 3),
-                np.ones(3 * len(rows), dtype=np.bool_),
-            )
+            if len(rows):
+                values, slope = _rotation_residual(tool.rotation[rows], R @ readings.rotations[rows])
+                J = slope @ tool.rotation_jacobian[rows]
+                setup = -slope.swapaxes(1, 2) @ np.concatenate([np.zeros((3, 3)), axes], axis=1)
+                yield self._residuals(rows, values, J, first, setup if i else None, is_rotation=True)
 
     def _plane_residuals(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
         """Give the heights of the tool over the planes that it touched."""
@@ -178,7 +165,7 @@ class MeasurementModel:
             slopes = plane.axes.T @ (np.eye(3) - np.outer(normal, normal)) / length
             setup = np.stack([-np.ones(len(rows)), -(offset @ slopes[1]), offset @ slopes[0]], axis=1)
             J = np.einsum("i,mik->mk", normal, tool.position_jacobian[rows])
-            yield _length_residuals(offset @ normal - shift, self._jacobian(J, first, setup), rows)
+            yield self._residuals(rows, offset @ normal - shift, J, first, setup)
             first += 3
 
     def _anchor_residuals(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
@@ -188,7 +175,7 @@ class MeasurementModel:
             rows = np.flatnonzero(readings.anchor == i)
             distance, direction = _length_and_direction(tool.position[rows] - anchor - x[first : first + 3])
             J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows])
-            yield _length_residuals(distance - readings.distances[rows], self._jacobian(J, first, -direction), rows)
+            yield self._residuals(rows, distance - readings.distances[rows], J, first, -direction)
             first += 3
 
     def _displacement_residuals(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
@@ -199,20 +186,36 @@ class MeasurementModel:
         other = self.chain.forward(readings.other[rows], x[: len(self.chain.names)])
         distance, direction = _length_and_direction(tool.position[rows] - other.position)
         J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows] - other.position_jacobian)
-        yield _length_residuals(distance - readings.distances[rows], self._jacobian(J), rows)
+        yield self._residuals(rows, distance - readings.distances[rows], J)
 
-    def _jacobian(self, arm: Array, first: int = 0, setup: Array | None = None) -> Array:
-        """Return the Jacobian (r, k) by all errors from those by the arm's and by some that begin at a number."""
-        J = np.zeros((len(arm), len(self.names)))
-        J[:, : arm.shape[1]] = arm
+    def _residuals(
+        self,
+        rows: Numbers,
+        values: Array,
+        arm: Array,
+        first: int = 0,
+        setup: Array | None = None,
+        *,
+        is_rotation: bool = False,
+    ) -> Residuals:
+        """Return residuals of some readings, a number or a vector each.
+
+        Args:
+            rows: (m,) numbers of the readings.
+            values: (m,) or (m, 3) their residuals.
+            arm: (..., a) derivative of these by the errors of the arm.
+            first: number of the first of some errors of the setup.
+            setup: (..., s) derivative by these.
+            is_rotation: whether they are rotations.
+        """
+        J = np.zeros((*values.shape, len(self.names)))
+        J[..., : arm.shape[-1]] = arm
         if setup is not None:
-            J[:, first : first + setup.shape[1]] = setup
-        return J
-
-
-def _length_residuals(values: Array, jacobian: Array, rows: Numbers) -> Residuals:
-    """Return residuals that are lengths, one for each reading."""
-    return Residuals(values, jacobian, rows, np.zeros(len(rows), dtype=np.bool_))
+            J[..., first : first + setup.shape[-1]] = setup
+        reading = np.broadcast_to(rows.reshape(-1, *[1] * (values.ndim - 1)), values.shape)
+        return Residuals(
+            values.ravel(), J.reshape(-1, len(self.names)), reading.ravel(), np.full(values.size, is_rotation)
+        )
 
 
 def _length_and_direction(vectors: Array) -> tuple[Array, Array]:

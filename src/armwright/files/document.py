@@ -1,5 +1,6 @@
 """Reading TOML and JSON: tables that check their values, with errors that name file, line and key."""
 
+import itertools
 import json
 import math
 import tomllib
@@ -10,17 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from armwright.arrays import Array
-from armwright.errors import FileFormatError, closest
+from armwright.arrays import LARGEST, Array
+from armwright.errors import FileFormatError, closest, shown
 from armwright.files.inputs import read_text
 from armwright.files.key_lines import DuplicateKeyError, Keys, LineTree, json_lines, longest_dotted_key, toml_lines
 from armwright.files.limits import limit, limit_message
 
 _MISSING: Any = object()
-# No quantity of a robot is larger, and products of three such numbers are still numbers.
-_LARGEST = 1e100
-# Number of characters that a message shows of a text.
-_MAX_SHOWN_LENGTH = 60
 
 
 class Document:
@@ -243,9 +240,9 @@ class Table:
             raise self._error_at(keys, f"expected a number, got {_value_text(value)}")
         if isinstance(value, float) and not math.isfinite(value):
             raise self._error_at(keys, f"expected a finite number, got {value}")
-        if abs(value) > _LARGEST:
+        if abs(value) > LARGEST:
             got = f"{value:g}" if isinstance(value, float) else "an integer of many digits"
-            raise self._error_at(keys, f"expected a number no larger than {_LARGEST:g}, got {got}")
+            raise self._error_at(keys, f"expected a number no larger than {LARGEST:g}, got {got}")
 
     def _numbers(self, keys: Keys, value: Any, length: int | Collection[int]) -> Array:
         if not isinstance(value, list):
@@ -272,7 +269,7 @@ def _parse(path: Path, text: str, *, is_json: bool) -> Any:
         raise too_deep
     try:
         data = json.loads(text, object_pairs_hook=_object_without_duplicates) if is_json else tomllib.loads(text)
-    except _DuplicateKeyError as error:
+    except DuplicateKeyError as error:
         raise _duplicate_key_error(path, text) or too_deep from error
     except tomllib.TOMLDecodeError as error:
         raise _toml_error(path, text, error) from error
@@ -287,18 +284,15 @@ def _parse(path: Path, text: str, *, is_json: bool) -> Any:
     return data
 
 
-class _DuplicateKeyError(Exception):
-    """A key of a JSON object is given twice; JSON lets that pass, and the first value would be lost."""
-
-
 def _object_without_duplicates(members: list[tuple[str, Any]]) -> dict[str, Any]:
     result = dict(members)
     if len(result) < len(members):
-        raise _DuplicateKeyError
+        raise DuplicateKeyError
     return result
 
 
 def _duplicate_key_error(path: Path, text: str) -> FileFormatError | None:
+    """Return the error with the path and the line of the key, which the parser does not know; None if too deep."""
     try:
         json_lines(text)
     except DuplicateKeyError as error:
@@ -319,15 +313,11 @@ def _is_within_nesting_limit(path: Path, data: Any) -> bool:
     for _ in range(limit("nesting") + 1):
         if any(type(value) is int and abs(value) >= largest for value in row):
             raise _digits_error(path)
-        row = [
-            below
-            for value in row
-            if isinstance(value, dict | list)
-            for below in (value.values() if isinstance(value, dict) else value)
+        containers = [
+            value.values() if isinstance(value, dict) else value for value in row if isinstance(value, dict | list)
         ]
-        if not row:
-            return True
-    return False
+        row = [*itertools.chain.from_iterable(containers)]
+    return not row
 
 
 def _digits_error(path: Path) -> FileFormatError:
@@ -354,17 +344,12 @@ def _keys_text(keys: Keys) -> str:
         if isinstance(key, int):
             words[-1] += f" {key + 1}"
         else:
-            words.append(key if key.isprintable() and key.strip() else _quote(key))
+            words.append(key if key.isprintable() and key.strip() else shown(key))
     return ", ".join(words)
 
 
 def _numbers_text(length: int | Collection[int]) -> str:
     return f"{length if isinstance(length, int) else ' or '.join(map(str, length))} numbers"
-
-
-def _quote(text: str) -> str:
-    """Write a text on one line, not too long."""
-    return repr(text if len(text) <= _MAX_SHOWN_LENGTH else f"{text[:_MAX_SHOWN_LENGTH]}...")
 
 
 def _value_text(value: Any) -> str:
@@ -373,9 +358,7 @@ def _value_text(value: Any) -> str:
     if isinstance(value, bool):
         return f"the truth value {str(value).lower()}"
     if isinstance(value, str):
-        return f"the text {_quote(value)}"
+        return f"the text {shown(value)}"
     if isinstance(value, list):
         return f"a list of {len(value)}"
-    if isinstance(value, dict):
-        return "a table"
-    return f"{value}"
+    return "a table" if isinstance(value, dict) else f"{value}"

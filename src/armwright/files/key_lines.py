@@ -28,8 +28,8 @@ _KEY_NAMES = re.compile(_NAME, re.DOTALL)
 class DuplicateKeyError(Exception):
     """A key of a JSON object occurs twice; JSON permits that, and the first value would be lost."""
 
-    def __init__(self, keys: Keys, line: int) -> None:
-        """Keep the path to the key, and the line of the second."""
+    def __init__(self, keys: Keys = (), line: int = 1) -> None:
+        """Keep the path to the key, and the line of the second, as far as they are known."""
         super().__init__(f"{keys} occurs twice, again in line {line}")
         self.keys, self.line = keys, line
 
@@ -94,7 +94,7 @@ def json_lines(text: str) -> LineTree:
     """Return the line, from 1, of every key of a text that is valid JSON.
 
     Raises:
-        TwinKeyError: an object has a key twice.
+        DuplicateKeyError: an object has a key twice.
     """
     scanner = _Scanner(text, ":")
     scanner.skip_blanks()
