@@ -1,19 +1,18 @@
 """``armwright repl``: enter statements interactively in a simulated cell."""
 
-import contextlib
 import functools
 import io
 import json
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.failures import failure_data
+from armwright.cli.failures import outcome
 from armwright.cli.programs import CellFile, Std
 from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.language.words import Standard
@@ -46,7 +45,7 @@ def repl(
     """
     from armwright.cli.programs import read_cell_option
     from armwright.cli.repl_commands import COMMANDS, Commands
-    from armwright.cli.repl_lines import Script, line_editing, read_typed_line
+    from armwright.cli.repl_lines import Script, handle_interrupt, line_editing, read_typed_line
     from armwright.program.api import import_reader
     from armwright.program.repl.session import Session
 
@@ -60,24 +59,16 @@ def repl(
     if program is not None:
         printer.answer(commands.load_file(program))
     if not interactive:
-        _converse(session, commands, Script().line, printer)
+        script = Script()
+        _converse(session, commands, lambda _: script.readline(), printer)
         if printer.status:
             raise typer.Exit(printer.status)
         return
     _greet(session)
-    with _interruptible(), line_editing(session, COMMANDS):
+    # Ctrl-C ends a line or a statement instead of the session.
+    with handle_interrupt(signal.default_int_handler), line_editing(session, COMMANDS):
         colour = not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") != "dumb"
         _converse(session, commands, functools.partial(read_typed_line, colour=colour), printer)
-
-
-@contextlib.contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let Ctrl-C end a line or a statement instead of the session."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _greet(session: "Session") -> None:
@@ -91,10 +82,8 @@ def _greet(session: "Session") -> None:
 # ---- the conversation ----------------------------------------------------------------------------------------------
 
 
-def _converse(
-    session: "Session", commands: "Commands", next_line: Callable[[str], str | None], printer: "_Printer"
-) -> None:
-    """Read and execute lines until the input ends; ``next_line`` takes a prompt, and returns None at the end."""
+def _converse(session: "Session", commands: "Commands", next_line: Callable[[str], str], printer: "_Printer") -> None:
+    """Read and execute lines until the input ends; ``next_line`` takes a prompt, and returns an empty text then."""
     from armwright.cli.repl_commands import EndOfSessionError
 
     incomplete = ""
@@ -108,10 +97,10 @@ def _converse(
             session.skip_lines(incomplete)
             incomplete = ""
             continue
-        if line is None:
+        if not line:
             break
         try:
-            incomplete = _execute_line(session, commands, incomplete, line, printer)
+            incomplete = _execute_line(session, commands, incomplete, line.rstrip("\r\n"), printer)
         except EndOfSessionError:
             return
         except KeyboardInterrupt:
@@ -172,10 +161,11 @@ class _Printer:
             self.status = max(self.status, error.exit_status)
             self._console.print(f"error: {error}", style="bold red")
             return
-        for text in reply.lines:
-            self._console.print(text)
-        if reply.answer is not None:
-            self.answer(reply.answer)
+        if isinstance(reply, list):
+            for text in reply:
+                self._console.print(text)
+        else:
+            self.answer(reply)
 
     def interrupted(self) -> None:
         """Print that a statement was interrupted."""
@@ -210,12 +200,13 @@ class _JsonPrinter(_Printer):
             reply = commands.run(line)
         except ArmwrightError as error:
             self.status = max(self.status, error.exit_status)
-            self._print({**data, "ok": False, **failure_data(error.exit_status, error, str(error))})
+            self._print({**data, "ok": False, **outcome(error)})
             return
-        entered = {} if reply.answer is None else _as_data(reply.answer)
-        if reply.answer is not None:
-            self.status = max(self.status, reply.answer.status)
-        self._print({**data, "ok": True, "exit_status": ExitStatus.DONE, "lines": list(reply.lines), **entered})
+        if isinstance(reply, list):
+            self._print({**data, "ok": True, "exit_status": ExitStatus.DONE, "lines": reply})
+        else:
+            self.status = max(self.status, reply.status)
+            self._print({**data, **_as_data(reply), "lines": []})
 
     def _print(self, data: dict[str, Any]) -> None:
         print(json.dumps({**data, "time": self._session.state.machine.now}, ensure_ascii=False))

@@ -5,9 +5,7 @@ import os
 import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import attrs
+from typing import TYPE_CHECKING, NamedTuple
 
 from armwright.errors import InvalidValueError, OutputError, UnknownNameError, shortened
 
@@ -19,19 +17,6 @@ _PROGRAM = "session.rlo"
 
 class EndOfSessionError(Exception):
     """The user has ended the session."""
-
-
-@attrs.frozen(kw_only=True)
-class Reply:
-    """The result of a command.
-
-    Attributes:
-        lines: text for people.
-        answer: the result of the statements of a file, if the command has loaded one.
-    """
-
-    lines: tuple[str, ...] = ()
-    answer: "InputResult | None" = None
 
 
 class Commands:
@@ -46,8 +31,8 @@ class Commands:
         """
         self._session, self._cell = session, cell
 
-    def run(self, line: str) -> Reply:
-        """Run the command of a line that begins with a colon.
+    def run(self, line: str) -> "list[str] | InputResult":
+        """Run the command of a line that begins with a colon; return its lines, or the results of a file it has loaded.
 
         Raises:
             ArmwrightError: the command is unknown, or fails.
@@ -66,63 +51,64 @@ class Commands:
 
     # ---- inspection ------------------------------------------------------------------------------------------------
 
-    def frames(self, _: str) -> Reply:
+    def frames(self, _: str) -> list[str]:
         """Show the frame tree: positions in the unit of the program, rotations about z, y, x in degrees."""
         from armwright.program.repl.frame_view import frame_table_lines
 
-        return Reply(lines=tuple(frame_table_lines(self._session)))
+        return frame_table_lines(self._session)
 
-    def arms(self, _: str) -> Reply:
+    def arms(self, _: str) -> list[str]:
         """Show the joints of the arms and the objects that they grasp."""
         from armwright.program.repl.frame_view import arm_lines
 
-        return Reply(lines=tuple(arm_lines(self._session)))
+        return arm_lines(self._session)
 
-    def time(self, _: str) -> Reply:
+    def time(self, _: str) -> list[str]:
         """Show the clock of the cell."""
-        return Reply(lines=(f"{self._session.state.machine.now:.3f} s",))
+        return [f"{self._session.state.machine.now:.3f} s"]
 
-    def list(self, _: str) -> Reply:
+    def list_program(self, _: str) -> list[str]:
         """Show the session as a program."""
-        return Reply(lines=tuple(self._session.program().splitlines()))
+        return self._session.program().splitlines()
 
-    def help(self, _: str) -> Reply:
+    def help(self, _: str) -> list[str]:
         """List the commands."""
-        rows = [(f":{name} {command.argument}".rstrip(), command.summary) for name, command in _COMMANDS.items()]
+        rows = [
+            (f":{name} {command.argument}".rstrip(), (command.run.__doc__ or "").rstrip("."))
+            for name, command in _COMMANDS.items()
+        ]
         width = max(len(usage) for usage, _ in rows)
-        return Reply(
-            lines=(
-                "Enter statements, declarations (VAR, PROCEDURE, UNITS, IMPORT), or an expression to see its value.",
-                "An incomplete statement continues on the next line. Ctrl-C abandons a line, Ctrl-D ends the session.",
-                *(f"  {usage:<{width}}  {summary}" for usage, summary in rows),
-            )
-        )
+        return [
+            "Enter statements, declarations (VAR, PROCEDURE, UNITS, IMPORT), or an expression to see its value.",
+            "An incomplete statement continues on the next line. Ctrl-C abandons a line, Ctrl-D ends the session.",
+            *(f"  {usage:<{width}}  {summary}" for usage, summary in rows),
+        ]
 
-    def quit(self, _: str) -> Reply:
+    def quit(self, _: str) -> list[str]:
         """End the session."""
         raise EndOfSessionError
 
     # ---- undo and redo ---------------------------------------------------------------------------------------------
 
-    def undo(self, argument: str) -> Reply:
+    def undo(self, argument: str) -> list[str]:
         """Undo the last statements, with frames, arms, clock, camera and devices."""
         undone = self._session.undo(_parse_count(argument))
         if not undone:
             raise InvalidValueError("there is nothing to undo")
-        return Reply(lines=tuple(f"undone: {text}" for text in undone))
+        return [f"undone: {text}" for text in undone]
 
-    def redo(self, argument: str) -> Reply:
+    def redo(self, argument: str) -> list[str]:
         """Redo the statements that were undone last."""
         redone = self._session.redo(_parse_count(argument))
         if not redone:
             raise InvalidValueError("there is nothing to redo")
-        return Reply(lines=tuple(f"redone: {text}" for text in redone))
+        return [f"redone: {text}" for text in redone]
 
     # ---- files -----------------------------------------------------------------------------------------------------
 
-    def load(self, argument: str) -> Reply:
+    def load(self, argument: str) -> "InputResult":
         """Enter the statements of a file, such as a program."""
-        return Reply(answer=self.load_file(_parse_path(argument)))
+        return self.load_file(_parse_path(argument))
 
     def load_file(self, path: Path) -> "InputResult":
         """Enter the statements of a file.
@@ -138,15 +124,15 @@ class Commands:
             Source(path.name, read_program(path)), lambda name: os.path.normpath(path.parent / name)
         )
 
-    def save(self, argument: str) -> Reply:
+    def save(self, argument: str) -> list[str]:
         """Write the session as a program with the same final state."""
         return self._save(_output_path(argument), overwrite=False)
 
-    def overwrite(self, argument: str) -> Reply:
+    def overwrite(self, argument: str) -> list[str]:
         """Write the session over an existing file."""
         return self._save(_output_path(argument), overwrite=True)
 
-    def _save(self, path: Path, *, overwrite: bool) -> Reply:
+    def _save(self, path: Path, *, overwrite: bool) -> list[str]:
         from armwright.files.output import write_file
 
         if path.is_dir():
@@ -154,7 +140,7 @@ class Commands:
         if path.exists() and not overwrite:
             raise OutputError(f"'{path}' exists already; `:save! {path}` overwrites it")
         write_file(path, self._program(path), back=overwrite)
-        return Reply(lines=(f"saved: {path}",))
+        return [f"saved: {path}"]
 
     def _program(self, path: Path) -> str:
         """Return the session as a program at a path: relative paths start from its folder."""
@@ -162,7 +148,7 @@ class Commands:
         remark = shlex.join(["armwright", "run", path.name, *cell])
         return self._session.program(remark, lambda name: _relative_to(path.parent, name))
 
-    def report(self, argument: str) -> Reply:
+    def report(self, argument: str) -> list[str]:
         """Write the program and its results: motion, events, frames, and a page that shows the arms moving."""
         from armwright.files.output import folder_error_text
 
@@ -182,7 +168,7 @@ class Commands:
                 for path in missing:
                     path.rmdir()
             raise
-        return Reply(lines=(f"report: {folder / 'report.html'}",))
+        return [f"report: {folder / 'report.html'}"]
 
     def _report(self, folder: Path) -> None:
         from armwright.program import Source, compile as compile_program, run
@@ -208,39 +194,33 @@ class Commands:
         write_run(folder, recording, (*compiled.diagnostics, *run_diagnostics(recording)), origin)
 
 
-@attrs.frozen(kw_only=True)
-class _Command:
+class _Command(NamedTuple):
     """A command.
 
     Attributes:
-        run: the method that runs it.
+        run: the method that runs it; its docstring describes the command for people.
         argument: name of its argument for people, in brackets where it is optional; empty without an argument.
         example: example of the argument.
     """
 
-    run: Callable[[Commands, str], Reply]
+    run: "Callable[[Commands, str], list[str] | InputResult]"
     argument: str = ""
     example: str = ""
 
-    @property
-    def summary(self) -> str:
-        """The description of the command, for people."""
-        return (self.run.__doc__ or "").rstrip(".")
-
 
 _COMMANDS: Mapping[str, _Command] = {
-    "frames": _Command(run=Commands.frames),
-    "arms": _Command(run=Commands.arms),
-    "time": _Command(run=Commands.time),
-    "list": _Command(run=Commands.list),
-    "undo": _Command(run=Commands.undo, argument="[n]"),
-    "redo": _Command(run=Commands.redo, argument="[n]"),
-    "load": _Command(run=Commands.load, argument="FILE", example="stacking.rlo"),
-    "save": _Command(run=Commands.save, argument="FILE", example="try.rlo"),
-    "save!": _Command(run=Commands.overwrite, argument="FILE", example="try.rlo"),
-    "report": _Command(run=Commands.report, argument="DIR", example="out"),
-    "help": _Command(run=Commands.help),
-    "quit": _Command(run=Commands.quit),
+    "frames": _Command(Commands.frames),
+    "arms": _Command(Commands.arms),
+    "time": _Command(Commands.time),
+    "list": _Command(Commands.list_program),
+    "undo": _Command(Commands.undo, "[n]"),
+    "redo": _Command(Commands.redo, "[n]"),
+    "load": _Command(Commands.load, "FILE", "stacking.rlo"),
+    "save": _Command(Commands.save, "FILE", "try.rlo"),
+    "save!": _Command(Commands.overwrite, "FILE", "try.rlo"),
+    "report": _Command(Commands.report, "DIR", "out"),
+    "help": _Command(Commands.help),
+    "quit": _Command(Commands.quit),
 }
 COMMANDS = tuple(_COMMANDS)
 

@@ -1,15 +1,20 @@
 """The input lines of a session: from a terminal with history and completion, or from a file or pipe."""
 
 import contextlib
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from armwright.errors import FileFormatError
 from armwright.files.limits import MEGABYTE, limit, limit_message
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from io import TextIOWrapper
+    from types import FrameType
+
     from armwright.program.repl.session import Session
 
 # Lines of earlier sessions that the arrow keys recall.
@@ -22,37 +27,46 @@ PATH_COMMANDS = ("load", "save", "save!", "report")
 
 
 class Script:
-    """Lines of a standard input that is not a terminal: no prompts, no history."""
+    """The lines of a standard input that is not a terminal, in UTF-8 in every locale."""
 
     def __init__(self) -> None:
-        """Begin with the first line, which may have a byte order mark."""
-        self._encoding = "utf-8-sig"
+        """Begin with the first line, which may have a byte order mark; other bytes are replaced by a character."""
+        cast("TextIOWrapper", sys.stdin).reconfigure(encoding="utf-8-sig", errors="replace", newline="\n")
 
-    def line(self, prompt: str) -> str | None:  # noqa: ARG002 - a script has no prompts
-        """Return the next line, None at the end; bytes that are not UTF-8 become replacement characters.
+    def readline(self) -> str:
+        """Return the next line with its end; an empty text at the end of the input.
 
         Raises:
             FileFormatError: the line is longer than a program may be.
         """
         max_length = limit("program_mb") * MEGABYTE
-        line = sys.stdin.buffer.readline(max_length + 1)
+        line = sys.stdin.readline(max_length + 1)
         if len(line) > max_length:
             raise FileFormatError("standard input", None, "", f"a line is too long: {limit_message('program_mb')}")
-        text, self._encoding = line.decode(self._encoding, errors="replace"), "utf-8"
-        return text.rstrip("\r\n") if line else None
+        return line
 
 
-def read_typed_line(prompt: str, *, colour: bool) -> str | None:
-    """Return the line that is typed on a terminal after a prompt, which may be in colour; None at the end of the input.
+@contextlib.contextmanager
+def handle_interrupt(handler: "Callable[[int, FrameType | None], object]") -> Iterator[None]:
+    """Call a function on Ctrl-C."""
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def read_typed_line(prompt: str, *, colour: bool) -> str:
+    """Return the line that is typed on a terminal after a prompt, which may be in colour, as a script does.
 
     Raises:
         KeyboardInterrupt: the line was abandoned.
     """
     try:
-        return input(_PROMPT.format(prompt) if colour else prompt)
+        return input(_PROMPT.format(prompt) if colour else prompt) + "\n"
     except EOFError:
         print()
-        return None
+        return ""
 
 
 @contextlib.contextmanager
