@@ -32,16 +32,12 @@ class Quantity(NamedTuple):
 
     Attributes:
         name: as messages call it.
-        units: SI values of the units that a column name may end in; none for words and plain numbers.
+        units: SI values of the units that a column name may end in, the usual one first; none for words and plain
+            numbers.
     """
 
     name: str
     units: Mapping[str, float]
-
-    @property
-    def usual_unit(self) -> str:
-        """The unit that is proposed."""
-        return next(iter(self.units))
 
 
 _DEGREE = math.pi / 180
@@ -81,7 +77,7 @@ class Column:
     @property
     def name_with_unit(self) -> str:
         """Its name, with the usual unit where it must have one."""
-        return self.name if self.unit or not self.quantity.units else f"{self.name}_{self.quantity.usual_unit}"
+        return self.name if self.unit or not self.quantity.units else f"{self.name}_{next(iter(self.quantity.units))}"
 
     @property
     def names_with_units(self) -> str:
@@ -167,17 +163,15 @@ def resolve_headings(
             raise names.error(text, "a minus sign in the name of a column does not apply to its numbers; negate them")
         unit = unit or (units or {}).get(column.quantity.name, "") or column.unit
         if column.quantity.units and not unit:
-            options = "--columns" if units is None else "--columns or --units"
-            raise names.error(
-                text, f"the name has no unit: expected {column.names_with_units}, in the file or by {options}"
-            )
+            where = f"in the file or by {'--columns' if units is None else '--columns or --units'}"
+            raise names.error(text, f"the name has no unit: expected {column.names_with_units}, {where}")
         if column.name in headings:
             raise names.error(text, f"a second column for this quantity, after {headings[column.name].text}")
         headings[column.name] = Heading(cell, column, unit, text)
     first: dict[str, Heading] = {}
     for heading in headings.values():
         group = heading.column.group
-        other = first.setdefault(group, heading) if group else heading
+        other = first.setdefault(group or heading.column.name, heading)
         if other.unit != heading.unit:
             raise names.error(heading.text, f"{group} must have one unit in a file, but {other.text} has another")
     return headings
@@ -191,10 +185,9 @@ class _NameResolver:
         self._own = {column.name: [column] for column in schema.columns}
         self._all = {name: list(columns) for name, columns in self._own.items()}
         for column in schema.columns:
-            for synonym in column.synonyms:
-                columns = self._all.setdefault("_".join(_words(synonym)), [])
-                if column not in columns:
-                    columns.append(column)
+            for synonym in dict.fromkeys("_".join(_words(synonym)) for synonym in column.synonyms):
+                if synonym != column.name:
+                    self._all.setdefault(synonym, []).append(column)
 
     def error(self, text: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a column."""
@@ -220,8 +213,8 @@ class _NameResolver:
             splits = [split for split in splits if set(split[1]).isdisjoint(_NOMINAL | _MEASURED)]
             splits += [(base_words[:end] + nominal, base_words[end:]) for end in range(len(base_words), 0, -1)]
         lenient = self._schema.ignores_unknown and not mapped
-        for name, unit in (("_".join(name), "_".join(unit)) for name, unit in splits):
-            columns = (self._own.get(name) if mapped else None) or self._all.get(name, [])
+        for name, unit in (map("_".join, split) for split in splits):
+            columns = (self._own.get(name) if mapped else None) or self._all.get(name)
             if not columns:
                 continue
             if len(columns) > 1:
@@ -234,21 +227,18 @@ class _NameResolver:
                 raise self.error(text, _unit_error_text(columns[0], unit))
         if lenient:
             return None
-        raise self._unknown_name_error("_".join(words), text)
+        raise self.error(text, self._schema.explain("_".join(words)) or self._unknown_name_text("_".join(words)))
 
-    def _unknown_name_error(self, name: str, text: str) -> FileFormatError:
-        explained = self._schema.explain(name)
-        if explained:
-            return self.error(text, explained)
+    def _unknown_name_text(self, name: str) -> str:
         spellings = [
-            "_".join(filter(None, (key, unit)))
+            f"{key}_{unit}".rstrip("_")
             for key, columns in self._all.items()
             for unit in columns[0].quantity.units or ("",)
         ]
         near = closest(name, spellings)
         hint = f" Did you mean '{near}'?" if near else ""
         known = ", ".join(column.name_with_unit for column in self._schema.columns)
-        return self.error(text, f"no such column.{hint} Known: {known}; comments are columns named note...")
+        return f"no such column.{hint} Known: {known}; comments are columns named note..."
 
 
 def normalised_name(header: str) -> str:

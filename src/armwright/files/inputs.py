@@ -15,13 +15,8 @@ from armwright.errors import FileFormatError, closest
 from armwright.files.limits import MEGABYTE, limit, limit_message
 
 _PIECE_BYTES = 1 << 20
-_FILE_TYPES = {
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFDIR: "a folder",
-}
+# By the letter with which `ls -l` marks them.
+_FILE_TYPES = {"p": "a pipe", "c": "a device", "b": "a device", "s": "a socket", "d": "a folder"}
 # Names of a folder among which the nearest to a missing one is looked for.
 _MAX_NAMES = 1000
 # The SHA-256 hash of what was read last of every file: the file may be another by now, or a pipe, which is empty then.
@@ -43,7 +38,7 @@ def regular_file(path: Path) -> Path:
     except (OSError, ValueError):
         return path  # reading it says what is wrong
     if not stat.S_ISREG(mode):
-        kind = _FILE_TYPES.get(stat.S_IFMT(mode), "something else")
+        kind = _FILE_TYPES.get(stat.filemode(mode)[0], "something else")
         raise FileFormatError(path, None, "", f"expected a file, got {kind}")
     return path
 
@@ -190,11 +185,11 @@ def read_typed_program(stream: BinaryIO) -> str:
     Raises:
         FileFormatError: it is larger than the limit, or not UTF-8.
     """
-    most = limit("program_mb") * MEGABYTE
+    most, name = limit("program_mb") * MEGABYTE, "standard input"
     data = stream.read(most + 1)
     if len(data) > most:
-        raise FileFormatError("standard input", None, "", f"too large: {limit_message('program_mb')}")
-    return decode(data, "standard input")
+        raise _size_error(name, "program_mb", None)
+    return decode(data, name)
 
 
 def decode(data: bytes, path: Path | str) -> str:
@@ -216,7 +211,7 @@ def utf8_error(path: Path | str, line: int, byte: int) -> FileFormatError:
     return FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} is invalid; save it as UTF-8")
 
 
-def _size_error(path: Path, bound: str, size: int | None) -> FileFormatError:
+def _size_error(path: Path | str, bound: str, size: int | None) -> FileFormatError:
     got = None if size is None else f"{size / MEGABYTE:,.1f}"
     return FileFormatError(path, None, "", f"too large: {limit_message(bound, got)}")
 

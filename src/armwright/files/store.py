@@ -119,9 +119,7 @@ def user_store(name: str) -> Store:
         name: of the store, a folder in the cache folder.
     """
     folder = cache_folder()
-    if folder is None:
-        return Store(None)
-    return _trusted_store(folder, name)
+    return Store(None) if folder is None else _trusted_store(folder, name)
 
 
 @cache
@@ -142,17 +140,15 @@ def cache_folder() -> Path | None:
 
     None where the user has no home: no such variable is set and no such user is known, as in many containers.
     """
-    own = os.environ.get("ARMWRIGHT_CACHE")
-    if own:
+    if own := os.environ.get("ARMWRIGHT_CACHE"):
         return Path(own).absolute()
-    caches = os.environ.get("XDG_CACHE_HOME", "")
-    if Path(caches).is_absolute():
-        return Path(caches) / "armwright"
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    return home / ".cache" / "armwright" if home.is_absolute() else None
+    caches = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not caches.is_absolute():
+        try:
+            caches = Path.home() / ".cache"
+        except RuntimeError:
+            return None
+    return caches / "armwright" if caches.is_absolute() else None
 
 
 def make_private(folder: Path) -> None:
