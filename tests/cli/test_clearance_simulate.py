@@ -19,8 +19,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a run of path y1."""
     folder = tmp_path_factory.mktemp("rattling") / "out"
     done = armwright(
-        "clearance", "simulate", "five-bar", "--path", "y1", "--clearance-mm", "0.4", "--clearance", "J2=0.3mm", "-o",
-        folder,
+        "clearance", "simulate", "five-bar", "--path", "y1", "--clearance-mm", "0.4", "--clearance", "J2=0.3mm",
+        "--step", "2e-5", "-o", folder,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert f"report: {folder / 'report.html'}" in done.stdout
@@ -72,6 +72,8 @@ def test_turning_drive() -> None:
         "2",
         "--start",
         "centred",
+        "--step",
+        "2e-5",
         "--json",
     )
 
@@ -84,7 +86,7 @@ def test_turning_drive() -> None:
 
 def test_quiet() -> None:
     """With -q nothing is printed."""
-    done = armwright("clearance", "simulate", "five-bar", "--path", "y1", "-q")
+    done = armwright("clearance", "simulate", "five-bar", "--path", "y1", "--step", "2e-5", "-q")
 
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
@@ -102,7 +104,7 @@ def test_quiet() -> None:
         (["five-bar", "--path", "y1", "--step", "1e-3"], "is too long for contacts"),
     ],
 )
-def test_slips(arguments: list[str], said: str) -> None:
+def test_misspelt_names_and_wrong_numbers(arguments: list[str], said: str) -> None:
     """A slip ends with one line that names the nearest thing, or what is expected."""
     done = armwright("clearance", "simulate", *arguments, columns=200)
 
@@ -124,7 +126,7 @@ def test_slips(arguments: list[str], said: str) -> None:
         (["five-bar", "--path", "y1", "--clearance", "J2=thick"], "J2=0.5, got J2=thick"),
     ],
 )
-def test_usage(arguments: list[str], said: str) -> None:
+def test_options_that_do_not_fit_together(arguments: list[str], said: str) -> None:
     """Options that do not fit together, or cannot be read, are a matter of usage: status 2, and what was meant."""
     done = armwright("clearance", "simulate", *arguments, columns=200)
 
