@@ -9,7 +9,7 @@ import attrs
 
 from armwright.program.api import Compilation
 from armwright.program.language.diagnostic import Diagnostic, Fix
-from armwright.program.language.source import Source
+from armwright.program.language.source import Source, Span
 from armwright.program.language.text_edits import TextEdit, apply_edits
 
 # How often a program is looked at again: one cure may bring the next slip to light.
@@ -74,9 +74,7 @@ def apply_fixes(source: Source, compile_source: Compile, *, rounds: int = MAX_RO
     rejected: set[tuple[str, str]] = set()
     for _ in range(rounds if "\0" not in source.text else 0):
         offered = [
-            diagnostic
-            for diagnostic in current.diagnostics
-            if diagnostic.fixes and _message_key(diagnostic, current.source) not in rejected
+            one for one in current.diagnostics if one.fixes and _message_key(one, current.source) not in rejected
         ]
         selected = select_disjoint(offered)
         if not selected:
@@ -93,9 +91,9 @@ def apply_fixes(source: Source, compile_source: Compile, *, rounds: int = MAX_RO
 def select_disjoint(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Return those whose changes can be made at once: of two that touch, the first."""
     disjoint: list[Diagnostic] = []
-    taken: list[tuple[int, int]] = []
+    taken: list[Span] = []
     for diagnostic in sorted(diagnostics, key=lambda diagnostic: min(fix.span.start for fix in diagnostic.fixes)):
-        spans = [(fix.span.start, fix.span.end) for fix in diagnostic.fixes]
+        spans = [fix.span for fix in diagnostic.fixes]
         if not any(_touches(span, taken) for span in spans):
             disjoint.append(diagnostic)
             for span in spans:
@@ -103,10 +101,10 @@ def select_disjoint(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     return disjoint
 
 
-def _touches(span: tuple[int, int], taken: Sequence[tuple[int, int]]) -> bool:
+def _touches(span: Span, taken: Sequence[Span]) -> bool:
     """Whether a span touches one of some, which are in order and do not touch one another."""
     index = bisect_right(taken, span)
-    return (index > 0 and taken[index - 1][1] >= span[0]) or (index < len(taken) and taken[index][0] <= span[1])
+    return any(other.start <= span.end and span.start <= other.end for other in taken[max(0, index - 1) : index + 1])
 
 
 def _apply(source: Source, diagnostics: Iterable[Diagnostic]) -> Source:
@@ -123,21 +121,13 @@ def _improves(selected: Sequence[Diagnostic], before: Compilation, after: Compil
     """
     changes = _OffsetMap(selected)
     repeated = {(one.code, one.message, index) for one in selected for index in changes.map_offset(one.span.start)}
-    known = {
-        (diagnostic.code, index)
-        for diagnostic in before.diagnostics
-        if diagnostic.is_syntax
-        for index in changes.map_offset(diagnostic.span.start)
-    } - {(code, index) for code, _, index in repeated}
-    for diagnostic in after.diagnostics:
-        index = diagnostic.span.start
-        if (diagnostic.code, diagnostic.message, index) in repeated:
-            return False
-        if (
-            diagnostic.is_syntax
-            and (diagnostic.code, index) not in known
-            and not (diagnostic.fixes and index in changes.ends)
-        ):
+    syntax_errors = [one for one in before.diagnostics if one.is_syntax]
+    known = {(one.code, index) for one in syntax_errors for index in changes.map_offset(one.span.start)}
+    known -= {(code, index) for code, _, index in repeated}
+    for one in after.diagnostics:
+        index = one.span.start
+        is_new = one.is_syntax and (one.code, index) not in known
+        if (one.code, one.message, index) in repeated or (is_new and not (one.fixes and index in changes.ends)):
             return False
     return True
 
@@ -146,9 +136,7 @@ class _OffsetMap:
     """How places move when changes are made."""
 
     def __init__(self, selected: Iterable[Diagnostic]) -> None:
-        spans = sorted(
-            (fix.span.start, fix.span.end, len(fix.replacement)) for diagnostic in selected for fix in diagnostic.fixes
-        )
+        spans = sorted((*fix.span, len(fix.replacement)) for diagnostic in selected for fix in diagnostic.fixes)
         self._starts = [start for start, _, _ in spans]
         self._shifts = [0, *accumulate(longer - (end - start) for start, end, longer in spans)]
         self.ends = {end + longer for (_, end, _), longer in zip(spans, self._shifts[1:], strict=True)}
@@ -173,9 +161,10 @@ def _select_improving(
         if not groups:
             break
         group = groups.pop()
-        tried = compile_source(_apply(before.source, [*accepted, *group]))
-        if _improves([*accepted, *group], before, tried):
-            accepted, after = [*accepted, *group], tried
+        trial = [*accepted, *group]
+        compilation = compile_source(_apply(before.source, trial))
+        if _improves(trial, before, compilation):
+            accepted, after = trial, compilation
         elif len(group) > 1:
             half = len(group) // 2
             groups += [group[half:], group[:half]]

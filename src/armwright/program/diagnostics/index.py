@@ -51,7 +51,7 @@ class Page:
 @cache
 def codes() -> tuple[str, ...]:
     """Return all codes that have a page: errors, devices, warnings, style."""
-    return tuple(sorted((path.stem for path in _PAGES.glob("*.md")), key=_sort_key))
+    return tuple(sorted((path.stem for path in _PAGES.glob("*.md")), key=lambda code: (_ORDER.index(code[0]), code)))
 
 
 def codes_by_range() -> dict[str, tuple[str, ...]]:
@@ -83,7 +83,3 @@ def _read_page(code: str) -> Page:
     match = _PAGE.fullmatch((_PAGES / f"{code}.md").read_text(encoding="utf-8"))
     assert match is not None, f"the page of {code} has not the form of a page"  # noqa: S101 - our own pages
     return Page(**match.groupdict())
-
-
-def _sort_key(code: str) -> tuple[int, str]:
-    return _ORDER.index(code[0]), code

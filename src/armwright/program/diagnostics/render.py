@@ -83,9 +83,8 @@ def _diagnostic_rows(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
                 (" " * width + " | " + " " * len(before_it), _GUTTER_STYLE),
                 *_marker_row(label, mark, style, source, (first, last)),
             ]
-    for head, texts in (("note", diagnostic.notes), ("help", diagnostic.helps)):
-        for text in texts:
-            yield [(" " * width + " = ", _GUTTER_STYLE), (f"{head}: ", "bold"), (text, "")]
+    for head, text in diagnostic.remarks:
+        yield [(" " * width + " = ", _GUTTER_STYLE), (f"{head}: ", "bold"), (text, "")]
 
 
 def _visible_range(length: int, column: int) -> tuple[int, int]:

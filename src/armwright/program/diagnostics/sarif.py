@@ -5,11 +5,9 @@ from pathlib import PurePath
 from typing import Any
 
 from armwright.program.diagnostics.index import find_page
-from armwright.program.language.diagnostic import Diagnostic, Severity
+from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source, Span
 from armwright.version import __version__
-
-_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning"}
 
 
 def to_sarif(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> dict[str, Any]:
@@ -24,23 +22,9 @@ def to_sarif(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> di
         for diagnostics, source, path in programs
         for diagnostic in diagnostics
     ]
-    return {
-        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
-        "version": "2.1.0",
-        "runs": [
-            {
-                "tool": {
-                    "driver": {
-                        "name": "armwright",
-                        "version": __version__,
-                        "rules": [_rule(code) for code in codes],
-                    }
-                },
-                "columnKind": "unicodeCodePoints",
-                "results": results,
-            }
-        ],
-    }
+    driver = {"name": "armwright", "version": __version__, "rules": [_rule(code) for code in codes]}
+    run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
+    return {"$schema": "https://json.schemastore.org/sarif-2.1.0.json", "version": "2.1.0", "runs": [run]}
 
 
 def _rule(code: str) -> dict[str, Any]:
@@ -49,15 +33,11 @@ def _rule(code: str) -> dict[str, Any]:
 
 
 def _result(diagnostic: Diagnostic, source: Source, uri: str, codes: list[str]) -> dict[str, Any]:
-    advice = "".join(
-        f"\n{head}: {text}"
-        for head, texts in (("note", diagnostic.notes), ("help", diagnostic.helps))
-        for text in texts
-    )
+    advice = "".join(f"\n{head}: {text}" for head, text in diagnostic.remarks)
     result: dict[str, Any] = {
         "ruleId": diagnostic.code,
         "ruleIndex": codes.index(diagnostic.code),
-        "level": _LEVELS[diagnostic.severity],
+        "level": diagnostic.severity.value,
         "message": {"text": diagnostic.message + advice},
         "locations": [_location(diagnostic.span, source, uri, diagnostic.label)],
     }

@@ -93,6 +93,11 @@ class Diagnostic:
         return self.severity is Severity.ERROR
 
     @property
+    def remarks(self) -> list[tuple[str, str]]:
+        """The notes and what to write instead, each with the word in front of it."""
+        return [*(("note", text) for text in self.notes), *(("help", text) for text in self.helps)]
+
+    @property
     def is_syntax(self) -> bool:
         """Whether the parser had to guess, so that what the program does cannot be judged."""
         return self.code.startswith("E1")
@@ -132,11 +137,8 @@ class DiagnosticList(list[Diagnostic]):
             super().append(one)
         elif count == MAX_PER_CODE:
             text = f"{MAX_PER_CODE:,} messages have the code {one.code}; later ones are not reported"
-            super().append(
-                attrs.evolve(
-                    one, message=text, label="this one, and possibly more", secondary=(), notes=(), helps=(), fixes=()
-                )
-            )
+            label = "this one, and possibly more"
+            super().append(attrs.evolve(one, message=text, label=label, secondary=(), notes=(), helps=(), fixes=()))
 
     def extend(self, several: Iterable[Diagnostic]) -> None:
         """Add several."""
@@ -168,7 +170,7 @@ class DiagnosticList(list[Diagnostic]):
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Return them sorted by their place in the text."""
-    return tuple(sorted(diagnostics, key=lambda diagnostic: (diagnostic.span.start, diagnostic.span.end)))
+    return tuple(sorted(diagnostics, key=lambda diagnostic: diagnostic.span))
 
 
 def summary_line(diagnostics: Sequence[Diagnostic], source: Source) -> str:

@@ -16,7 +16,7 @@ class TextEdit:
 def apply_edits(text: str, edits: tuple[TextEdit, ...]) -> str:
     """Return a text with edits made, all counted in the text as given; of two that overlap the first is made."""
     pieces, done = [], 0
-    for edit in sorted(edits, key=lambda edit: (edit.span.start, edit.span.end)):
+    for edit in sorted(edits, key=lambda edit: edit.span):
         if edit.span.start >= done:
             pieces += [text[done : edit.span.start], edit.text]
             done = edit.span.end
