@@ -33,11 +33,9 @@ def tables(model: Arm) -> Iterator[ResultTable]:
     if any(joint.fixed is not None for joint in model.joints):
         yield _fixed(model)
     yield _limits(model)
-    unknown = [f"link {i}: {link.unknown}" for i, link in enumerate(model.links, 1) if link.unknown]
-    if unknown:
-        yield ResultTable(
-            title=f"Mass and inertia are unknown, so there is no dynamics. {'; '.join(unknown)}", heads=(), rows=()
-        )
+    if unknown := [f"link {i}: {link.unknown}" for i, link in enumerate(model.links, 1) if link.unknown]:
+        title = f"Mass and inertia are unknown, so there is no dynamics. {'; '.join(unknown)}"
+        yield ResultTable(title=title, heads=(), rows=())
     if any(link.mass or link.inertia.any() for link in model.links):
         yield _links(model)
         yield _inertia(model)
@@ -79,17 +77,13 @@ def as_data(model: Arm) -> dict[str, Any]:
 
 
 def _fixed(model: Arm) -> ResultTable:
+    title = "Fixed transforms, after theta and d and before a and alpha"
     rows = []
     for i, joint in enumerate(model.joints, 1):
         if joint.fixed is not None:
             position = (f"{x * 1e3:z.6g}" for x in joint.fixed[:3, 3])
-            rotation = (f"{math.degrees(x):z.6g}°" for x in to_rpy(joint.fixed[:3, :3]))
-            rows.append((str(i), *position, *rotation))
-    return ResultTable(
-        title="Fixed transforms, after theta and d and before a and alpha",
-        heads=("joint", "x mm", "y mm", "z mm", "roll", "pitch", "yaw"),
-        rows=rows,
-    )
+            rows.append((str(i), *position, *(f"{math.degrees(x):z.6g}°" for x in to_rpy(joint.fixed[:3, :3]))))
+    return ResultTable(title=title, heads=("joint", "x mm", "y mm", "z mm", "roll", "pitch", "yaw"), rows=rows)
 
 
 def _names(model: Arm) -> ResultTable:
@@ -106,9 +100,8 @@ def _geometry(model: Arm) -> ResultTable:
         else:
             d = f"q{i}" if joint.d == 0 else f"q{i} {joint.d * 1e3:+g} mm"
         rows.append((str(i), joint.kind, theta, d, _length(joint.a), _angle(joint.alpha)))
-    return ResultTable(
-        title="Denavit-Hartenberg, standard", heads=("joint", "kind", "theta", "d", "a", "alpha"), rows=rows
-    )
+    heads = ("joint", "kind", "theta", "d", "a", "alpha")
+    return ResultTable(title="Denavit-Hartenberg, standard", heads=heads, rows=rows)
 
 
 def _limits(model: Arm) -> ResultTable:
@@ -123,21 +116,16 @@ def _limits(model: Arm) -> ResultTable:
 
 
 def _links(model: Arm) -> ResultTable:
-    rows = []
-    for i, link in enumerate(model.links, 1):
-        rows.append((str(i), f"{link.mass:g}", *(f"{x * 1e3:z.6g}" for x in link.com)))
-    return ResultTable(
-        title="Links: mass, and centre of mass in the frame of the link",
-        heads=("link", "kg", "x mm", "y mm", "z mm"),
-        rows=rows,
-    )
+    title = "Links: mass, and centre of mass in the frame of the link"
+    masses = enumerate(model.links, 1)
+    rows = [(str(i), f"{link.mass:g}", *(f"{x * 1e3:z.6g}" for x in link.com)) for i, link in masses]
+    return ResultTable(title=title, heads=("link", "kg", "x mm", "y mm", "z mm"), rows=rows)
 
 
 def _inertia(model: Arm) -> ResultTable:
     entries = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
-    rows = []
-    for i, link in enumerate(model.links, 1):
-        rows.append((str(i), *(f"{link.inertia[entry]:z.4g}" for entry in entries.values())))
+    links = enumerate(model.links, 1)
+    rows = [(str(i), *(f"{link.inertia[entry]:z.4g}" for entry in entries.values())) for i, link in links]
     return ResultTable(title="Inertia about the centre of mass, kg m²", heads=("link", *entries), rows=rows)
 
 
@@ -148,11 +136,8 @@ def _motors(model: Arm) -> ResultTable:
         coulomb = f"{forward:g}" if forward == backward else f"+{forward:g} / -{backward:g}"
         friction = f"{motor.viscous:g} {units.viscous}", f"{coulomb} {units.effort}"
         rows.append((str(i), f"{motor.inertia:g} {units.inertia}", *friction, f"{motor.gear_ratio:g}"))
-    return ResultTable(
-        title="Drives, reflected to the joint",
-        heads=("joint", "inertia", "viscous", "Coulomb friction", "gear ratio"),
-        rows=rows,
-    )
+    heads = ("joint", "inertia", "viscous", "Coulomb friction", "gear ratio")
+    return ResultTable(title="Drives, reflected to the joint", heads=heads, rows=rows)
 
 
 def _angle(value: float) -> str:

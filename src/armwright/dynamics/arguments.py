@@ -1,7 +1,7 @@
 """The arguments of the functions of dynamics: joint arrays whose leading axes fit together."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions
@@ -9,6 +9,9 @@ from armwright.arrays import LARGEST, Array, ArrayLike, broadcast_rows, joint_ar
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import per_joint, stack
 from armwright.tracing.scalar import Scalar
+
+# One abstract scalar per joint, or the components of a vector.
+Scalars: TypeAlias = Sequence[Scalar]
 
 NO_WRENCH = (0.0,) * 6
 

@@ -1,11 +1,12 @@
 """Newton-Euler inverse dynamics: the joint efforts that a motion requires."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from armwright.arm.model import Arm, Joint, Motor
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
-from armwright.dynamics.arguments import NO_WRENCH, batch, stack_matrix
+from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
 from armwright.kinematics.forward_kinematics import link_frames, link_transform, stack
 from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.tracing.scalar import Scalar, select
@@ -15,13 +16,7 @@ _STILL = (0.0, 0.0, 0.0)
 
 
 def newton_euler(
-    arm: Arm,
-    q: Sequence[Scalar],
-    qd: Sequence[Scalar],
-    qdd: Sequence[Scalar],
-    wrench: Sequence[Scalar] = NO_WRENCH,
-    *,
-    base_acceleration: Sequence[Scalar] = _STILL,
+    arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars = NO_WRENCH, *, base_acceleration: Scalars = _STILL
 ) -> list[Scalar]:
     """Return the efforts that the links alone require, over abstract scalars.
 
@@ -49,13 +44,7 @@ class JointWrench(NamedTuple):
 
 
 def joint_wrenches(
-    arm: Arm,
-    q: Sequence[Scalar],
-    qd: Sequence[Scalar],
-    qdd: Sequence[Scalar],
-    wrench: Sequence[Scalar] = NO_WRENCH,
-    *,
-    base_acceleration: Sequence[Scalar] = _STILL,
+    arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars = NO_WRENCH, *, base_acceleration: Scalars = _STILL
 ) -> list[JointWrench]:
     """Return the wrench of each link on the next, over abstract scalars.
 
@@ -78,10 +67,7 @@ def joint_wrenches(
     v_dot = base_frame_acceleration(arm, base_acceleration)
     w: Vector = [0.0, 0.0, 0.0]
     w_dot: Vector = [0.0, 0.0, 0.0]
-    rotations: list[Matrix] = []
-    levers: list[Vector] = []
-    forces: list[Vector] = []
-    moments: list[Vector] = []
+    links: list[tuple[Matrix, Vector, Vector, Vector]] = []
     for joint, link, position, speed, acceleration in zip(arm.joints, arm.links, q, qd, qdd, strict=True):
         R, _ = link_transform(joint, position)
         Rt = transpose(R)
@@ -90,23 +76,20 @@ def joint_wrenches(
         com, inertia = link.com.tolist(), link.inertia.tolist()
         com_acceleration = add(v_dot, cross(w_dot, com), cross(w, cross(w, com)))
         force = scale(link.mass, com_acceleration)
-        rotations.append(R)
-        levers.append(lever)
-        forces.append(force)
         spin = add(apply(inertia, w_dot), cross(w, apply(inertia, w)))
-        moments.append(add(spin, cross(add(lever, com), force)))
+        links.append((R, lever, force, add(spin, cross(add(lever, com), force))))
     f, n = tool_reaction(arm, q, wrench)
     wrenches: list[JointWrench] = []
-    for i in reversed(range(arm.n)):
+    for R, lever, force, moment in reversed(links):
         # f and n act from link i on the next, at the origin of frame i, in frame i.
-        n = add(n, cross(levers[i], f), moments[i])
-        f = add(f, forces[i])
-        wrenches.append(JointWrench(f, n, rotations[i][2]))
-        f, n = apply(rotations[i], f), apply(rotations[i], n)
+        n = add(n, cross(lever, f), moment)
+        f = add(f, force)
+        wrenches.append(JointWrench(f, n, R[2]))
+        f, n = apply(R, f), apply(R, n)
     return wrenches[::-1]
 
 
-def base_frame_acceleration(arm: Arm, base_acceleration: Sequence[Scalar] = _STILL) -> Vector:
+def base_frame_acceleration(arm: Arm, base_acceleration: Scalars = _STILL) -> Vector:
     """Return the acceleration of frame 0 in its own axes, with gravity as an opposite acceleration."""
     return apply(arm.base[:3, :3].T.tolist(), subtract(base_acceleration, arm.gravity.tolist()))
 
@@ -142,7 +125,7 @@ def _next_link(
     return w, w_dot, v_dot
 
 
-def tool_reaction(arm: Arm, q: Sequence[Scalar], wrench: Sequence[Scalar]) -> tuple[Vector, Vector]:
+def tool_reaction(arm: Arm, q: Scalars, wrench: Scalars) -> tuple[Vector, Vector]:
     """Return force and moment of the last link on the surroundings, at its origin, in its frame.
 
     Args:
@@ -168,6 +151,12 @@ def drive_effort(motor: Motor, qd: Scalar, qdd: Scalar) -> Scalar:
 def dry_friction(motor: Motor, qd: Scalar) -> Scalar:
     """Return the Coulomb friction of a moving joint, 0 at rest, over abstract scalars."""
     return select(qd > 0, motor.coulomb_forward, select(qd < 0, -motor.coulomb_backward, 0.0))
+
+
+def coulomb_friction(arm: Arm, qd: Array) -> Array:
+    """Return the Coulomb friction of joints (..., n) that move as ``qd`` does, 0 at rest."""
+    forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
+    return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
 
 
 def inverse_dynamics(

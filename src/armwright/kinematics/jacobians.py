@@ -48,16 +48,14 @@ def jacobian_rate_columns(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -
     """
     frames = link_frames(arm, q)
     _, p_tool = tool_frame(arm, frames[-1])
-    # The speed of the origin of frame i-1 and the angular speed of its link; then, of each joint, its lever to the
-    # tool and those two.
+    # The speed of the origin of frame i-1 and the angular speed of its link; then, of each joint, its axis, its lever
+    # to the tool and those two.
     v: Vector = [0.0, 0.0, 0.0]
     w: Vector = [0.0, 0.0, 0.0]
-    levers, turns, speeds = [], [], []
+    motions = []
     for joint, rate, (R, p), (_, p_next) in zip(arm.joints, qd, frames[:-1], frames[1:], strict=True):
         z = [row[2] for row in R]
-        levers.append(subtract(p_tool, p))
-        turns.append(w)
-        speeds.append(v)
+        motions.append((z, subtract(p_tool, p), w, v))
         if joint.revolute:
             w = add(w, scale(rate, z))
             v = add(v, cross(w, subtract(p_next, p)))
@@ -65,11 +63,10 @@ def jacobian_rate_columns(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -
             v = add(v, cross(w, subtract(p_next, p)), scale(rate, z))
     v_tool = add(v, cross(w, subtract(p_tool, frames[-1][1])))
     columns = []
-    for joint, (R, _), lever, turn, speed in zip(arm.joints, frames[:-1], levers, turns, speeds, strict=True):
-        z = [row[2] for row in R]
-        z_rate = cross(turn, z)
+    for joint, (z, lever, w_joint, v_joint) in zip(arm.joints, motions, strict=True):
+        z_rate = cross(w_joint, z)
         if joint.revolute:
-            columns.append([*add(cross(z_rate, lever), cross(z, subtract(v_tool, speed))), *z_rate])
+            columns.append([*add(cross(z_rate, lever), cross(z, subtract(v_tool, v_joint))), *z_rate])
         else:
             columns.append([*z_rate, 0.0, 0.0, 0.0])
     return columns

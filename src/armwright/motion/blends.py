@@ -167,9 +167,8 @@ def blend_timing(
     if q.ndim != 2 or len(q) < 2 or not q.size:
         raise ShapeError(f"blends: expected (k, n) points with k at least 2, got {q.shape}")
     one_of("kind of ends", ends, ("rest", "running"))
-    speeds, accelerations = (
-        limit_per_joint(limit, q.shape[1], what) for limit, what in ((speed, "speed"), (acceleration, "acceleration"))
-    )
+    speeds = limit_per_joint(speed, q.shape[1], "speed")
+    accelerations = limit_per_joint(acceleration, q.shape[1], "acceleration")
     travel = np.diff(q, axis=0)
     for i in np.flatnonzero(np.abs(travel).max(axis=1) <= NOWHERE):
         raise InvalidValueError(f"blends: points {i + 1} and {i + 2} coincide; omit one of them")

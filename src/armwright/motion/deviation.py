@@ -17,6 +17,7 @@ from armwright.motion.polynomials import evaluate
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
+from armwright.spatial.rotations import skew_matrix
 
 # What a bound may add to what is seen, in parts of what is allowed; samples are taken so densely that it does not
 # exceed it, but no fewer and no more on an interval than these.
@@ -170,9 +171,7 @@ def error_of(
 def rotated(rotation: Array, fraction: Array) -> Array:
     """Return the rotations (m, k, 3, 3) by fractions (m, k) of rotation vectors (m, 3)."""
     angle = np.sqrt(np.einsum("mi,mi->m", rotation, rotation))
-    x, y, z = (rotation / np.where(angle > 0, angle, 1.0)[:, None]).T
-    o = np.zeros_like(x)
-    K = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=-1).reshape(-1, 1, 3, 3)
+    K = skew_matrix(rotation / np.where(angle > 0, angle, 1.0)[:, None])[:, None]
     phase = (angle[:, None] * fraction)[..., None, None]
     return np.asarray(np.eye(3) + np.sin(phase) * K + (2 * np.sin(phase / 2) ** 2) * (K @ K))
 

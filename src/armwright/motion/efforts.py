@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.dynamics.newton_euler import coulomb_friction
 from armwright.errors import IncapableArmError, KindError, ShapeError, shown
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
@@ -186,13 +187,7 @@ def check_lasting(arm: Arm, lasting: Array, most: float, at: Array, location: Ca
 def lasting_efforts(solver: Solver, q: Array, qd: Array) -> Array:
     """Return what gravity and dry friction take of joints (..., n) that move, however slowly, as ``qd`` does."""
     still = np.zeros_like(q)
-    return np.asarray(solver.inverse_dynamics(q, still, still) + dry_frictions(solver.arm, qd))
-
-
-def dry_frictions(arm: Arm, qd: Array) -> Array:
-    """Return what dry friction takes of joints (..., n) that move as ``qd`` does."""
-    forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
-    return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
+    return np.asarray(solver.inverse_dynamics(q, still, still) + coulomb_friction(solver.arm, qd))
 
 
 def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:

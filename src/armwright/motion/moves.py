@@ -263,14 +263,11 @@ def exact_poses(poses: ArrayLike) -> Array:
     X = of_shape(poses, (4, 4), "poses")
     if X.ndim != 3 or len(X) < 2:
         raise ShapeError(f"poses: expected two or more poses, shape (k, 4, 4), got {X.shape}")
-    try:
-        typed_poses(X)
-    except InvalidValueError:
-        for i, pose in enumerate(X, 1):
-            try:
-                typed_poses(pose)
-            except InvalidValueError as refused:
-                raise InvalidValueError(f"pose {i}: {str(refused).removeprefix('pose: ')}") from None
+    for i, pose in enumerate(X, 1):
+        try:
+            typed_poses(pose)
+        except InvalidValueError as error:
+            raise InvalidValueError(f"pose {i}: {str(error).removeprefix('pose: ')}") from None
     R = nearest_rotation(X[:, :3, :3])
     changes = np.abs(R - X[:, :3, :3]).max(axis=(1, 2))
     for i in np.flatnonzero(changes > _ROUNDING).tolist():

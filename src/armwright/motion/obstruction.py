@@ -43,18 +43,11 @@ class PathError(ArmwrightError, ValueError):
     """
 
     def __init__(
-        self,
-        cause: Cause,
-        segment: int,
-        fraction: float,
-        message: str,
-        *,
-        joint: int | None = None,
-        reason: str | None = None,
+        self, cause: Cause, segment: int, fraction: float, message: str, *, joint: int | None = None, reason: str = ""
     ) -> None:
         """Say what stops the arm, and where."""
         self.cause, self.segment, self.fraction, self.joint = cause, segment, fraction, joint
-        self.reason = message if reason is None else reason
+        self.reason = reason or message
         super().__init__(message)
 
     def restated(self, segment: int, message: str) -> "PathError":

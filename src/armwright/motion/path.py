@@ -1,7 +1,6 @@
 """A path of the tool through poses, and the report's rule for how densely and how fast to run it."""
 
 import math
-from collections.abc import Sequence
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -144,16 +143,12 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
     for i in moving:
         A, B = path.poses[i, :3, 3], path.poses[i + 1, :3, 3]
         count = math.ceil(lengths[i] / report_step(arm, A, B, deviation) - 1e-9)
-        steps = _steps(count * finer, first=i == moving[0], last=i == moving[-1])
+        first, last = i == moving[0], i == moving[-1]
+        whole = max(count * finer, 1) - (first and last)
+        steps = [*[0.5] * first, *[1.0] * whole, *[0.5] * last]
         per_step = lengths[i] / sum(steps) / report_speed(arm, A, B, speed)
         for done in accumulate(steps):
             times.append(times[-1] + per_step)
             segments.append(i)
             fractions.append(done / sum(steps))
     return Knots(np.array(times), np.array(segments, dtype=np.intp), np.array(fractions))
-
-
-def _steps(count: int, *, first: bool, last: bool) -> Sequence[float]:
-    """Return the relative lengths of the steps on one segment."""
-    whole = max(count, 1) - (first and last)
-    return [*[0.5] * first, *[1.0] * whole, *[0.5] * last]

@@ -15,8 +15,9 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.dynamics.newton_euler import coulomb_friction
 from armwright.errors import IncapableArmError
-from armwright.motion.efforts import check_lasting, dry_frictions
+from armwright.motion.efforts import check_lasting
 from armwright.motion.forward_backward import UNBOUNDED, Bounds, by_toppra, largest_squares
 from armwright.motion.joint_path import Grid
 from armwright.motion.solver import Solver
@@ -137,7 +138,7 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
     speed, acceleration, effort = arm.limits.speed, arm.limits.acceleration, arm.limits.effort
     viscous = arm.motor_values("viscous")
     # The least and the most that dry friction takes of the joints on the intervals (N, n).
-    frictions = np.stack([dry_frictions(arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
+    frictions = np.stack([coulomb_friction(arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
     least, most = frictions.min(axis=0), frictions.max(axis=0)
     limits: list[_Rows] = []
     for part in _PARTS:
@@ -150,7 +151,7 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
             q = grid.at(part, 0)
             gravity = np.asarray(solver.inverse_dynamics(q, none, none))
             a = solver.inverse_dynamics(q, none, rate) - gravity
-            b = solver.inverse_dynamics(q, rate, bend) - gravity - viscous * rate - dry_frictions(arm, rate)
+            b = solver.inverse_dynamics(q, rate, bend) - gravity - viscous * rate - coulomb_friction(arm, rate)
             lasting = gravity + np.where(gravity > 0, most, least)
             check_lasting(arm, lasting, _ALL, grid.origins, locate)
             # Where a joint reverses on an interval, its dry friction is either; so much less is left on both sides.

@@ -116,9 +116,9 @@ class PlannedStage:
     kind: StageKind
     trajectory: Trajectory
     length: float
-    certificate: Certificate | None
-    deviation: float | None
-    slowed: str
+    certificate: Certificate | None = None
+    deviation: float | None = None
+    slowed: str = ""
     obstacle: Obstacle | None = None
     detour: Detour | None = None
 
@@ -311,12 +311,5 @@ def _configurations(arm: AnyArm, X: Array, q: Array, number: int) -> list[Array]
 
 
 def _direct(arm: AnyArm, q: Array, goal: Array, manner: Manner) -> PlannedStage:
-    trajectory = point_to_point(solver_of(arm).arm, q, goal, manner.speed)
-    return PlannedStage(
-        kind="PTP",
-        trajectory=whole_ticks(trajectory, manner.period),
-        length=hand_length(arm, trajectory),
-        certificate=None,
-        deviation=None,
-        slowed="",
-    )
+    motion = point_to_point(solver_of(arm).arm, q, goal, manner.speed)
+    return PlannedStage(kind="PTP", trajectory=whole_ticks(motion, manner.period), length=hand_length(arm, motion))

@@ -129,14 +129,9 @@ class _Run(NamedTuple):
         return Trajectory(times=self.times, coefficients=composed(self.path.coefficients[self.intervals], self.law))
 
     @property
-    def slowing(self) -> float:
-        """How many times slower all must run to keep the limits where they were sampled."""
-        return max(1.0, float(self.uses.max()))
-
-    @property
     def duration(self) -> float:
-        """How long it takes, slowed to keep the limits [s]."""
-        return float(self.times[-1]) * self.slowing
+        """How long it takes, slowed to keep the limits where they were sampled [s]."""
+        return float(self.times[-1]) * max(1.0, float(self.uses.max()))
 
 
 def timed(arm: Arm, path: Trajectory, caps: Array) -> Timed:
@@ -194,13 +189,10 @@ def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
         length = (part * lengths)[:, None]
         rate, bend = evaluate(rates, length), evaluate(bends, length)
         # At this part of the segment x has grown by 2 u times the path.
-        for on_u, on_x in (
-            (0.0, 1 / caps[:, None] ** 2),
-            (0.0, (rate / speed) ** 2),
-            (rate / acceleration, bend / acceleration),
-        ):
-            a.append(on_u + on_x * 2 * length)
-            b.append(on_x)
+        of_x = [1 / caps[:, None] ** 2, (rate / speed) ** 2, bend / acceleration]
+        b += of_x
+        a += [each * 2 * length for each in of_x]
+        a[-1] += rate / acceleration
     on_u, on_x = np.concatenate(a, axis=1), np.concatenate(b, axis=1)
     return Bounds(on_u, on_x, np.zeros_like(on_u))
 

@@ -217,7 +217,9 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
         tracking = Tracking(trajectory, error, speed)
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
-            return _between_knots(arm, trajectory) or tracking
+            # Between two knots that keep a limit the spline may pass it where a joint reverses.
+            first, second = turning_positions(trajectory.coefficients, h)
+            return beyond_limits(arm, first, knots) or beyond_limits(arm, second, knots) or tracking
         if task.report_spline:
             return tracking
         ratio = np.where((h < knots[-1] / _SHORT)[:, None], _velocity_ratios(task, trajectory, speed), 0.0)
@@ -252,9 +254,3 @@ def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Arr
     turns = np.where(least > _NONE, np.ceil(least), np.where(most < -_NONE, np.floor(most), 0.0))
     fits = (turns >= least - _NONE) & (turns <= most + _NONE) & arm.revolute
     return np.asarray(q + _TURN * np.where(fits, turns, 0.0))
-
-
-def _between_knots(arm: Arm, trajectory: Trajectory) -> Obstruction | None:
-    """Return the limit that a spline passes between two knots which keep it, if there is one."""
-    first, second = turning_positions(trajectory.coefficients, np.diff(trajectory.times))
-    return beyond_limits(arm, first, trajectory.times) or beyond_limits(arm, second, trajectory.times)

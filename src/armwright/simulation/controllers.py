@@ -9,7 +9,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_or_each
 from armwright.dynamics.arguments import weighed
-from armwright.dynamics.newton_euler import dry_friction, newton_euler
+from armwright.dynamics.newton_euler import coulomb_friction, newton_euler
 from armwright.dynamics.shares import gravity_shares
 from armwright.errors import InvalidValueError
 
@@ -109,18 +109,13 @@ def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
         section 8.3.
     """
     stiffness, damping = _gains(arm, kp, "kp"), _gains(arm, kd, "kd")
+    inertia, viscous = arm.motor_values("inertia"), arm.motor_values("viscous")
 
     def efforts(t: float, q: Array, qd: Array) -> Array:
         speed = reference(t, 1)
         acceleration = reference(t, 2) + damping * (speed - qd) + stiffness * (reference(t, 0) - q)
-        links = newton_euler(arm, q.tolist(), qd.tolist(), acceleration.tolist())
-        drives = [
-            motor.inertia * a + motor.viscous * v + dry_friction(motor, direction)
-            for motor, a, v, direction in zip(
-                arm.motors, acceleration.tolist(), qd.tolist(), speed.tolist(), strict=True
-            )
-        ]
-        return np.array([link + drive for link, drive in zip(links, drives, strict=True)], dtype=np.float64)
+        links = np.array(newton_euler(arm, q.tolist(), qd.tolist(), acceleration.tolist()))
+        return links + (inertia * acceleration + viscous * qd + coulomb_friction(arm, speed))
 
     return efforts
 

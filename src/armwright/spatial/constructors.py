@@ -67,7 +67,10 @@ def pose(
     if (axis is None) != (angle is None):
         raise InvalidValueError(f"expected axis and angle together, got only {'angle' if axis is None else 'axis'}")
     if rotation is not None:
-        R = _checked(of_shape(rotation, (3, 3), "rotation"))
+        R = of_shape(rotation, (3, 3), "rotation")
+        if (error := float(np.max(orthonormality_error(R), initial=0.0))) > _TYPED:
+            message = f"expected an orthonormal matrix with determinant 1, got an orthonormality error of {error:.2g}"
+            raise InvalidValueError(f"rotation: {message}")
     elif quaternion is not None:
         R = rotation_from_quaternion(_direction(quaternion, 4, "quaternion"))
     elif rpy is not None:
@@ -79,15 +82,6 @@ def pose(
     else:
         R = np.eye(3)
     return homogeneous(R, of_shape(position, (3,), "position"))
-
-
-def _checked(R: Array) -> Array:
-    error = float(np.max(orthonormality_error(R), initial=0.0))
-    if error > _TYPED:
-        raise InvalidValueError(
-            f"rotation: expected an orthonormal matrix with determinant 1, got an orthonormality error of {error:.2g}"
-        )
-    return R
 
 
 def _direction(value: ArrayLike, size: int, what: str) -> Array:

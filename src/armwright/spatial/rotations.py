@@ -79,9 +79,8 @@ def rotation_vector(R: ArrayLike) -> Array:
         (..., 3) rotation vectors [rad], of length at most pi.
     """
     R = of_shape(R, (3, 3), "rotation")
-    skew = (
-        np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1) / 2
-    )
+    x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    skew = np.stack([x, y, z], axis=-1) / 2
     sine = np.linalg.norm(skew, axis=-1)
     cosine = (np.trace(R, axis1=-2, axis2=-1) - 1) / 2
     angle = np.arctan2(sine, cosine)
@@ -117,13 +116,18 @@ def rotation_from_vector(w: ArrayLike) -> Array:
     angle = np.linalg.norm(w, axis=-1)[..., None, None]
     small = angle < _TINY_ANGLE
     safe = np.where(small, 1.0, angle)
-    zero = np.zeros(w.shape[:-1])
-    x, y, z = w[..., 0], w[..., 1], w[..., 2]
-    W = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*w.shape[:-1], 3, 3)
+    W = skew_matrix(w)
     first = np.where(small, 1.0, np.sin(angle) / safe)
     # 1 - cos loses all digits for small angles; half-angle sines keep them.
     second = np.where(small, 0.5, 2 * (np.sin(angle / 2) / safe) ** 2)
     return np.asarray(np.eye(3) + first * W + second * (W @ W))
+
+
+def skew_matrix(w: Array) -> Array:
+    """Return the matrices (..., 3, 3) that take v to the cross products w × v, for vectors w (..., 3)."""
+    x, y, z = np.moveaxis(w, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
 
 
 def angle_between(R_A: ArrayLike, R_B: ArrayLike) -> Array:
@@ -142,7 +146,6 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
         (..., 3, 3).
     """
     typed = of_shape(quaternion, (4,), "quaternion")
-    w, x, y, z = np.moveaxis(typed / np.linalg.norm(typed, axis=-1, keepdims=True), -1, 0)
-    zero = np.zeros(w.shape)
-    V = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*w.shape, 3, 3)
-    return np.asarray(np.eye(3) + 2 * (w[..., None, None] * V + V @ V))
+    unit = typed / np.linalg.norm(typed, axis=-1, keepdims=True)
+    V = skew_matrix(unit[..., 1:])
+    return np.asarray(np.eye(3) + 2 * (unit[..., 0, None, None] * V + V @ V))

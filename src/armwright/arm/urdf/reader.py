@@ -76,7 +76,9 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
     locked = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
     robot = read_robot(path, {name: number(q, f"lock, '{name}'") for name, q in locked.items()})
     chain = chain_of(robot, base, tip)
-    size = _size(chain)
+    # The distance of the joints and the tip from the base, or 1 m where all are at one point.
+    origins = np.array([*(each.X_BJ[:3, 3] for each in chain.moving), chain.X_BT[:3, 3]])
+    size = float(np.linalg.norm(origins, axis=-1).max()) or 1.0
     frames = frames_of([each.X_BJ for each in chain.moving], [each.axis for each in chain.moving], size)
     joints, links, motors, notes = [], [], [], [*chain.notes, *_leaning(chain, frames)]
     for moving, row, X in zip(chain.moving, frames.rows, frames.poses, strict=True):
@@ -103,12 +105,6 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
         down = vector_text(arm.gravity)
         notes.append(f"gravity points downwards in the root link of the file: {down} along the axes of '{chain.base}'")
     return Reading(arm=arm, notes=tuple(notes))
-
-
-def _size(chain: Chain) -> float:
-    """Return how far the joints and the tip are from the base, or 1 m where all are in one place."""
-    origins = np.array([*(each.X_BJ[:3, 3] for each in chain.moving), chain.X_BT[:3, 3]])
-    return float(np.linalg.norm(origins, axis=-1).max()) or 1.0
 
 
 def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:

@@ -69,7 +69,7 @@ class UrdfJoint:
         if self.fixed:
             return
         if self.kind not in _MOVING:
-            raise self.element.error("type", f"an arm cannot have a {self.kind} joint; expected {_either(_MOVING)}")
+            raise self.element.error("type", f"an arm cannot have a {self.kind} joint; expected {', '.join(_MOVING)}")
         follows = self.element.find("mimic")
         if follows is not None:
             master = follows.attributes.get("joint", "another joint")
@@ -285,7 +285,3 @@ def motor_of(joint: UrdfJoint) -> Motor:
     dry = element.number("friction", 0.0, lower=0.0)
     viscous = element.number("damping", 0.0, lower=0.0)
     return Motor(viscous=viscous, coulomb_forward=dry, coulomb_backward=dry)
-
-
-def _either(words: tuple[str, ...]) -> str:
-    return f"{', '.join(words[:-1])} or {words[-1]}"

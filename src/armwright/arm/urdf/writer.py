@@ -98,7 +98,8 @@ def _robot(arm: Arm, tilts: Sequence[float]) -> Element:
     _joint(root, (first, "fixed", base, moving[0]), to_rpy(arm.base[:3, :3]), arm.base[:3, 3])
     X, rpy = np.eye(4), np.zeros(3)
     for i, (joint, link, motor, tilt) in enumerate(zip(arm.joints, arm.links, arm.motors, tilts, strict=True)):
-        kind = "prismatic" if not joint.revolute else "continuous" if _endless(joint.limits) else "revolute"
+        endless = math.isinf(joint.limits.lower) and math.isinf(joint.limits.upper)
+        kind = "prismatic" if not joint.revolute else "continuous" if endless else "revolute"
         element = _joint(root, (joints[i], kind, moving[i], moving[i + 1]), rpy, X[:3, 3])
         _limits_and_friction(element, joint.limits, motor)
         X = homogeneous(elementary_rotation(2, joint.theta), (0.0, 0.0, joint.d)) @ joint.behind
@@ -168,10 +169,6 @@ def _number(value: float) -> str:
     """Write a number so that it is read back to the last bit; one without bounds as the largest there is."""
     value = float(value) + 0.0
     return repr(math.copysign(NO_LIMIT, value) if math.isinf(value) else value)
-
-
-def _endless(limits: Limits) -> bool:
-    return math.isinf(limits.lower) and math.isinf(limits.upper)
 
 
 def _dry_friction(motor: Motor) -> float:

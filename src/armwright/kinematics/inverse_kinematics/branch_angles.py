@@ -7,12 +7,12 @@ from armwright.kinematics.inverse_kinematics.geometry import (
     ON_AXIS,
     ClosedFormGeometry,
     Sign,
-    first_three,
     reach_error,
     rotated_about_y,
     rotation_about_z_then_y,
     solve_elbow,
     solve_joint_1,
+    solve_slide,
 )
 from armwright.tracing.scalar import Scalar, atan2, cos, select, sin, sqrt
 from armwright.tracing.vectors import Matrix, Vector, product, transpose
@@ -40,26 +40,33 @@ class BranchAngles(NamedTuple):
 def branch_angles(
     geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: tuple[Sign, Sign, Sign], near: Vector
 ) -> BranchAngles:
-    """Return the angles of one branch.
+    """Return the angles of one branch; a point out of reach gives the one that stretches, or folds, towards it.
 
     Args:
         geometry: of the arm.
         p: wrist centre in the shoulder frame [m].
         R: orientation of the last wrist frame (``R_T6`` from the tool), seen from the shoulder frame.
-        signs: which arm, which elbow (or direction of the slide), which wrist.
+        signs: arm, 1 for the left one as PUMA users say, which reaches out on the side joint 1 faces, -1 for the right;
+            which elbow, or the direction of the slide; which wrist.
         near: six angles; a free one takes its value from here.
+
+    Source:
+        PUMA: Paul (1981) ch. 3. Stanford: Paul (1981) ch. 3; TR-83-008 appendix 1.
     """
     arm, elbow, flip = signs
     if geometry.family == "parallel":
         return _parallel(geometry, p, R, signs, near)
-    first = first_three(geometry, p, arm, elbow, near)
-    raised = first[1] if geometry.family == "stanford" else first[1] + first[2]
-    R_SW = product(rotation_about_z_then_y(first[0], raised), geometry.R_3W.tolist())
+    theta_1, X = solve_joint_1(geometry, p, arm, near[0])
+    if geometry.family == "stanford":
+        second, third = solve_slide(geometry, X, p[2], elbow, near[1])
+        raised = second
+    else:
+        second, third = solve_elbow(geometry, X, p[2], elbow, near[1])
+        raised = second + third
+    R_SW = product(rotation_about_z_then_y(theta_1, raised), geometry.R_3W.tolist())
     last, wrist_free = last_three(product(transpose(R_SW), R), flip, near[3])
-    _, X = solve_joint_1(geometry, p, arm, near[0])
-    return BranchAngles(
-        [*first, *last], _on_first_axis(p), _zero(X, p[2]), wrist_free, reach_error(geometry, p, X, p[2])
-    )
+    angles = [theta_1, second, third, *last]
+    return BranchAngles(angles, _vanish(*p[:2]), _vanish(X, p[2]), wrist_free, reach_error(geometry, p, X, p[2]))
 
 
 def _parallel(
@@ -88,7 +95,7 @@ def _parallel(
     theta_2, theta_3 = solve_elbow(geometry, X - x, p[2] - z, elbow, near[1])
     angles = [theta_1, theta_2, theta_3, raised - theta_2 - theta_3, theta_5, theta_6]
     error = reach_error(geometry, p, X - x, p[2] - z)
-    return BranchAngles(angles, _on_first_axis(p), _zero(X - x, p[2] - z), wrist_free, error)
+    return BranchAngles(angles, _vanish(*p[:2]), _vanish(X - x, p[2] - z), wrist_free, error)
 
 
 def last_three(R_36: Matrix, flip: Sign, theta_4_free: Scalar) -> tuple[Vector, Scalar]:
@@ -138,9 +145,6 @@ def _arc_cosine(x: Scalar) -> Scalar:
     return atan2(sqrt(1 - x * x), x)
 
 
-def _on_first_axis(p: Vector) -> Scalar:
-    return p[0] * p[0] + p[1] * p[1] < ON_AXIS**2
-
-
-def _zero(x: Scalar, z: Scalar) -> Scalar:
-    return x * x + z * z < ON_AXIS**2
+def _vanish(x: Scalar, y: Scalar) -> Scalar:
+    """Whether a point at (x, y) from an axis is on it."""
+    return x * x + y * y < ON_AXIS**2

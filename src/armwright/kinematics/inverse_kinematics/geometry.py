@@ -105,28 +105,6 @@ def rotation_about_z_then_y(first: Scalar, second: Scalar) -> Matrix:
     return [[c1 * c2, -s1, c1 * s2], [s1 * c2, c1, s1 * s2], [-s2, 0.0, c2]]
 
 
-def first_three(geometry: ClosedFormGeometry, p: Vector, arm: Sign, elbow: Sign, free: Vector | None = None) -> Vector:
-    """Return the angles 1 to 3 (of a slide: its length) that put the wrist centre at ``p``; not of a parallel arm.
-
-    A point out of reach gives the configuration that stretches, or folds, towards it.
-
-    Args:
-        geometry: a ``puma`` or a ``stanford``.
-        p: wrist centre in the shoulder frame [m].
-        arm: 1 for the left arm as PUMA users say, which reaches out on the side joint 1 faces; -1 for the right.
-        elbow: 1 or -1, which of the two elbow configurations; for a slide, forwards or backwards.
-        free: the angles that joints 1 and 2 take where the wrist centre is on their axis.
-
-    Source:
-        PUMA: Paul (1981) ch. 3. Stanford: Paul (1981) ch. 3; TR-83-008 appendix 1.
-    """
-    free_1, free_2 = (0.0, 0.0) if free is None else free[:2]
-    theta_1, X = solve_joint_1(geometry, p, arm, free_1)
-    if geometry.family == "stanford":
-        return [theta_1, *solve_slide(geometry, X, p[2], elbow, free_2)]
-    return [theta_1, *solve_elbow(geometry, X, p[2], elbow, free_2)]
-
-
 def solve_joint_1(geometry: ClosedFormGeometry, p: Vector, arm: Sign, free: Scalar) -> tuple[Scalar, Scalar]:
     """Return angle 1 and how far ahead of joint 2 the wrist centre is then, in the plane of the arm.
 

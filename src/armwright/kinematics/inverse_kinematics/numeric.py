@@ -96,8 +96,8 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
         reached = np.array([nearest_equivalent(arm, q, near) for q in _reaching(free, more)]).reshape(-1, arm.n)
         tried = np.concatenate([tried, more])
     if not len(reached):
-        best = tried[_residuals(limited, tried).argmin()]
-        best = nearest_equivalent(arm, best, near)
+        distances, angles = pose_errors(arm, tried, X)
+        best = nearest_equivalent(arm, tried[np.hypot(distances, limited.length * angles).argmin()], near)
         return rank(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_CONFIGURATION, X_near=forward(arm, best))
     return rank(arm, X, _named(limited, reached, near), near, apart=_SAME_CONFIGURATION)
 
@@ -179,12 +179,6 @@ def _reaching(task: _Task, q: Array) -> Array:
     """Return those of the configurations (k, n) that meet the pose."""
     distance, angle = pose_errors(task.arm, q, task.X)
     return q[(distance <= POSE_TOLERANCE) & (angle <= POSE_TOLERANCE)]
-
-
-def _residuals(task: _Task, q: Array) -> Array:
-    """Return how far each of the configurations (k, n) is from the pose, position and orientation together (k,) [m]."""
-    distance, angle = pose_errors(task.arm, q, task.X)
-    return np.hypot(distance, task.length * angle)
 
 
 def _descend(task: _Task, q: Array) -> Array:
