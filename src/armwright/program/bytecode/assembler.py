@@ -35,7 +35,7 @@ HEAD = "; armwright intermediate code, form 1"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:-[0-9]+)?")
 _PASSING = re.compile(r"%[0-9]+")
 _STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
-_OPERAND = re.compile(r'"(?:[^"\\]|\\.)*"|[^\s;]+')
+_OPERAND_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|;.*|[^\s;]+')
 _ROW = re.compile(r"(?P<at>[0-9]+)\s+(?P<span>\S+)\s+(?P<op>[A-Za-z]+)(?P<rest>.*)")
 _SPAN = re.compile(r"(?P<line>[0-9]+):(?P<column>[0-9]+)\+(?P<length>[0-9]+)(?P<begins>!?)")
 _TYPE = re.compile(r"(?:ARRAY \[(?P<sizes>[0-9]+(?:,[0-9]+)*)\] OF )?(?P<kind>[A-Z]+)")
@@ -61,13 +61,13 @@ def _lines(code: Code) -> Iterator[str]:
     for name, kind in code.types.items():
         yield f"var {name} {kind}"
     for name, procedure in code.procedures.items():
-        yield f"procedure {name} @{procedure.start:04d}"
+        yield f"procedure {name} {JumpTarget(procedure.start)}"
         for own, kind in procedure.types.items():
             word = "parameter" if own in procedure.parameters else "local"
             yield f"  {word} {own} {kind}"
     for index, value in enumerate(code.constants):
         numbers = value if isinstance(value, tuple) else (value,)
-        yield f"constant c{index} {' '.join(map(repr, numbers))}"
+        yield f"constant {Constant(index)} {' '.join(map(repr, numbers))}"
     yield "code"
     for at, step in enumerate(code.instructions):
         source, span = code.source, step.span
@@ -100,11 +100,8 @@ class _Reader:
     """One pass over the lines."""
 
     def __init__(self, file: str, text: str) -> None:
-        self._file, self._rows = file, text.split("\n")
-        self._number = 0
-        self._program = "program"
-        self._units = UnitSystem()
-        self._standard = Standard.RLO_2
+        self._file, self._rows, self._number = file, text.split("\n"), 0
+        self._program, self._units, self._standard = "program", UnitSystem(), Standard.RLO_2
         self._spelling: dict[str, str] = {}
         self._types: dict[str, VariableType] = {}
         self._procedures: dict[str, ProcedureCode] = {}
@@ -123,11 +120,11 @@ class _Reader:
             "program": self._read_program,
             "units": self._read_units,
             "standard": self._read_standard,
-            "name": self._read_name,
-            "var": self._read_variable,
+            "name": lambda rest: self._spelling.update({self._name(rest): rest}),
+            "var": lambda rest: self._types.update([self._declaration(rest)]),
             "procedure": self._read_procedure,
-            "parameter": self._read_own,
-            "local": self._read_own,
+            "parameter": self._read_parameter,
+            "local": lambda rest: self._own_types.update([self._declaration(rest)]),
             "constant": self._read_constant,
         }
         in_code = False
@@ -141,8 +138,9 @@ class _Reader:
                 self._read_step(line)
             elif word == "code" and not rest:
                 in_code = True
+            elif word in ("parameter", "local") and not self._procedures:
+                self._fail(f"expected a procedure before the {word}")
             elif word in words:
-                self._word = word
                 words[word](rest.strip())
             else:
                 self._fail(f"unknown word {word!r}", closest(word, [*words, "code"]))
@@ -185,13 +183,6 @@ class _Reader:
             self._fail(f"unknown standard {rest!r}, expected {' or '.join(known)}")
         self._standard = Standard(rest)
 
-    def _read_name(self, rest: str) -> None:
-        self._spelling[self._name(rest)] = rest
-
-    def _read_variable(self, rest: str) -> None:
-        name, _, kind = rest.partition(" ")
-        self._types[self._name(name)] = self._type(kind)
-
     def _read_procedure(self, rest: str) -> None:
         name, _, start = rest.partition(" ")
         if not re.fullmatch(r"@[0-9]{1,9}", start):
@@ -199,14 +190,11 @@ class _Reader:
         self._own_types = {}
         self._procedures[self._name(name)] = ProcedureCode(start=int(start[1:]), parameters=(), types=self._own_types)
 
-    def _read_own(self, rest: str) -> None:
-        if not self._procedures:
-            self._fail(f"expected a procedure before the {self._word}")
-        name, _, kind = rest.partition(" ")
-        self._own_types[self._name(name)] = self._type(kind)
-        if self._word == "parameter":
-            procedure, last = self._procedures.popitem()
-            self._procedures[procedure] = attrs.evolve(last, parameters=(*last.parameters, self._name(name)))
+    def _read_parameter(self, rest: str) -> None:
+        parameter, kind = self._declaration(rest)
+        self._own_types[parameter] = kind
+        name, last = self._procedures.popitem()
+        self._procedures[name] = attrs.evolve(last, parameters=(*last.parameters, parameter))
 
     def _read_constant(self, rest: str) -> None:
         name, *numbers = rest.split() or [""]
@@ -227,14 +215,11 @@ class _Reader:
         name = match["op"].upper()
         if name not in Op.__members__:
             self._fail(f"unknown operation {name!r}", closest(name, Op.__members__))
-        operands = []
-        rest = match["rest"]
-        while (found := _OPERAND.search(rest)) and not rest[: found.start()].count(";"):
-            operands.append(self._operand(found[0]))
-            rest = rest[found.end() :]
+        words = _OPERAND_OR_COMMENT.findall(match["rest"])
+        operands = tuple(self._operand(word) for word in words if word[0] != ";")
         self._numbers.append(self._number)
         self._instructions.append(
-            Instruction(op=Op[name], operands=tuple(operands), span=self._span(span), begins=bool(span["begins"]))
+            Instruction(op=Op[name], operands=operands, span=self._span(span), begins=bool(span["begins"]))
         )
 
     def _span(self, match: re.Match[str]) -> Span:
@@ -281,6 +266,12 @@ class _Reader:
             self._number = self._numbers[error.instruction]
             self._fail(error.fault)
         return code
+
+    def _declaration(self, text: str) -> tuple[str, VariableType]:
+        """Return a name in upper case and its type."""
+        name, _, type_name = text.partition(" ")
+        kind = self._type(type_name)
+        return self._name(name), kind
 
     def _type(self, text: str) -> VariableType:
         match = _TYPE.fullmatch(text.strip())
