@@ -29,7 +29,7 @@ def lsp(
     from armwright.errors import MissingExtraError
 
     try:
-        from armwright.program.language_server.server import serve
+        from armwright.program.language_server.handlers import serve
     except ImportError as error:
         if (error.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
             raise

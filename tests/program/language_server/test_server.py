@@ -20,8 +20,8 @@ from pygls.io_ import run_async
 from pytest_lsp import ClientServerConfig, LanguageClient, client_capabilities
 
 from armwright.files.message_stream import MessageStream
+from armwright.program.language_server.handlers import RloServer
 from armwright.program.language_server.semantic_tokens import KINDS, MODIFIERS
-from armwright.program.language_server.server import make_server
 
 CELL = """
 name = "bench"
@@ -183,7 +183,7 @@ class InThisProcess(ClientServerConfig):
     @staticmethod
     def _serve(connection: socket.socket) -> None:
         with connection, connection.makefile("rb") as incoming, connection.makefile("wb") as outgoing:
-            make_server().start_io(cast("BinaryIO", MessageStream(incoming)), outgoing)
+            RloServer().start_io(cast("BinaryIO", MessageStream(incoming)), outgoing)
 
 
 @pytest_lsp.fixture(config=InThisProcess(server_command=[]))

@@ -1,9 +1,9 @@
 """Open documents: their texts as they change, and the analysis of each."""
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING
 
 from lsprotocol import types as lsp
 from pygls.uris import to_fs_path
@@ -12,15 +12,15 @@ from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.positions import span_of
+from armwright.program.language_server.semantic_tokens import SemanticToken
+
+if TYPE_CHECKING:
+    from armwright.program.language_server.server import RloServer
 
 # How many lines a program may have that is analysed at every change.
 MAX_SHORT_LINES = 2000
 # How long nothing has to be typed before a program is analysed though nobody asks: short ones and long ones [s].
 TYPING_DELAY, LONG_TYPING_DELAY = 0.02, 0.5
-
-
-Analyse: TypeAlias = "Callable[[Document], Analysis]"
-Publish: TypeAlias = "Callable[[Document, Analysis], None]"
 
 
 class Document:
@@ -32,17 +32,17 @@ class Document:
         version: as the editor counts.
         codec: of its text.
         last_analysis: the analysis of the text, or of one before; None before the first.
+        sent_tokens: the number and the lines of the semantic tokens that the editor got last.
     """
 
-    def __init__(
-        self, uri: str, codec: PositionCodec, version: int | None, analyse: "Analyse", publish: "Publish"
-    ) -> None:
+    def __init__(self, server: "RloServer", item: lsp.TextDocumentItem) -> None:
         """Take up a text; it is analysed when somebody asks, or soon, and soon what is wrong with it is published."""
-        self.uri, self.codec, self.version = uri, codec, version
-        path = to_fs_path(uri) if uri.startswith("file:") else None
+        self._server, self.uri, self.version = server, item.uri, item.version
+        self.codec = PositionCodec(item.text, server.encoding)
+        path = to_fs_path(item.uri) if item.uri.startswith("file:") else None
         self.path = None if path is None else Path(path)
         self.last_analysis: Analysis | None = None
-        self._analyse, self._publish = analyse, publish
+        self.sent_tokens: tuple[str, Sequence[list[SemanticToken]]] = "", ()
         self._outdated = True
         self._timer: asyncio.TimerHandle | None = None
         self._published = asyncio.Event()
@@ -63,7 +63,7 @@ class Document:
         """Whether it is analysed at every change."""
         return len(self.codec.line_starts) <= MAX_SHORT_LINES
 
-    def change(self, changes: Sequence[lsp.TextDocumentContentChangeEvent], version: int | None) -> None:
+    def change(self, changes: Sequence[lsp.TextDocumentContentChangeEvent], version: int) -> None:
         """Make changes, one after the other; a change that names no range brings the whole text anew."""
         for change in changes:
             text, replaced = self.text, Span(0, len(self.text))
@@ -84,13 +84,13 @@ class Document:
     def analyse(self) -> Analysis:
         """Return the analysis of the text as it is now."""
         if self._outdated or self.last_analysis is None:
-            self.last_analysis, self._outdated = self._analyse(self), False
+            self.last_analysis, self._outdated = self._server.analyse(self), False
         return self.last_analysis
 
     def publish(self) -> None:
         """Publish what is wrong with the text as it is now."""
         self._stop_timer()
-        self._publish(self, self.analyse())
+        self._server.publish(self, self.analyse())
         self._published.set()
 
     def close(self) -> None:

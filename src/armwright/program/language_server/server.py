@@ -1,21 +1,18 @@
-"""The language server: a conversation with an editor about programs, in the Language Server Protocol."""
+"""The state of the language server: open documents, settings, and the features that are served."""
 
 import logging
-import os
-import sys
+from collections.abc import Callable
 from contextlib import suppress
-from functools import reduce
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, TypeVar
 
 from lsprotocol import types as lsp
+from pygls.capabilities import get_capability
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol, lsp_method
 from pygls.uris import to_fs_path
 
-from armwright.errors import InvalidValueError
-from armwright.files.message_stream import MessageStream
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.words import Standard
 from armwright.program.language_server.analysis import Analysis, Settings, analyse
@@ -29,7 +26,21 @@ SECTION = "armwright"
 # What the protocol calls a request that cannot be granted.
 _REQUEST_FAILED = -32803
 # Columns are counted so where the editor says nothing.
-_DEFAULT_ENCODING = "utf-16"
+DEFAULT_ENCODING = "utf-16"
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+# The methods of the protocol that are served, with their options and the functions that serve them.
+_FEATURES: list[tuple[str, Any, Callable[..., Any]]] = []
+
+
+def feature(method: str, options: Any = None) -> Callable[[_Function], _Function]:
+    """Return a decorator of a function of a server and parameters, which lets all servers serve a method with it."""
+
+    def register(function: _Function) -> _Function:
+        _FEATURES.append((method, options, function))
+        return function
+
+    return register
 
 
 class _Protocol(LanguageServerProtocol):
@@ -61,11 +72,15 @@ class RloServer(LanguageServer):
         super().__init__("armwright", __version__, protocol_cls=_Protocol)
         self.documents: dict[str, Document] = {}
         self.settings = Settings()
-        self.encoding = _DEFAULT_ENCODING
+        self.encoding = DEFAULT_ENCODING
         self.cells = CellCache()
         # Whether the editor has sent ``exit``.
         self.has_exited = False
         self._last_problem = ""
+        for method, options, function in _FEATURES:
+            self.feature(method, options)(function)
+        # What is refused is told to the editor; its record need not have it again.
+        logging.getLogger("pygls").setLevel(logging.CRITICAL)
 
     def shutdown(self) -> None:
         """End at once: what is being read is for nobody any more, and is not waited for."""
@@ -79,10 +94,9 @@ class RloServer(LanguageServer):
 
     # ---- what the editor can do
 
-    def client_capability(self, *path: str) -> Any:
-        """Return a capability of the editor; None where it says nothing of it."""
-        capabilities: Any = self.client_capabilities
-        return reduce(lambda part, name: getattr(part, name, None), path, capabilities)
+    def client_capability(self, path: str) -> Any:
+        """Return a capability of the editor, by its path with dots; None where it says nothing of it."""
+        return get_capability(self.client_capabilities, path)
 
     # ---- documents
 
@@ -133,7 +147,7 @@ class RloServer(LanguageServer):
         """Tell the editor what is wrong with a document."""
         if self.documents.get(document.uri, document) is not document:
             return
-        related = bool(self.client_capability("text_document", "publish_diagnostics", "related_information"))
+        related = bool(self.client_capability("text_document.publish_diagnostics.related_information"))
         try:
             published = lsp_diagnostics(analysis, document.uri, related=related)
         except Exception as error:  # noqa: BLE001 - as above
@@ -175,7 +189,7 @@ class RloServer(LanguageServer):
 
     async def request_settings(self) -> None:
         """Ask the editor for its settings."""
-        if not self.client_capability("workspace", "configuration"):
+        if not self.client_capability("workspace.configuration"):
             return
         items = [lsp.ConfigurationItem(section=SECTION)]
         with suppress(JsonRpcException):
@@ -183,121 +197,27 @@ class RloServer(LanguageServer):
             if answers and answers[0] is not None:
                 self.apply_settings(answers[0])
 
+    async def register_watchers(self) -> None:
+        """Ask the editor to tell of changes of cell files, and of settings."""
+        watched = lsp.DidChangeWatchedFilesRegistrationOptions([lsp.FileSystemWatcher("**/*.{toml,json}")])
+        options = {
+            "did_change_watched_files": (lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, watched),
+            "did_change_configuration": (
+                lsp.WORKSPACE_DID_CHANGE_CONFIGURATION,
+                lsp.DidChangeConfigurationRegistrationOptions(SECTION),
+            ),
+        }
+        registrations = [
+            lsp.Registration(method, method, option)
+            for name, (method, option) in options.items()
+            if self.client_capability(f"workspace.{name}.dynamic_registration")
+        ]
+        if registrations:
+            # An editor that will not do what it said it can do tells nothing of cell files, and that is all.
+            with suppress(JsonRpcException):
+                await self.client_register_capability_async(lsp.RegistrationParams(registrations))
+
 
 def request_error(text: str) -> JsonRpcException:
     """Return what tells an editor that something cannot be done, and why."""
     return JsonRpcException(text, code=_REQUEST_FAILED)
-
-
-def make_server() -> RloServer:
-    """Return a server that knows all its answers."""
-    # Imported here: the answers need the server's class.
-    from armwright.program.language_server import handlers  # noqa: PLC0415
-
-    # What is refused is told to the editor; its record need not have it again.
-    logging.getLogger("pygls").setLevel(logging.CRITICAL)
-    server = RloServer()
-    _register_document_features(server)
-    _register_workspace_features(server)
-    handlers.register(server)
-    return server
-
-
-def serve() -> int:
-    """Talk to an editor over standard input and output until it says goodbye.
-
-    Returns:
-        The exit status. The thread that reads may be at work still, for nobody.
-
-    Raises:
-        InvalidValueError: it sent a message that is larger than the limit; the connection is over.
-    """
-    incoming = MessageStream(sys.stdin.buffer)
-    # Of its own: the protocol closes it at its end, and whatever else is printed must not get into it.
-    outgoing = os.fdopen(os.dup(1), "wb")
-    sys.stdout = sys.stderr
-    server = make_server()
-    server.start_io(cast("BinaryIO", incoming), outgoing)
-    if incoming.refused:
-        raise InvalidValueError(f"{incoming.refused}; the connection has ended")
-    return server.status
-
-
-def _register_document_features(server: RloServer) -> None:
-    """Let the server hear of the beginning, and of documents."""
-
-    @server.feature(lsp.INITIALIZE)
-    def initialize(params: lsp.InitializeParams) -> None:
-        encoding = server.workspace.position_encoding or _DEFAULT_ENCODING
-        server.encoding = encoding.value if isinstance(encoding, lsp.PositionEncodingKind) else encoding
-        server.apply_settings(params.initialization_options)
-
-    @server.feature(lsp.INITIALIZED)
-    async def initialized(_: lsp.InitializedParams) -> None:
-        await _register_watchers(server)
-        await server.request_settings()
-
-    @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
-    async def did_open(params: lsp.DidOpenTextDocumentParams) -> None:
-        item = params.text_document
-        if (before := server.documents.get(item.uri)) is not None:
-            before.close()
-        codec = PositionCodec(item.text, server.encoding)
-        server.documents[item.uri] = Document(item.uri, codec, item.version, server.analyse, server.publish)
-
-    @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
-    def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
-        document = server.documents.get(params.text_document.uri)
-        if document is not None:
-            document.change(params.content_changes, params.text_document.version)
-
-    @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
-    def did_close(params: lsp.DidCloseTextDocumentParams) -> None:
-        document = server.documents.pop(params.text_document.uri, None)
-        if document is not None:
-            document.close()
-            server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri=document.uri, diagnostics=[]))
-
-
-def _register_workspace_features(server: RloServer) -> None:
-    """Let the server hear of settings and files, and of the end."""
-
-    @server.feature(lsp.EXIT)
-    def exited(_: Any) -> None:
-        server.has_exited = True
-
-    @server.feature(lsp.WORKSPACE_DID_CHANGE_CONFIGURATION)
-    async def did_change_configuration(params: lsp.DidChangeConfigurationParams) -> None:
-        if server.client_capability("workspace", "configuration"):
-            await server.request_settings()
-        else:
-            server.apply_settings(params.settings)
-
-    @server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
-    def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
-        # Others may depend on what has been saved beside them.
-        server.invalidate()
-        if (document := server.documents.get(params.text_document.uri)) is not None:
-            document.publish()
-
-    @server.feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
-    def did_change_watched_files(_: lsp.DidChangeWatchedFilesParams) -> None:
-        server.invalidate()
-
-
-async def _register_watchers(server: RloServer) -> None:
-    """Ask the editor to tell of changes of cell files, and of settings."""
-    requested: dict[str, Any] = {}
-    if server.client_capability("workspace", "did_change_watched_files", "dynamic_registration"):
-        requested[lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES] = lsp.DidChangeWatchedFilesRegistrationOptions(
-            watchers=[lsp.FileSystemWatcher(glob_pattern="**/*.{toml,json}")]
-        )
-    if server.client_capability("workspace", "did_change_configuration", "dynamic_registration"):
-        requested[lsp.WORKSPACE_DID_CHANGE_CONFIGURATION] = lsp.DidChangeConfigurationRegistrationOptions(
-            section=SECTION
-        )
-    if requested:
-        registrations = [lsp.Registration(method, method, options) for method, options in requested.items()]
-        # An editor that will not do what it said it can do tells nothing of cell files, and that is all.
-        with suppress(JsonRpcException):
-            await server.client_register_capability_async(lsp.RegistrationParams(registrations))
