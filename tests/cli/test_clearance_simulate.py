@@ -158,3 +158,10 @@ def test_micrometres_for_millimetres() -> None:
 
     assert done.returncode == 2
     assert "clearance J2: expected at most the radius of the journal, 10 mm, got 300 mm" in done.stderr
+
+
+def test_pick_and_place() -> None:
+    """The path that is corrected can be simulated too, with its three targets."""
+    done = armwright("clearance", "simulate", "five-bar", "--path", "pick-and-place", "--step", "2e-5", "--json")
+
+    assert [one["time"] for one in json.loads(done.stdout)["targets"]] == pytest.approx([0.0, 0.25, 0.5])
