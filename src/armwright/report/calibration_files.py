@@ -14,6 +14,14 @@ from armwright.report.static_page import static_page
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# The distances that are drawn.
+_DISTANCES = {
+    "nominal, base best-fitted",
+    "calibrated, held out",
+    "calibrated, all readings",
+    "non-geometric, held out",
+}
+
 
 def calibration_files(assessment: CalibrationAssessment, *, title: str, command: str) -> dict[str, str]:
     """Return the files of a calibration by name.
@@ -23,22 +31,16 @@ def calibration_files(assessment: CalibrationAssessment, *, title: str, command:
         title: of the page.
         command: the command line that made it.
     """
+    caption = "Residuals of each reading: along x, y and z where points were measured; held-out distances below"
     drawn = [
-        Drawing(
-            "residuals",
-            "Residuals of each reading: along x, y and z where points were measured; held-out distances below",
-            svg_text(_residuals_figure(assessment)),
-        ),
+        Drawing("residuals", caption, svg_text(_residuals_figure(assessment))),
         Drawing("distances", "Distances before and after, sorted", svg_text(distances_figure(assessment))),
     ]
     readings = len(assessment.held_out.distance)
-    head = (
-        f"# {assessment.arm.name} as calibrated with {readings} readings, without rotations about y; "
-        f"all errors are in errors.json\n"
-    )
+    how = f"as calibrated with {readings} readings, without rotations about y; all errors are in errors.json"
     tables = {**corrected_tables(assessment.full), **corrected_tables(assessment.tabular)}
     return {
-        "arm.toml": head + toml_text(corrected_arm(assessment.tabular)) + "\n",
+        "arm.toml": f"# {assessment.arm.name} {how}\n{toml_text(corrected_arm(assessment.tabular))}\n",
         "arm.urdf": corrected_urdf(assessment.full),
         **{f"dh_{name}.csv": text for name, text in tables.items()},
         "errors.json": json.dumps(assessment.as_data(), indent=2) + "\n",
@@ -88,15 +90,8 @@ def distances_figure(assessment: CalibrationAssessment) -> "Figure":
     """Return the cumulative distribution of the distances between readings and arm before and after."""
     figure = empty_figure((7.4, 4.0))
     axes = plain_axes(figure, "distance, mm", "cumulative share of readings, %")
-    distances = assessment.distances
-    for name in (
-        "nominal, base best-fitted",
-        "calibrated, held out",
-        "calibrated, all readings",
-        "non-geometric, held out",
-    ):
-        if name in distances:
-            x = distances[name]
+    for name, x in assessment.distances.items():
+        if name in _DISTANCES:
             share = (np.arange(len(x)) + 0.5) / len(x) * 100
             axes.plot(np.maximum(np.sort(x) * 1e3, 1e-6), share, label=name)
     axes.set(xscale="log", ylim=(0, 100))

@@ -126,18 +126,13 @@ def _pin_data(run: ClearanceRun, points: Sequence[BodyPoint]) -> list[dict[str, 
     linkage = run.simulation.scenario.linkage
     pins = []
     for i, pin in enumerate(linkage.pins):
-        ends = {
-            name: points.index(point) if point in points else [float(x) for x in linkage.point(point)]
-            for name, point in (("bearing", pin.bearing), ("journal", pin.journal))
-        }
-        pins.append(
-            {
-                "name": pin.name,
-                "clearance_um": float(run.simulation.clearances[i]) * _MICRO,
-                "peak_N": float(run.simulation.peaks[i]),
-                **ends,
-            }
+        bearing, journal = (
+            points.index(point) if point in points else [float(x) for x in linkage.point(point)]
+            for point in (pin.bearing, pin.journal)
         )
+        clearance, peak = float(run.simulation.clearances[i]) * _MICRO, float(run.simulation.peaks[i])
+        ends = {"bearing": bearing, "journal": journal}
+        pins.append({"name": pin.name, "clearance_um": clearance, "peak_N": peak, **ends})
     return pins
 
 
@@ -168,11 +163,8 @@ def _facts(data: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
 
 def _settings(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     used = data["settings"]
-    located = ", impacts located" if used["located"] else ""
-    yield (
-        "Integrator",
-        f"{used['integrator']}, step {used['step']:.3g} s{located}, sampled every {used['sample']:.3g} s",
-    )
+    step = f"step {used['step']:.3g} s{', impacts located' if used['located'] else ''}"
+    yield "Integrator", f"{used['integrator']}, {step}, sampled every {used['sample']:.3g} s"
     gains = f", {used['gains'][0]:g} N m/rad and {used['gains'][1]:g} N m s/rad" if "gains" in used else ""
     yield "Control", f"{used['control']}{gains}"
     yield "Start", used["start"]

@@ -48,9 +48,8 @@ def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = 
     axis = figure.subplots()
     space = workspace(bar, _MAP_CELLS)
     edges = [np.append(x, 2 * x[-1] - x[-2]) - (x[1] - x[0]) / 2 for x in (space.x * 1e3, space.y * 1e3)]
-    colours = axis.pcolormesh(
-        *edges, _inverse_condition_numbers(bar, space, mode), cmap="YlGnBu", vmin=0, vmax=1, rasterized=True, zorder=0
-    )
+    gains = _inverse_condition_numbers(bar, space, mode)
+    colours = axis.pcolormesh(*edges, gains, cmap="YlGnBu", vmin=0, vmax=1, rasterized=True, zorder=0)
     figure.colorbar(colours, ax=axis, label="smallest gain of the motors by the largest", shrink=0.8)
     _draw_curves(axis, bar, mode)
     for path in paths:
@@ -76,10 +75,8 @@ def scenario_workspace(scenario: Scenario) -> Drawing | None:
         return None
     tips = tip_position(scenario.linkage, scenario.ideal.q)
     for mode, angles in inverse_all(bar, tips[0]).items():
-        if (
-            np.abs(np.sin((five_bar_coordinates(scenario.linkage, angles) - scenario.ideal.q[0]) / 2)).max()
-            < _EQUAL_ANGLES
-        ):
+        differences = five_bar_coordinates(scenario.linkage, angles) - scenario.ideal.q[0]
+        if np.abs(np.sin(differences / 2)).max() < _EQUAL_ANGLES:
             return workspace_figure(bar, mode, [tips[:: max(1, len(tips) // _MAX_POINTS)]])
     raise AssertionError("a five-bar has four assembly modes")
 

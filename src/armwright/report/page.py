@@ -6,18 +6,14 @@ its scripts and its data, and uses no network.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import attrs
 
+from armwright.arm.model import JointKind
 from armwright.arrays import Array
 from armwright.report.elements import badge, facts
 from armwright.report.markup import asset, page_html
-
-Severity: TypeAlias = Literal["error", "warning", "note"]
-StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "JOINT", "HAND"]
-TextKind: TypeAlias = Literal["Program", "Poses"]
-JointKind: TypeAlias = Literal["revolute", "prismatic"]
 
 # The text on collisions wherever a motion is reported, until they are checked.
 COLLISIONS = "not checked"
@@ -36,7 +32,7 @@ class Message:
         line: line of the program, from 1; None without a line.
     """
 
-    severity: Severity
+    severity: Literal["error", "warning", "note"]
     text: str
     code: str = ""
     line: int | None = None
@@ -84,7 +80,7 @@ class StageRow:
     t1: float
     line: int
     arm: str
-    kind: StageKind
+    kind: Literal["PTP", "LINE", "SPLINE", "BLEND", "JOINT", "HAND"]
     to: Sequence[str]
     speed: float
     peak_speed: Sequence[float]
@@ -248,7 +244,7 @@ class RunPage:
     stages: Sequence[StageRow] = ()
     arms: Sequence[ArmRecord] = ()
     animation: Animation | None = None
-    text_kind: TextKind = "Program"
+    text_kind: Literal["Program", "Poses"] = "Program"
 
 
 def run_page(data: RunPage) -> str:

@@ -95,11 +95,8 @@ def frame_data(recording: Recording) -> dict[str, Any]:
     """Return the final frame tree: the parent of each frame, and its poses relative to the world and the parent."""
     tree = recording.tree
     table = {}
-    for name in tree:
-        if name == WORLD:
-            continue
-        known = tree.has_value(name)
-        parent = tree.parent(name) or WORLD
+    for name in (name for name in tree if name != WORLD):
+        known, parent = tree.has_value(name), tree.parent(name) or WORLD
         table[name] = {
             "spelling": recording.code.spelled(name),
             "parent": parent,
@@ -112,15 +109,14 @@ def frame_data(recording: Recording) -> dict[str, Any]:
 
 def ending_data(recording: Recording) -> dict[str, Any]:
     """Return the exit status of a run, and the error of a failed run with its location and time."""
-    failure = recording.failure
+    failure, source = recording.failure, recording.code.source
     if failure is None:
         return {"ended": "finished", "exit_status": int(ExitStatus.DONE)}
-    source, span = recording.code.source, failure.diagnostic.span
     error = {
         "class": RunError.__name__,
         **to_json(failure.diagnostic, source),
         "file": source.name,
-        "statement": " ".join(source.slice(span).split()),
+        "statement": " ".join(source.slice(failure.diagnostic.span).split()),
         "time": failure.time,
         "arm": failure.arm,
     }
@@ -215,8 +211,8 @@ def round_numbers(value: Any) -> Any:
 
 
 def _event_lines(recording: Recording) -> Iterator[str]:
+    source = recording.code.source
     for effect in recording.effects:
-        source = recording.code.source
         event = {
             "t0": effect.t0,
             "t1": effect.t1,
@@ -239,18 +235,18 @@ def omission_notes(recording: Recording, most_rows: int) -> tuple[str, ...]:
         recording: the recording of the run.
         most_rows: limit of the rows of ``motion.csv``.
     """
+    notes = []
     rows, contacts = sum(len(stream.t) for stream in recording.streams), _contacts(recording).omitted
-    more_contacts = (f"run.json lists the first and the last contacts: {omission_text(contacts)}",) if contacts else ()
-    if rows <= most_rows:
-        return more_contacts
-    ticks = len(recording.streams[0].t)
-    first, end, _ = _written_ticks(recording, most_rows).indices(ticks)
-    part = "last" if first else "first"
-    text = (
-        f"motion.csv holds the {part} {(end - first) * recording.cell.period:.3f} s of {recording.duration:.3f} s: "
-        f"{(end - first) * len(recording.streams)} of {rows} rows; `--motion-rows {rows}` writes all"
-    )
-    return (text, *more_contacts)
+    if rows > most_rows:
+        first, end, _ = _written_ticks(recording, most_rows).indices(len(recording.streams[0].t))
+        part, written = "last" if first else "first", end - first
+        notes.append(
+            f"motion.csv holds the {part} {written * recording.cell.period:.3f} s of {recording.duration:.3f} s: "
+            f"{written * len(recording.streams)} of {rows} rows; `--motion-rows {rows}` writes all"
+        )
+    if contacts:
+        notes.append(f"run.json lists the first and the last contacts: {omission_text(contacts)}")
+    return tuple(notes)
 
 
 def _written_ticks(recording: Recording, most_rows: int) -> slice:
