@@ -111,13 +111,15 @@ class Details(TypedDict, total=False):
         secondary: other places that matter.
         note: what one has to know; empty for none.
         advice: what to write instead; empty for none.
-        fixes: changes that cure it.
+        replacement: what cures it where it stands in place of the span.
+        fixes: changes that cure it, where they are others.
     """
 
     severity: Severity
     secondary: tuple[Label, ...]
     note: str
     advice: str
+    replacement: str
     fixes: tuple[Fix, ...]
 
 
@@ -153,6 +155,7 @@ class DiagnosticList(list[Diagnostic]):
         """Add a diagnostic, made of what is given."""
         if self._counts[code] >= MAX_PER_CODE:
             return
+        cure = (Fix(span, details["replacement"]),) if "replacement" in details else ()
         self.append(
             Diagnostic(
                 code=code,
@@ -163,7 +166,7 @@ class DiagnosticList(list[Diagnostic]):
                 secondary=details.get("secondary", ()),
                 notes=filter(None, (details.get("note"),)),
                 helps=filter(None, (details.get("advice"),)),
-                fixes=details.get("fixes", ()),
+                fixes=details.get("fixes", cure),
             )
         )
 

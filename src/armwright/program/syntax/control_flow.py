@@ -1,7 +1,6 @@
 """Parsing what decides what is done next: blocks, choices, loops, calls, branches side by side, events, recovery."""
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Fix
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import (
@@ -147,16 +146,15 @@ def _accept_else(tokens: TokenStream) -> bool:
         return True
     token, after = tokens.current, tokens.peek()
     if token.key == ";" and after.key == "ELSE":
-        fix = Fix(token.span, "")
-        tokens.report_once("E124", "no `;` is allowed before ELSE", token.span, "leave it out", fixes=(fix,))
+        tokens.report_once("E124", "no `;` is allowed before ELSE", token.span, "leave it out", replacement="")
         tokens.take()
         tokens.take()
         return True
     if token.kind is not TokenKind.NAME or after.key in ("=", ":=", "(", "["):
         return False
     if token.key in _ELSE_IF_SPELLINGS:
-        text, fix = f"unknown statement `{token.text}`", Fix(token.span, "ELSE IF")
-        tokens.report("E105", text, token.span, "not a statement", advice="write `ELSE IF`", fixes=(fix,))
+        text, meant = f"unknown statement `{token.text}`", "ELSE IF"
+        tokens.report("E105", text, token.span, "not a statement", advice=f"write `{meant}`", replacement=meant)
         tokens.replace_current("IF")
         return True
     if closest(token.text, ("ELSE", *tokens.vocabulary.statements)) == "ELSE":
@@ -324,8 +322,7 @@ def _branch_separator(tokens: TokenStream) -> None:
         return
     gap = tokens.gap_span()
     if tokens.matches("BEGIN", "PRIORITY"):
-        text, fix = "missing `;` between two branches", Fix(gap, ";")
-        tokens.report_once("E104", text, gap, "expected `;` here", fixes=(fix,))
+        tokens.report_once("E104", "missing `;` between two branches", gap, "expected `;` here", replacement=";")
         return
     tokens.fail(f"{describe_token(tokens.current)} does not belong here", "expected `;`", code="E117")
 

@@ -4,7 +4,7 @@ import math
 from functools import partial
 
 from armwright.errors import closest
-from armwright.program.language.diagnostic import Fix, did_you_mean
+from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import number, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
@@ -91,7 +91,7 @@ def names_and_type(tokens: TokenStream, names: list[tree.Name]) -> tree.TypeName
             _declared_name(tokens, names)
         elif tokens.current.kind is TokenKind.NAME and tokens.peek().key in (",", ":"):
             gap = tokens.gap_span()
-            tokens.report("E112", "missing `,` between two names", gap, "expected `,` here", fixes=(Fix(gap, ","),))
+            tokens.report("E112", "missing `,` between two names", gap, "expected `,` here", replacement=",")
             _declared_name(tokens, names)
         else:
             break

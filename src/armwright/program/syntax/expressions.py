@@ -77,8 +77,8 @@ def _replace_foreign_operator(tokens: TokenStream) -> bool:
     """Put the sign that was meant in the pose of one of another language."""
     token = tokens.current
     meant, text = FOREIGN_OPERATORS[token.key], f"`{token.text}` is not a symbol of RLO"
-    fix = Fix(token.span, f" {meant} " if meant.isalpha() else meant)
-    tokens.report_once("E123", text, token.span, f"write `{meant}`", fixes=(fix,))
+    replacement = f" {meant} " if meant.isalpha() else meant
+    tokens.report_once("E123", text, token.span, f"write `{meant}`", replacement=replacement)
     tokens.replace_current(meant)
     return True
 
@@ -108,8 +108,7 @@ def _unary(tokens: TokenStream, wants: str, where: str, lowest: int) -> tree.Exp
         text = f"NOT needs parentheses after `{tokens.previous.text}`"
         tokens.report_once("E122", text, token.span, "put `( )` around NOT and what follows")
     if token.key == "+":
-        fix = Fix(token.span, "")
-        tokens.report_once("E113", "a value has no `+` in front", token.span, "leave it out", fixes=(fix,))
+        tokens.report_once("E113", "a value has no `+` in front", token.span, "leave it out", replacement="")
     tokens.take()
     tokens.enter_level()
     operand = expression(tokens, "a value", "", PRECEDENCE_OF_NOT if token.key == "NOT" else PRECEDENCE["*"] + 1)
@@ -132,8 +131,7 @@ def number(tokens: TokenStream) -> tree.Number:
         tokens.take()
         token = tokens.current
         if start.key == "+":
-            fix = Fix(start.span, "")
-            tokens.report("E113", "a number has no `+` in front", start.span, "leave it out", fixes=(fix,))
+            tokens.report("E113", "a number has no `+` in front", start.span, "leave it out", replacement="")
     if token.kind is not _NUMBER:
         tokens.fail("expected a number", f"found {describe_token(token)}")
     tokens.take()

@@ -1,7 +1,6 @@
 """Parsing statements about frames: assignments, AFFIX and UNFIX."""
 
 from armwright.program.language.diagnostic import Fix
-from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression, mobile
 from armwright.program.syntax.lexer import TokenKind
@@ -28,11 +27,11 @@ def expect_equals(tokens: TokenStream, what: str, written: str) -> None:
     token = tokens.current
     if tokens.accept(":=", "=="):
         text = f"{what} gets its value with `=`, not `{token.text}`"
-        tokens.report("E109", text, token.span, "write `=`", fixes=(Fix(token.span, "="),))
+        tokens.report("E109", text, token.span, "write `=`", replacement="=")
     elif tokens.is_at_end or tokens.matches(";", ",", ")", "END") or token.kind is TokenKind.KEYWORD:
         tokens.fail(f"{what} needs `=` and a value", "expected `=` and a value here", code="E109")
     elif not token.damaged:
-        text, fix = f"{what} needs `=` before its value", Fix(Span(token.start, token.start), "= ")
+        text, fix = f"{what} needs `=` before its value", Fix(token.gap, "= ")
         advice = f"write `{written} = (...`" if token.text == "(" else f"write `{written} = {token.text}`"
         tokens.report("E109", text, token.span, "expected `=` before this", advice=advice, fixes=(fix,))
 

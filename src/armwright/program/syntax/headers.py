@@ -29,9 +29,8 @@ def parse_headers(tokens: TokenStream) -> list[tree.Header]:
         if token.kind is TokenKind.KEYWORD and token.key in tokens.vocabulary.headers:
             headers_ += parse_header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
-            gap = Span(token.start, token.start)
-            text, fix = "missing `VAR` before the declarations", Fix(gap, "VAR ")
-            tokens.report("E112", text, gap, "expected `VAR` here", fixes=(fix,))
+            text = "missing `VAR` before the declarations"
+            tokens.report("E112", text, token.gap, "expected `VAR` here", replacement="VAR ")
             headers_ += declarations(tokens)
         elif word := _intended_header(tokens):
             _replace_misspelt_keyword(tokens, word)
@@ -59,8 +58,7 @@ def parse_header(tokens: TokenStream) -> Sequence[tree.Header]:
 def _skip_semicolons(tokens: TokenStream) -> None:
     """Pass over each ``;`` in front of BEGIN, where there is none to spare."""
     while token := tokens.accept(";"):
-        fix = Fix(token.span, "")
-        tokens.report("E117", "`;` does not belong here", token.span, "leave it out", fixes=(fix,))
+        tokens.report("E117", "`;` does not belong here", token.span, "leave it out", replacement="")
         while tokens.accept(";"):
             pass
 
@@ -98,9 +96,8 @@ def _accept_begin(tokens: TokenStream) -> None:
         _replace_misspelt_keyword(tokens, "BEGIN")
         tokens.take()
         return
-    gap = Span(tokens.current.start, tokens.current.start)
-    fix = Fix(gap, "BEGIN ")
-    tokens.report_once("E115", "missing `BEGIN` before the first statement", gap, "expected `BEGIN` here", fixes=(fix,))
+    text = "missing `BEGIN` before the first statement"
+    tokens.report_once("E115", text, tokens.current.gap, "expected `BEGIN` here", replacement="BEGIN ")
 
 
 # import = "IMPORT" string ";" ;
@@ -149,8 +146,8 @@ def _procedure(tokens: TokenStream) -> list[tree.Header]:
     tokens.note_expected_words("VAR", "BEGIN", starts_statement=True)
     own = var_part(tokens) if tokens.matches("VAR") else []
     while tokens.matches("VAR"):
-        span = tokens.current.span
-        tokens.report("E118", "a procedure has one VAR part", span, "remove this word", fixes=(Fix(span, ""),))
+        text = "a procedure has one VAR part"
+        tokens.report("E118", text, tokens.current.span, "remove this word", replacement="")
         own += var_part(tokens)
     tokens.note_expected_words("BEGIN", starts_statement=True)
     body = _procedure_body(tokens, head, name)
@@ -159,8 +156,7 @@ def _procedure(tokens: TokenStream) -> list[tree.Header]:
         tokens.report_once("E127", "`END` without BEGIN", tokens.current.span, "the procedure has ended before")
         tokens.take()
     if tokens.matches("."):
-        fix = Fix(tokens.current.span, ";")
-        tokens.report_once("E104", "a procedure ends with `;`", tokens.current.span, "write `;`", fixes=(fix,))
+        tokens.report_once("E104", "a procedure ends with `;`", tokens.current.span, "write `;`", replacement=";")
         tokens.take()
     else:
         tokens.accept_semicolon("after the procedure")
@@ -227,8 +223,7 @@ def _parameter_separator(tokens: TokenStream) -> bool:
         return True
     token = tokens.current
     if token.key == ";" and tokens.peek().kind is TokenKind.NAME and tokens.peek(2).key in (",", ":"):
-        fix = Fix(token.span, ",")
-        tokens.report_once("E112", "expected `,` between two parameters", token.span, "write `,`", fixes=(fix,))
+        tokens.report_once("E112", "expected `,` between two parameters", token.span, "write `,`", replacement=",")
         tokens.take()
         return True
     if token.kind is TokenKind.NAME and tokens.peek().key in (",", ":"):
@@ -244,10 +239,10 @@ def _procedure_body(tokens: TokenStream, head: Span, name: tree.Name) -> tree.Bl
         _replace_misspelt_keyword(tokens, "BEGIN")
     elif not tokens.matches("BEGIN"):
         gap = tokens.gap_span()
-        fix = Fix(Span(token.start, token.start), "BEGIN ")
-        fixes = (fix,) if token.kind is TokenKind.NAME or tokens.matches(*tokens.vocabulary.statements) else ()
+        starts_statement = token.kind is TokenKind.NAME or tokens.matches(*tokens.vocabulary.statements)
+        fixes = (Fix(token.gap, "BEGIN "),) if starts_statement else ()
         tokens.report_once("E115", "the procedure has no BEGIN", gap, "expected `BEGIN` here", fixes=fixes)
-        if not fixes:
+        if not starts_statement:
             return tree.Block(gap, (), gap)
     tokens.enclosing_procedure = name.key or "?"
     body = block(tokens)

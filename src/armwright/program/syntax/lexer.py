@@ -53,6 +53,11 @@ class Token:
         """Where it stands."""
         return Span(self.start, self.end)
 
+    @property
+    def gap(self) -> Span:
+        """The position right in front of it, where a missing thing belongs."""
+        return Span(self.start, self.start)
+
 
 @attrs.frozen(kw_only=True)
 class ScannedText:
@@ -271,12 +276,10 @@ class _Scanner:
     def _scan_misspelt_arm(self, word: str, start: int, end: int) -> Token:
         digits = word[3:].strip(" \t-_")
         key = arm_name(digits or "1")
-        message, label = (
-            (f"`{word}` is not the name of an arm", "no blanks in the name of an arm")
-            if digits
-            else ("`ARM` alone is not a name", "which arm?")
-        )
-        fixes = (Fix(Span(start, end), key),) if digits else ()
+        message, label, fixes = "`ARM` alone is not a name", "which arm?", tuple[Fix, ...]()
+        if digits:
+            message, label = f"`{word}` is not the name of an arm", "no blanks in the name of an arm"
+            fixes = (Fix(Span(start, end), key),)
         self._report("E106", message, Span(start, end), label, advice=f"write `{key}`", fixes=fixes)
         return Token(TokenKind.ARM, word, key, start, end, damaged=True)
 

@@ -83,9 +83,8 @@ def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | Non
         tokens.note_expected_words(*tokens.vocabulary.with_clauses, present_clauses=_clause_words(others))
         return _with_clause(tokens, token)
     if key in tokens.vocabulary.with_clauses:
-        gap = Span(token.start, token.start)
         if not token.damaged:
-            text, advice, fix = f"{key} needs WITH before it", f"write `WITH {key} = ...`", Fix(gap, "WITH ")
+            text, advice, fix = f"{key} needs WITH before it", f"write `WITH {key} = ...`", Fix(token.gap, "WITH ")
             tokens.report("E116", text, token.span, "expected WITH before this", advice=advice, fixes=(fix,))
         return _valued_clause(tokens, token, key)
     return _plain_clause(tokens, token, key)
@@ -158,7 +157,7 @@ def _guard(tokens: TokenStream) -> tree.On:
         text, advice = f"{word.text} cannot be the action of ON", f"write `DO BEGIN {word.text} ... END`"
         label = "expected a block, `=`, a call, HALT, SIGNAL or PRINT"
         certain = not isinstance(action, tree.Move) or not action.clauses
-        fixes = (Fix(Span(word.start, word.start), "BEGIN "), Fix(tokens.gap_span(), " END")) if certain else ()
+        fixes = (Fix(word.gap, "BEGIN "), Fix(tokens.gap_span(), " END")) if certain else ()
         tokens.report("E121", text, word.span, label, advice=advice, fixes=fixes)
     return tokens.node(tree.On, start, head, condition, action)
 

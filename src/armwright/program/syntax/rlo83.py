@@ -173,7 +173,7 @@ class _ConformanceVisitor:
             return self._reject_statement(node, f"the call of `{name.text}`", name.span, "RLO-83 has no procedures")
         bracket = self._tokens[self._token_index(name.span) + 1]
         text, advice = f"`{name.text}` needs `=` before its value", f"write `{name.text} = (...`"
-        fix = Fix(Span(bracket.start, bracket.start), "= ")
+        fix = Fix(bracket.gap, "= ")
         self.report("E109", text, bracket.span, "expected `=` before this", advice=advice, fixes=(fix,))
         value = tree.Matrix(Span(bracket.start, node.span.end), node.arguments)
         return self._assign(tree.Assign(node.span, name, value))

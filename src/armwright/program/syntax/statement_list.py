@@ -266,9 +266,8 @@ def _statement_separator(tokens: TokenStream) -> None:
     if token.kind is _NAME and _replace_misspelt_end(tokens):
         return
     if _starts_statement(tokens):
-        text, gap = "missing `;` between two statements", tokens.gap_span()
-        here = labels(token.span, "a new statement starts here")
-        tokens.report_once("E104", text, gap, "expected `;` here", secondary=here, fixes=(Fix(gap, ";"),))
+        text, here = "missing `;` between two statements", labels(token.span, "a new statement starts here")
+        tokens.report_once("E104", text, tokens.gap_span(), "expected `;` here", secondary=here, replacement=";")
         return
     advice = UNSUPPORTED_STATEMENTS.get(token.key, "")
     tokens.fail(f"{describe_token(token)} does not belong here", "expected `;`", code="E117", advice=advice)

@@ -341,9 +341,8 @@ class TokenStream:
         if self.accept(";"):
             return True
         report = self.report_once if once else self.report
-        gap, advice = self.gap_span(), f"insert `;` after `{self.previous.text}`"
-        text = f"missing `;` {where}"
-        report("E104", text, gap, "expected `;` here", advice=advice, fixes=(Fix(gap, ";"),))
+        text, advice = f"missing `;` {where}", f"insert `;` after `{self.previous.text}`"
+        report("E104", text, self.gap_span(), "expected `;` here", advice=advice, replacement=";")
         return False
 
     def expect(self, key: str, where: str, *, statement: bool = False) -> None:
