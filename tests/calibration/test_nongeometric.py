@@ -42,7 +42,7 @@ def measured(
 
 def test_springs_are_found(puma: Arm, rng: np.random.Generator) -> None:
     """Joints that give under their load are told from geometry, and how much they give; gears that run true are not."""
-    seen, bent = measured(puma, rng, compliances(puma), SAG, m=120)
+    seen, bent = measured(puma, rng, compliances(puma), SAG, m=90)
 
     found = calibrate_nongeometric(puma, seen, folds=3)
 
@@ -62,7 +62,7 @@ def test_springs_are_found(puma: Arm, rng: np.random.Generator) -> None:
 
 def test_gears_are_found(puma: Arm, rng: np.random.Generator) -> None:
     """Gears that run out of true once a turn are told, and springs that are not there are not."""
-    seen, _ = measured(puma, rng, transmission_errors(puma, 1), SWING, m=120)
+    seen, _ = measured(puma, rng, transmission_errors(puma, 1), SWING, m=90)
 
     found = calibrate_nongeometric(puma, seen, folds=3)
 
@@ -73,7 +73,7 @@ def test_gears_are_found(puma: Arm, rng: np.random.Generator) -> None:
 
 def test_what_is_left_is_learnt(puma: Arm, rng: np.random.Generator) -> None:
     """What no model of ours has, such as a link that bends with the configuration, is learnt as far as points show."""
-    seen, _ = measured(puma, rng, (), 0.0, m=200)
+    seen, _ = measured(puma, rng, (), 0.0, m=130)
     q = seen.q
     strange = 4e-4 * np.stack([np.sin(q[:, 1]) * np.cos(q[:, 2]), np.cos(q[:, 1] + q[:, 3]), np.sin(2 * q[:, 0])], 1)
     seen = attrs.evolve(seen, points=seen.points + strange)

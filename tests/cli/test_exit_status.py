@@ -161,7 +161,7 @@ def test_broken_pipe(arguments: str) -> None:
     ("arguments", "status", "output", "errors"),
     [("arms", 0, True, False), ("show pumma560", 2, False, True), ("show pumma560 --json", 2, True, False)],
 )
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.25)
 def test_closed_streams(closed: str, arguments: str, status: int, output: bool, errors: bool) -> None:  # noqa: FBT001
     """What is said to a closed output is lost; it changes no status, and gets into no other stream."""
     command = f"{sys.executable} -m armwright {arguments} {closed}"

@@ -235,7 +235,7 @@ def wrong_as_json(status: int, out: str) -> str | None:
 
 @pytest.mark.share(0.005)
 @pytest.mark.parametrize("name", CALLS, ids=lambda name: name or "program")
-@pytest.mark.drawn(0.6)
+@pytest.mark.drawn(0.4)
 def test_any_value_of_any_parameter(name: str, sample: Sample, call: Call) -> None:
     """Whatever a command is given, it ends with a documented status; with --json in a document."""
     every = cases(name)

@@ -1,6 +1,7 @@
 """Straight ways of programs that are stopped: where and why is said, and on request they are gone round at a price."""
 
 import re
+from functools import cache
 from pathlib import Path
 
 import attrs
@@ -47,6 +48,18 @@ def stops(text: str, place: Cell) -> Diagnostic:
     return caught.value.diagnostic
 
 
+@cache
+def seam_error() -> Diagnostic:
+    """Return what stops the straight line along the seam."""
+    return stops(SEAM, cell())
+
+
+@cache
+def seam_run(by: Around) -> Recording:
+    """Return the run in which that line is gone round."""
+    return run(SEAM, cell(around=by))
+
+
 def down(**places: tuple[float, float, float]) -> str:
     """Return the beginning of a program whose frames have the hand point down."""
     values = " ".join(f"{name} = (1,0,0, 0,-1,0, 0,0,-1, {x},{y},{z}) ;" for name, (x, y, z) in places.items())
@@ -73,7 +86,7 @@ def off_the_seam(p: Array) -> Array:
 
 def test_the_place_on_the_path() -> None:
     """The error of a singular line says how far along, where in space, and which joint, and these agree."""
-    error = stops(SEAM, cell())
+    error = seam_error()
 
     found = PLACE.match(error.notes[0])
     assert error.code == "E403"
@@ -90,13 +103,13 @@ def test_the_place_on_the_path() -> None:
 @pytest.mark.parametrize("by", ["via", "damped"])
 def test_the_warning(by: Around) -> None:
     """A line that is gone round is told at its MOVE, with the place and cause of the error, the way and the price."""
-    recording = run(SEAM, cell(around=by))
+    recording = seam_run(by)
 
     (warning,) = motion_warnings(recording.stages, recording.cell)
     assert (warning.code, warning.is_error) == ("W402", False)
     assert SEAM[warning.span.start : warning.span.end] == "MOVE ARM_1 TO bottom STRAIGHTLY"
     assert "the straight line to `bottom`" in warning.message
-    assert stops(SEAM, cell()).notes[0] in warning.notes[0]
+    assert seam_error().notes[0] in warning.notes[0]
     assert ("via pose" if by == "via" else "damped least squares") in warning.notes[1]
     assert re.search(r"[\d.]+ mm off the line, [\d.]+ mrad, \+[\d.]+ s$", warning.message)
     assert "the straight line is infeasible at 50 % of the path" in stage_note(the_line(recording))
@@ -105,7 +118,7 @@ def test_the_warning(by: Around) -> None:
 @pytest.mark.parametrize("by", ["via", "damped"])
 def test_the_price_is_paid(by: Around) -> None:
     """What the warning says of distance, turn and time is what every tick of the motion shows."""
-    recording = run(SEAM, cell(around=by))
+    recording = seam_run(by)
     line = the_line(recording)
     assert line.stage.detour is not None
     price = line.stage.detour.price
@@ -127,7 +140,7 @@ def test_the_price_is_paid(by: Around) -> None:
 @pytest.mark.parametrize("by", ["via", "damped"])
 def test_a_stage_like_any_other(by: Around) -> None:
     """A way round begins where the last stage ended, lasts whole ticks, ends at rest at the goal, inside all limits."""
-    recording = run(SEAM, cell(around=by))
+    recording = seam_run(by)
     line = the_line(recording)
     motion, arm, period = line.stage.trajectory, recording.cell.arms["ARM_1"].arm, recording.cell.period
     before = recording.stages[0].stage.trajectory

@@ -265,7 +265,7 @@ def test_silence(speeds: Design, tmp_path: Path, capfd: pytest.CaptureFixture[st
     assert capfd.readouterr() == ("", "")
 
 
-# What the numbers of the runs between may take beyond what the first 200 take [bytes]; all of them are 45 MB.
+# What the numbers of the runs between may take beyond what the first 200 take [bytes]; all of them are 22 MB.
 SLACK = 1_000_000
 
 
@@ -285,13 +285,13 @@ def peak(runs):
     tracemalloc.stop()
     return used
 
-peak(100)  # libraries are loaded
-print(peak(200), peak(2000))
+peak(60)  # libraries are loaded
+print(peak(200), peak(1000))
 """
 
 
 def test_memory_is_flat(tmp_path: Path) -> None:
-    """Ten times as many runs take no more memory: 2000 runs of 1000 numbers, a few blocks at a time."""
+    """Five times as many runs take no more memory: 1000 runs of 1000 numbers, a few blocks at a time."""
     # In a process of its own: threads that a cluster left in this one would be counted too.
     command = [sys.executable, "-c", MEMORY, str(tmp_path)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
