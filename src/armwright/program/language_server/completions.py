@@ -53,8 +53,9 @@ _WORD_SNIPPETS = {
 }
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
-
-
+_VOCABULARY = VOCABULARIES[Standard.RLO_2]
+_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *_VOCABULARY.with_clauses))
+_CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
     "DIRECTLY": frozenset(("STRAIGHTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
@@ -87,7 +88,6 @@ class _OperandRule:
 _STEPS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV")
 _MEASURES = ("DIST", "FORCE")
 _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCALAR,))
-_NO_OPERAND = _OperandRule()
 _ANY_VALUE = _OperandRule(kinds=frozenset(VariableKind) - {VariableKind.EVENT}, arms=True, functions=tuple(FUNCTIONS))
 _NUMBER = _OperandRule(kinds=_SCALAR, functions=_MEASURES)
 _POSE = _OperandRule(kinds=_FRAME, arms=True)
@@ -134,96 +134,78 @@ def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippe
         offset: the position.
         snippets: whether the editor leads from part to part of what is to be filled in.
     """
-    items = _completion_items(codec, analysis, offset, snippets=snippets)
+    compiled = analysis.compiled
+    context = lexical_context(codec.text, offset, compiled.standard)
+    if context is None:
+        return []
+    end = Token(TokenKind.END, "", "", context.word.start, context.word.start)
+    source = Source(compiled.source.name, codec.text)
+    expected = expected_tokens(source, (*context.preceding, end), compiled.standard, declared=compiled.symbols.types)
+    procedure = expected.enclosing_procedure
+    scope = compiled.symbols.scope(procedure if procedure in compiled.symbols.procedures else None)
+    factory = _ItemFactory(analysis, span_range(codec, context.word), scope, snippets=snippets)
+    operand = _operand_rule(expected, context.preceding, scope)
+    words = (*operand.words, *_allowed_words(expected, context, compiled.standard))
+    if expected.starts_statement:
+        items = list(factory.words(words, starts=True))
+        if "MOVE" in words or "HALT" in words:
+            items += [*factory.procedures(), *factory.names(_ANY_VALUE.kinds, starts=True)]
+    else:
+        items = [*factory.arms(operand), *factory.names(operand.kinds), *factory.devices(operand)]
+        items += [*factory.functions(operand), *factory.words(words)]
     for number, item in enumerate(items):
         item.sort_text = f"{number:04d}"
     return items
 
 
-def _completion_items(codec: PositionCodec, analysis: Analysis, offset: int, *, snippets: bool) -> list[CompletionItem]:
-    text, compiled = codec.text, analysis.compiled
-    context = lexical_context(text, offset, compiled.standard)
-    if context is None:
-        return []
-    end = Token(TokenKind.END, "", "", context.word.start, context.word.start)
-    source = Source(compiled.source.name, text)
-    expectation = expected_tokens(source, (*context.preceding, end), compiled.standard, declared=compiled.symbols.types)
-    procedure = (
-        expectation.enclosing_procedure if expectation.enclosing_procedure in compiled.symbols.procedures else None
-    )
-    scope = compiled.symbols.scope(procedure)
-    maker = _ItemFactory(analysis, span_range(codec, context.word), scope, snippets=snippets)
-    operand = _NO_OPERAND if expectation.operand is None else _operand_rule(expectation, context.preceding, scope)
-    words = (*operand.words, *_allowed_words(expectation, context, compiled.standard))
-    if not expectation.starts_statement:
-        operands = [*maker.arms(operand), *maker.names(operand.kinds), *maker.devices(operand)]
-        return [*operands, *maker.functions(operand), *maker.words(words)]
-    statements = [*maker.words(words, starts=True)]
-    if "MOVE" not in words and "HALT" not in words:
-        return statements
-    return [*statements, *maker.procedures(), *maker.names(_ANY_VALUE.kinds, starts=True)]
-
-
-def _operand_rule(operand: ExpectedTokens, tokens: Sequence[Token], scope: Scope) -> _OperandRule:
+def _operand_rule(expected: ExpectedTokens, tokens: Sequence[Token], scope: Scope) -> _OperandRule:
     """Return what may stand for the value or name that is looked for."""
-    assert operand.operand is not None  # noqa: S101 - the caller has looked
-    wants, where = operand.operand
-    operand_ = _RULES_BY_NAME.get(wants)
+    if expected.operand is None:
+        return _OperandRule()
+    operand, where = expected.operand
+    rule = _RULES_BY_NAME.get(operand)
     call = enclosing_call(tokens)
-    if call is not None and wants not in ("an index", "the name of a FRAME", "an arm such as ARM_1"):
-        operand_ = _argument_rule(*call, scope.symbols)
+    if call is not None and operand not in ("an index", "the name of a FRAME", "an arm such as ARM_1"):
+        rule = _argument_rule(*call, scope.symbols)
     elif where in ("after SPEED =", "after BLEND =", "after DURATION ="):
-        operand_ = _NUMBER
-    elif operand_ is None:
-        kind = scope.type(operand.assignment_target)
+        rule = _NUMBER
+    elif rule is None:
         # Behind a comma stands a number of a matrix.
-        operand_ = _NUMBER if tokens[-1].key == "," else _ANY_VALUE if kind is None else _RULES_BY_KIND[kind.kind]
+        rule = _NUMBER if tokens[-1].key == "," else _rule_of_type(scope.type(expected.assignment_target))
     if tokens and tokens[-1].key == "*":
         # Behind `*` stands a step.
-        if VariableKind.FRAME in operand_.kinds:
-            return _STEP
-        return _TRANS if VariableKind.TRANS in operand_.kinds else operand_
-    return operand_
+        return _STEP if VariableKind.FRAME in rule.kinds else _TRANS if VariableKind.TRANS in rule.kinds else rule
+    return rule
 
 
 def _argument_rule(name: Token, number: int, symbols: Symbols) -> _OperandRule:
     procedure = symbols.procedures.get(name.key)
-    if procedure is None:
-        return _ARGUMENT_RULES.get(name.key, _NO_OPERAND)
-    if number >= len(procedure.parameters):
-        return _NO_OPERAND
-    kind = procedure.types.get(procedure.parameters[number])
-    return _ANY_VALUE if kind is None else _RULES_BY_KIND[kind.kind]
+    if procedure is None or number >= len(procedure.parameters):
+        return _ARGUMENT_RULES.get(name.key, _OperandRule()) if procedure is None else _OperandRule()
+    return _rule_of_type(procedure.types.get(procedure.parameters[number]))
 
 
-def _allowed_words(operand: ExpectedTokens, context: LexicalContext, std: Standard) -> Iterator[str]:
+def _rule_of_type(variable: VariableType | None) -> _OperandRule:
+    return _ANY_VALUE if variable is None else _RULES_BY_KIND[variable.kind]
+
+
+def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Standard) -> Iterator[str]:
     """Give the words that may stand at a place; of clauses those that go with the others of their MOVE."""
-    vocabulary = VOCABULARIES[std]
-    clauses = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *VOCABULARIES[Standard.RLO_2].with_clauses))
-    written = operand.present_clauses | {
-        token.key for token in takewhile(lambda token: not _ends_clause(token), context.following)
-    }
+    following = takewhile(lambda token: token.key not in _CLAUSE_ENDS, context.following)
+    written = expected.present_clauses | {token.key for token in following}
+    allowed = VOCABULARIES[std].reserved
     # What ends a stretch of statements is not offered behind each of them, unless it is being written.
-    unasked = (
-        frozenset()
-        if operand.starts_statement or context.word.start < context.word.end
-        else frozenset(BLOCK_CLOSERS | {"RECOVER"})
-    )
-    without_via = "VIA" not in written
-    for word in dict.fromkeys(operand.words):
+    if not expected.starts_statement and context.word.start == context.word.end:
+        allowed = allowed - BLOCK_CLOSERS - {"RECOVER"}
+    for word in dict.fromkeys(expected.words):
         last = word.rpartition(" ")[2]
         # The action of ON is over in front of the place, or behind it.
-        excluded = last in written or _EXCLUDES.get(last, frozenset()) & written or (last == "BLEND" and without_via)
-        excluded = excluded and last in clauses
-        if last in vocabulary.reserved - unasked and not excluded and (word != "RETRY" or operand.is_in_recovery):
+        if last in _CLAUSES and (last in written or _EXCLUDES.get(last, frozenset()) & written):
+            continue
+        if last == "BLEND" and "VIA" not in written:
+            continue
+        if last in allowed and (word != "RETRY" or expected.is_in_recovery):
             yield word
-
-
-def _ends_clause(token: Token) -> bool:
-    return token.key == ";" or (token.kind is TokenKind.KEYWORD and token.key in _CLAUSE_ENDS)
-
-
-_CLAUSE_ENDS = frozenset((*VOCABULARIES[Standard.RLO_2].block_ends, *VOCABULARIES[Standard.RLO_2].statements))
 
 
 class _ItemFactory:
@@ -232,20 +214,18 @@ class _ItemFactory:
     def __init__(self, analysis: Analysis, word: Range, scope: Scope, *, snippets: bool) -> None:
         self._analysis, self._word, self._scope, self._snippets = analysis, word, scope, snippets
 
-    def _item(
-        self, label: str, kind: Kind, text: str = "", detail: str = "", documentation: str = ""
-    ) -> CompletionItem:
+    def _item(self, label: str, kind: Kind, text: str = "", detail: str = "", meaning: str = "") -> CompletionItem:
         """Return one thing that can be written; a text with parts to fill in is a snippet."""
-        is_snippet = "$" in text
+        text_format = InsertTextFormat.PlainText
+        if "$" in text:
+            text, text_format = (text, InsertTextFormat.Snippet) if self._snippets else ("", text_format)
         return CompletionItem(
             label=label,
             kind=kind,
             detail=detail or None,
-            documentation=documentation or None,
-            insert_text_format=InsertTextFormat.Snippet
-            if is_snippet and self._snippets
-            else InsertTextFormat.PlainText,
-            text_edit=TextEdit(self._word, label if is_snippet and not self._snippets else text or label),
+            documentation=meaning or None,
+            insert_text_format=text_format,
+            text_edit=TextEdit(self._word, text or label),
         )
 
     def _match_case(self, text: str) -> str:
@@ -256,17 +236,14 @@ class _ItemFactory:
         """Give words of the language and, where a statement starts, statements that begin with them."""
         for word in words:
             last = word.rpartition(" ")[2]
-            meaning = word_doc(last, "MOVE") or WordDoc("", "")
-            written = _WORD_SNIPPETS.get(last, "")
-            written = (f"WITH {written}" if word != last else written) if written else ""
-            kind = Kind.TypeParameter if word in _TYPES else Kind.Keyword
-            yield self._item(
-                self._match_case(word), kind, self._match_case(written or word), meaning.syntax, meaning.text
-            )
-            for label, snippet in _SNIPPETS.get(word, ()) if starts and self._snippets else ():
-                yield self._item(
-                    self._match_case(label), Kind.Snippet, self._match_case(snippet), meaning.syntax, meaning.text
-                )
+            doc = word_doc(last, "MOVE") or WordDoc("", "")
+            # What stands before the last word, such as WITH, stays before its snippet.
+            text = word.removesuffix(last) + _WORD_SNIPPETS.get(last, last)
+            entries = [(word, Kind.TypeParameter if word in _TYPES else Kind.Keyword, text)]
+            if starts and self._snippets:
+                entries += [(label, Kind.Snippet, snippet) for label, snippet in _SNIPPETS.get(word, ())]
+            for label, kind, text in entries:
+                yield self._item(self._match_case(label), kind, self._match_case(text), doc.syntax, doc.text)
 
     def names(self, kinds: frozenset[VariableKind], *, starts: bool = False) -> Iterator[CompletionItem]:
         """Give the variables that can be seen and are of the right kind."""

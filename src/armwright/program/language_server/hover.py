@@ -61,15 +61,14 @@ def _describe_token(analysis: Analysis, token: Token) -> _Description | None:
 
 def signature(procedure: tree.Procedure) -> tuple[str, tuple[tuple[int, int], ...]]:
     """Return the head of a procedure on one line, and where its parameters stand in that."""
-    text, notes = f"PROCEDURE {procedure.name.text}", []
-    for number, declaration in enumerate(procedure.parameters):
-        text += ", " if number else " ("
-        for index, name in enumerate(declaration.names):
-            text += ", " if index else ""
-            notes.append((len(text), len(text) + len(name.text)))
-            text += name.text
+    text, spans, separator = f"PROCEDURE {procedure.name.text}", [], " ("
+    for declaration in procedure.parameters:
+        for name in declaration.names:
+            text += separator + name.text
+            spans.append((len(text) - len(name.text), len(text)))
+            separator = ", "
         text += f" : {_type_text(declaration.type)}"
-    return text + ")" * bool(notes), tuple(notes)
+    return text + ")" * bool(spans), tuple(spans)
 
 
 def _type_text(written: tree.TypeName) -> str:
@@ -81,10 +80,8 @@ def _type_text(written: tree.TypeName) -> str:
 def _statement_word(analysis: Analysis, token: Token) -> str:
     """Return the word that starts the statement that a token stands in."""
     statement = takewhile(lambda before: before.key != ";", analysis.tokens_before(token.start))
-    starts = (
-        before.key for before in statement if before.key in _STATEMENT_STARTS and before.kind is TokenKind.KEYWORD
-    )
-    return next(starts, "")
+    keywords = (before.key for before in statement if before.kind is TokenKind.KEYWORD)
+    return next((word for word in keywords if word in _STATEMENT_STARTS), "")
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------
@@ -92,32 +89,26 @@ def _statement_word(analysis: Analysis, token: Token) -> str:
 
 def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description | None:
     key, text = occurrence.key, analysis.text[occurrence.start : occurrence.end]
-    entry: _Description | None = None
+    procedure = analysis.compiled.symbols.procedures.get(key)
+    description: _Description | None = None
     match occurrence.kind:
         case NameKind.VARIABLE:
-            entry = _describe_variable(analysis, occurrence, text)
+            description = _describe_variable(analysis, occurrence, text)
         case NameKind.ARM:
-            entry = f"{key} : FRAME", _describe_arm(analysis, key)
-        case NameKind.PROCEDURE:
-            entry = _describe_procedure(analysis, key)
+            description = f"{key} : FRAME", _describe_arm(analysis, key)
+        case NameKind.PROCEDURE if procedure is not None:
+            line = analysis.compiled.source.line(procedure.node.name.span.start)
+            description = signature(procedure.node)[0], [f"declared in line {line}"]
         case NameKind.DEVICE:
-            entry = text, [_describe_device(analysis, key)]
+            description = text, [_describe_device(analysis, key)]
         case NameKind.UNIT if key in UNITS:
-            entry = key, [f"a unit of {dimension(key)}"]
+            description = key, [f"a unit of {dimension(key)}"]
         case NameKind.AXIS:
-            entry = key, [f"the {key.lower()} axis"]
+            description = key, [f"the {key.lower()} axis"]
         case NameKind.FUNCTION | NameKind.SENSOR if (word := word_doc(key)) is not None:
             value = f" : {FUNCTIONS[key].result.name}" if occurrence.kind is NameKind.FUNCTION else ""
-            entry = word.syntax + value, [word.text]
-    return entry
-
-
-def _describe_procedure(analysis: Analysis, key: str) -> _Description | None:
-    procedure = analysis.compiled.symbols.procedures.get(key)
-    if procedure is None:
-        return None
-    line = analysis.compiled.source.line(procedure.node.name.span.start)
-    return signature(procedure.node)[0], [f"declared in line {line}"]
+            description = word.syntax + value, [word.text]
+    return description
 
 
 def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:
@@ -126,12 +117,12 @@ def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) ->
     code = f"{declared.text if declared else text} : {occurrence.type or 'of an invalid type'}"
     lines = []
     if declared is not None:
-        line = analysis.compiled.source.line(declared.span.start)
-        if occurrence.owner is None:
-            lines.append(f"declared in line {line}")
-        else:
-            role = "parameter" if occurrence.key in symbols.procedures[occurrence.owner].parameters else "variable"
-            lines.append(f"{role} of `{symbols.procedures[occurrence.owner].node.name.text}`, declared in line {line}")
+        origin = f"declared in line {analysis.compiled.source.line(declared.span.start)}"
+        if occurrence.owner is not None:
+            procedure = symbols.procedures[occurrence.owner]
+            role = "parameter" if occurrence.key in procedure.parameters else "variable"
+            origin = f"{role} of `{procedure.node.name.text}`, {origin}"
+        lines.append(origin)
     elif occurrence.key in symbols.imported:
         lines.append("imported")
     elif occurrence.key in PREDECLARED:
@@ -147,11 +138,10 @@ def _describe_frame(analysis: Analysis, key: str) -> list[str]:
     if cell is None or frames is None:
         return []
     lines = []
-    if key in frames:
-        parent = frames.parent(key)
-        if parent is not None:
-            lines.append(f"attached to {_parent_text(parent)} in {cell.name}")
-        if parent is not None and frames.has_value(key):
+    parent = frames.parent(key) if key in frames else None
+    if parent is not None:
+        lines.append(f"attached to {_parent_text(parent)} in {cell.name}")
+        if frames.has_value(key):
             units = analysis.compiled.symbols.units
             if parent != "WORLD":
                 lines.append(f"relative to {_parent_text(parent)}: {pose_text(frames.relation(key, parent), units)}")
@@ -202,7 +192,6 @@ def _describe_number(token: Token, units: UnitSystem) -> _Description | None:
     if unit not in UNITS or token.damaged:
         return None
     value = convert(float(token.key), unit, units)
-    unit_name = {"length": units.length.lower(), "angle": units.angle.lower(), "time": "s", "force": "N"}[
-        dimension(unit)
-    ]
-    return f"{token.text} = {value:.12g} {unit_name}", [f"a {dimension(unit)} in the unit of the program"]
+    quantity = dimension(unit)
+    names = {"length": units.length.lower(), "angle": units.angle.lower(), "time": "s", "force": "N"}
+    return f"{token.text} = {value:.12g} {names[quantity]}", [f"a {quantity} in the unit of the program"]

@@ -71,8 +71,7 @@ def rename(analysis: Analysis, offset: int, new: str) -> tuple[TextEdit, ...]:
     """
     occurrence = renameable_occurrence(analysis, offset)
     _require_valid_name(analysis, new)
-    key = new.upper()
-    if key != occurrence.key:
+    if new.upper() != occurrence.key:
         _require_unused(analysis, occurrence, new)
     return tuple(TextEdit(other.span, new) for other in analysis.same_occurrences(occurrence))
 

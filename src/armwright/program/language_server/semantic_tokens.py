@@ -15,9 +15,13 @@ from armwright.program.syntax.lexer import Token, TokenKind
 _NAMES = ("variable", "parameter", "event", "function", "property", "enumMember")
 KINDS = ("keyword", "type", *_NAMES, "number", "string", "comment", "operator")
 MODIFIERS = ("declaration", "modification", "readonly", "defaultLibrary", "frame", "trans", "scalar", "array", "arm")
-_KEYWORD, _TYPE, _NUMBER, _STRING, _COMMENT, _OPERATOR = (
-    KINDS.index(kind) for kind in ("keyword", "type", "number", "string", "comment", "operator")
-)
+_COMMENT = KINDS.index("comment")
+_TOKEN_STYLES = {
+    TokenKind.NUMBER: (KINDS.index("number"), 0),
+    TokenKind.STRING: (KINDS.index("string"), 0),
+    TokenKind.SYMBOL: (KINDS.index("operator"), 0),
+}
+_OPERATORS = frozenset(("+", "-", "*", "/", "=", "<", ">", "<=", ">=", "<>"))
 _TYPES = frozenset((*TYPES, *RLO_2_TYPES, *UNITS))
 _BIT = {name: 1 << at for at, name in enumerate(MODIFIERS)}
 _NAME_STYLES = {
@@ -40,7 +44,13 @@ def line_tokens(analysis: Analysis) -> list[list[SemanticToken]]:
     """Return the coloured stretches of each line of a program."""
     codec, compiled = analysis.codec, analysis.compiled
     lines: list[list[SemanticToken]] = [[] for _ in codec.line_starts]
-    _add_tokens(lines, codec, analysis)
+    names = {name.start: name for name in analysis.occurrences}
+    for token in compiled.tokens:
+        name = names.get(token.start)
+        style = _token_style(token) if name is None else _name_style(name, analysis)
+        if style is not None:
+            line, column = codec.line_and_column(token.start)
+            lines[line].append((column, codec.width(token.start, token.end), *style))
     for comment in compiled.comments:
         _add_comment(lines, codec, comment)
     for comment in compiled.comments:
@@ -49,33 +59,12 @@ def line_tokens(analysis: Analysis) -> list[list[SemanticToken]]:
     return lines
 
 
-def _add_tokens(lines: list[list[SemanticToken]], codec: PositionCodec, analysis: Analysis) -> None:
-    """Add the stretches of tokens to their lines."""
-    names = iter((*analysis.occurrences, None))
-    name = next(names)
-    for token in analysis.compiled.tokens:
-        style = _token_style(token)
-        if name is not None and name.start == token.start:
-            style, name = _name_style(name, analysis), next(names)
-        if style is not None:
-            line, column = codec.line_and_column(token.start)
-            lines[line].append((column, codec.width(token.start, token.end), *style))
-
-
 def _token_style(token: Token) -> tuple[int, int] | None:
-    kind = token.kind
-    if kind is TokenKind.KEYWORD:
-        return (_TYPE if token.key in _TYPES else _KEYWORD), 0
-    if kind is TokenKind.NUMBER:
-        return _NUMBER, 0
-    if kind is TokenKind.STRING:
-        return _STRING, 0
-    if kind is TokenKind.SYMBOL and token.key in _OPERATORS:
-        return _OPERATOR, 0
-    return None
-
-
-_OPERATORS = frozenset(("+", "-", "*", "/", "=", "<", ">", "<=", ">=", "<>"))
+    if token.kind is TokenKind.KEYWORD:
+        return KINDS.index("type" if token.key in _TYPES else "keyword"), 0
+    if token.kind is TokenKind.SYMBOL and token.key not in _OPERATORS:
+        return None
+    return _TOKEN_STYLES.get(token.kind)
 
 
 def _name_style(name: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
@@ -85,20 +74,18 @@ def _name_style(name: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
         return KINDS.index(kind), bits | modifiers
     if name.kind is not NameKind.VARIABLE:
         return None
-    symbols = analysis.compiled.symbols
-    word = "variable"
-    bits = modifiers
+    symbols, kind, bits = analysis.compiled.symbols, "variable", modifiers
     if name.owner is not None and name.key in symbols.procedures[name.owner].parameters:
-        word = "parameter"
+        kind = "parameter"
     elif name.owner is None and name.key not in symbols.declared:
         bits |= _BIT["defaultLibrary"]
     if name.type is not None:
         if name.type.kind is VariableKind.EVENT:
-            word = "event" if word == "variable" else word
+            kind = "event" if kind == "variable" else kind
         else:
             bits |= _BIT[name.type.kind.value.lower()]
         bits |= _BIT["array"] * bool(name.type.sizes)
-    return KINDS.index(word), bits
+    return KINDS.index(kind), bits
 
 
 def _add_comment(lines: list[list[SemanticToken]], codec: PositionCodec, comment: Span) -> None:
