@@ -98,12 +98,10 @@ class Analysis:
     def occurrence_at(self, offset: int) -> Occurrence | None:
         """Return the name at a position, or right in front of it."""
         tokens = self.compiled.tokens
-        first = last = bisect_left(tokens, offset, key=lambda token: token.start)
+        index = bisect_left(tokens, offset, key=lambda token: token.start)
         # What a name is depends on its own statement alone, and so hover need not wait for the other names.
-        while first and (first == last or tokens[first].key != ";"):
-            first -= 1
-        while last < len(tokens) and tokens[last].key != ";":
-            last += 1
+        first = next((k for k in range(index - 1, 0, -1) if tokens[k].key == ";"), 0)
+        last = next((k for k in range(index, len(tokens)) if tokens[k].key == ";"), len(tokens))
         names = occurrences(tokens[first:last], self.scopes)
         return next((name for name in reversed(names) if name.start <= offset <= name.end), None)
 
@@ -196,7 +194,9 @@ def lexical_context(text: str, offset: int, std: Standard) -> LexicalContext | N
     start = offset
     while start and (text[start - 1].isalnum() or text[start - 1] in "_-"):
         start -= 1
-    word = Span(_word_start(text, start, offset), offset)
+    # A sign in it belongs to an arm or to nothing.
+    before_sign, sign, _ = text[start:offset].upper().rpartition("-")
+    word = Span(start + len(before_sign + sign) if before_sign != "ARM" else start, offset)
     source = Source("", text)
     scanned = scan(source, blank_line_numbers(source)[0], std)
     if any(comment.start < offset < comment.end + text.startswith("//", comment.start) for comment in scanned.comments):
@@ -207,11 +207,3 @@ def lexical_context(text: str, offset: int, std: Standard) -> LexicalContext | N
         return None
     opened = any(diagnostic.code == "E102" and diagnostic.span.end <= offset for diagnostic in scanned.diagnostics)
     return None if opened else LexicalContext(preceding=front, word=word, following=following)
-
-
-def _word_start(text: str, start: int, end: int) -> int:
-    """Return where the word in front of a place starts: a sign in it belongs to an arm or to nothing."""
-    if "-" not in text[start:end]:
-        return start
-    first, _, _ = text[start:end].upper().rpartition("-")
-    return start if first == "ARM" else start + len(first) + 1

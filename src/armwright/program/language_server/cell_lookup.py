@@ -1,7 +1,8 @@
 """The cell that a program in an editor is meant for: named in a setting, imported, or the only one beside it."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import attrs
@@ -14,7 +15,7 @@ from armwright.files.inputs import regular_file
 from armwright.program.semantics.cell_symbols import ImportedFrames
 
 _IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)
-_ARM = re.compile(r"ARM[-_]0*([0-9]+)", re.IGNORECASE)
+_ARM = re.compile(r"\AARM[-_]0*([0-9]+)\Z", re.IGNORECASE)
 # A folder with more files that might be cells, or a larger one, is no folder of cells.
 _MAX_FILES = 50
 _LARGEST_FILE = 1_000_000
@@ -84,18 +85,18 @@ class CellCache:
             return file
         if folder is None:
             return None
-        imported = (self._read_with_arms(folder / name) for name in dict.fromkeys(_IMPORT.findall(text)))
-        if (first := next(filter(None, imported), None)) is not None:
+        imported = (folder / name for name in dict.fromkeys(_IMPORT.findall(text)))
+        if (first := next(self._read_with_arms(imported), None)) is not None:
             return first
-        beside = list(filter(None, map(self._read_with_arms, _cell_candidates(folder))))
+        beside = list(self._read_with_arms(_cell_candidates(folder)))
         return beside[0] if len(beside) == 1 else None
 
-    def _read_with_arms(self, path: Path) -> CellFile | None:
-        try:
-            file = self.read(path)
-        except FileFormatError:
-            return None
-        return file if file.cell.arms else None
+    def _read_with_arms(self, paths: Iterable[Path]) -> Iterator[CellFile]:
+        """Give the cell files that can be read and have arms."""
+        for path in paths:
+            with suppress(FileFormatError):
+                if (file := self.read(path)).cell.arms:
+                    yield file
 
 
 def _cell_candidates(folder: Path) -> Iterator[Path]:
@@ -130,13 +131,6 @@ def _read_cell_file(path: Path) -> CellFile | FileFormatError:
 
 def _declaration_lines(path: Path) -> dict[str, int]:
     document = Document.read(path)
-    lines: dict[str, int] = {}
-    for table in ("visions", "frames", "arms"):
-        if not document.root.is_table(table):
-            continue
-        for key in document.root.table(table):
-            line = document.line((table, key))
-            arm = _ARM.fullmatch(key)
-            if line is not None:
-                lines[f"ARM_{arm[1]}" if arm else key.upper()] = line
-    return lines
+    tables = [table for table in ("visions", "frames", "arms") if document.root.is_table(table)]
+    lines = {key: document.line((table, key)) for table in tables for key in document.root.table(table)}
+    return {_ARM.sub(r"ARM_\1", key).upper(): line for key, line in lines.items() if line is not None}

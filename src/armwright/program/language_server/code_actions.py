@@ -46,9 +46,7 @@ def code_actions(
 
 def _is_requested(kind: str, context: lsp.CodeActionContext) -> bool:
     """Whether an editor asks for a kind of cures, or for all kinds."""
-    only = context.only
-    prefixes = [prefix.value if isinstance(prefix, lsp.CodeActionKind) else prefix for prefix in only or ()]
-    return only is None or any(f"{kind}.".startswith(f"{prefix}.") for prefix in prefixes)
+    return context.only is None or any(f"{kind}.".startswith(prefix + ".") for prefix in context.only)
 
 
 def quick_fixes(
@@ -59,10 +57,11 @@ def quick_fixes(
     actions = []
     for diagnostic in analysis.complete.diagnostics:
         cured = _with_suggested_word(diagnostic, source)
-        if not any(_overlap(part, span) for part in (cured.span, *(fix.span for fix in cured.fixes)) if cured.fixes):
+        parts = (cured.span, *(fix.span for fix in cured.fixes)) if cured.fixes else ()
+        if not any(start <= span.end and span.start <= end for start, end in parts):
             continue
         key = diagnostic.code, position(analysis.codec, diagnostic.span.start)
-        shown = [one for one in published if (one.code, one.range.start) == key]
+        shown = [other for other in published if (other.code, other.range.start) == key]
         actions.append(
             lsp.CodeAction(
                 title=_title(cured, source),
@@ -97,16 +96,11 @@ def _with_suggested_word(diagnostic: Diagnostic, source: Source) -> Diagnostic:
 def all_fixes(diagnostics: Iterable[Diagnostic]) -> tuple[TextEdit, ...]:
     """Return all certain cures that can be made at once, in the order of the text; of two that touch the first."""
     curable = select_disjoint([diagnostic for diagnostic in diagnostics if diagnostic.fixes])
-    edits = chain.from_iterable(map(_edits, curable))
-    return tuple(sorted(edits, key=lambda edit: edit.span.start))
+    return tuple(sorted(chain.from_iterable(map(_edits, curable)), key=lambda edit: edit.span.start))
 
 
 def _edits(diagnostic: Diagnostic) -> tuple[TextEdit, ...]:
     return tuple(TextEdit(fix.span, fix.replacement) for fix in diagnostic.fixes)
-
-
-def _overlap(span: Span, other: Span) -> bool:
-    return span.start <= other.end and other.start <= span.end
 
 
 def _title(diagnostic: Diagnostic, source: Source) -> str:

@@ -59,7 +59,7 @@ class Document:
         return self.path.name if self.path is not None else self.uri.rpartition("/")[2]
 
     @property
-    def is_short(self) -> bool:
+    def _is_short(self) -> bool:
         """Whether it is analysed at every change."""
         return len(self.codec.line_starts) <= MAX_SHORT_LINES
 
@@ -78,7 +78,7 @@ class Document:
         self._outdated = True
         self._published.clear()
         self._stop_timer()
-        pause = TYPING_DELAY if self.is_short else LONG_TYPING_DELAY
+        pause = TYPING_DELAY if self._is_short else LONG_TYPING_DELAY
         self._timer = asyncio.get_running_loop().call_later(pause, self.publish)
 
     def analyse(self) -> Analysis:
@@ -100,11 +100,10 @@ class Document:
 
     async def analysis(self) -> Analysis:
         """Return the analysis of the text as it is now; that of a long program comes when nothing more is typed."""
-        if not self.is_short:
+        if not self._is_short:
             await self._published.wait()
         return self.analyse()
 
     def _stop_timer(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-            self._timer = None

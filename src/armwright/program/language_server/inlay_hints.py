@@ -32,11 +32,8 @@ def _statement_hints(analysis: Analysis, statement: tree.Move | tree.Call | tree
     match statement:
         case tree.Move():
             yield from _move_hints(analysis, statement)
-        case tree.Grasp(arm=None):
-            flow = analysis.complete.flow
-            arm = None if flow is None else flow.arms.get(statement.span.start)
-            if arm:
-                yield _hint(analysis, statement.span.end, arm, "the arm that was named or moved last")
+        case tree.Grasp(arm=None) if (flow := analysis.complete.flow) and (arm := flow.arms.get(statement.span.start)):
+            yield _hint(analysis, statement.span.end, arm, "the arm that was named or moved last")
         case tree.Call():
             yield from _call_hints(analysis, statement)
 

@@ -27,33 +27,26 @@ def document_symbols(analysis: Analysis) -> list[DocumentSymbol]:
         elif isinstance(header, tree.Procedure):
             procedure = symbols.procedures.get(header.name.key)
             types = {} if procedure is None else procedure.types
-            children = [
-                symbol
-                for part in header.parameters
-                for symbol in _variable_symbols(codec, part, types, parameters=True)
-            ]
-            children += [symbol for part in header.declarations for symbol in _variable_symbols(codec, part, types)]
+            parts = (*header.parameters, *header.declarations)
+            children = [symbol for part in parts for symbol in _variable_symbols(codec, part, types)]
+            for parameter in children[: sum(len(part.names) for part in header.parameters)]:
+                parameter.kind = SymbolKind.Variable
             symbol_range, name = span_range(codec, header.span), span_range(codec, header.name.span)
             # A name that is missing may stand anywhere.
             name = name if symbol_range.start <= name.start and name.end <= symbol_range.end else symbol_range
             _, opening, parameters = signature(header)[0].partition("(")
-            detail = opening + parameters or None
-            symbol = DocumentSymbol(header.name.text or "?", SymbolKind.Function, symbol_range, name, detail)
-            symbol.children = children or None
+            symbol = DocumentSymbol(header.name.text or "?", SymbolKind.Function, symbol_range, name)
+            symbol.detail, symbol.children = opening + parameters or None, children or None
             declared.append(symbol)
     return sorted(declared, key=lambda symbol: (symbol.range.start.line, symbol.range.start.character))
 
 
 def _variable_symbols(
-    codec: PositionCodec,
-    declaration: tree.Declaration,
-    types: Mapping[str, VariableType | None],
-    *,
-    parameters: bool = False,
+    codec: PositionCodec, declaration: tree.Declaration, types: Mapping[str, VariableType | None]
 ) -> Iterator[DocumentSymbol]:
     for name in declaration.names:
         type_, kind = types.get(name.key), SymbolKind.Variable
-        if type_ is not None and not parameters:
+        if type_ is not None:
             kind = SymbolKind.Array if type_.sizes else _KINDS.get(type_.kind, kind)
         detail = declaration.type.text if type_ is None else str(type_)
         name_range = span_range(codec, name.span)

@@ -1,6 +1,7 @@
 """What a call takes, while it is being written."""
 
 from collections.abc import Sequence
+from itertools import accumulate
 
 from lsprotocol import types as lsp
 
@@ -71,10 +72,7 @@ def enclosing_call(tokens: Sequence[Token]) -> tuple[Token, int] | None:
     return None
 
 
-def _parameter_columns(label: str, parts: Sequence[str]) -> tuple[tuple[int, int], ...]:
-    start, places = label.find("("), []
-    for part in parts:
-        start = label.find(part, start + 1)
-        places.append((start, start + len(part)))
-        start += len(part)
-    return tuple(places)
+def _parameter_columns(label: str, parameters: Sequence[str]) -> tuple[tuple[int, int], ...]:
+    """Return the columns of parameters that are separated by a comma and a blank."""
+    starts = accumulate((len(parameter) + 2 for parameter in parameters), initial=label.index("(") + 1)
+    return tuple((start, start + len(parameter)) for start, parameter in zip(starts, parameters, strict=False))
