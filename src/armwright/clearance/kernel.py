@@ -143,7 +143,7 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
     equations = textwrap.indent(body.lines, " " * 8)
     return "\n\n".join(
         [
-            head(sum(body.operations.values())) + body.helpers,
+            head(body.operations),
             "\n".join(f"{name} = {value!r}" for name, value in {**sizes, "OUTPUTS": body.outputs}.items()),
             f"{_COMPILED if layout.located else _INLINED}\ndef rates(x, y):\n    for k in range({LANES}):\n{equations}",
             *events,

@@ -1,10 +1,14 @@
 """An arm whose laws are compiled: the same equations as everywhere, traced for that arm."""
 
+# The methods of a compiled arm have signatures and docstrings alone: what they do is in their kernels.
+# mypy: disable-error-code="empty-body"
+
 from __future__ import annotations  # what help shows keeps the names of array types, which are long
 
 import inspect
 from collections import OrderedDict
 from collections.abc import Callable
+from functools import wraps
 from threading import Lock
 from typing import Any, TypeVar, cast
 
@@ -64,13 +68,13 @@ class _KernelMethod:
         self._method = method
 
     def __get__(self, compiled: CompiledArm | None, _owner: type) -> Callable[..., Any]:
-        method = self._method
+        method, name = self._method, self._method.__name__
         if compiled is None:
-            return method
-        function = compiled.kernel(method.__name__).function(method.__name__, str(method.__doc__))
+            return wraps(method)(lambda arm, *inputs, **options: getattr(arm, name)(*inputs, **options))
+        function = compiled.kernel(name).function(name, str(method.__doc__))
         function.__signature__ = inspect.signature(method.__get__(compiled))  # type: ignore[attr-defined]
         # Found there before this descriptor from now on.
-        compiled.__dict__[method.__name__] = function
+        compiled.__dict__[name] = function
         return function
 
 
@@ -112,7 +116,6 @@ class CompiledArm:
         Returns:
             X_BT: (..., 4, 4) homogeneous poses, translations in [m].
         """
-        return self._array("forward", q, threads=threads, out=out)
 
     @_kernel_method
     def link_poses(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
@@ -126,7 +129,6 @@ class CompiledArm:
         Returns:
             (..., n + 2, 4, 4) homogeneous poses of frames 0 to n and of the tool, translations in [m].
         """
-        return self._array("link_poses", q, threads=threads, out=out)
 
     @_kernel_method
     def jacobian(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
@@ -140,7 +142,6 @@ class CompiledArm:
         Returns:
             J: (..., 6, n), linear rows first: velocity [m/s] and angular velocity [rad/s] per joint velocity.
         """
-        return self._array("jacobian", q, threads=threads, out=out)
 
     @_kernel_method
     def pose_and_jacobian(
@@ -157,7 +158,6 @@ class CompiledArm:
             X_BT: (..., 4, 4) homogeneous poses, translations in [m].
             J: (..., 6, n) Jacobian of the tool point along the axes of the base.
         """
-        return self._arrays("pose_and_jacobian", q, threads=threads, out=out)
 
     @_kernel_method
     def inverse_branches(
@@ -179,7 +179,6 @@ class CompiledArm:
         Raises:
             UnsupportedArmError: the arm has no closed form.
         """
-        return self._arrays("inverse_branches", pose, near, threads=threads, out=out)
 
     @_kernel_method
     def inverse_dynamics(
@@ -200,7 +199,6 @@ class CompiledArm:
         Raises:
             UnsupportedArmError: nothing is known of the mass of some link.
         """
-        return self._array("inverse_dynamics", q, qd, qdd, threads=threads, out=out)
 
     @_kernel_method
     def inverse_dynamics_with_wrench(
@@ -229,7 +227,6 @@ class CompiledArm:
         Raises:
             UnsupportedArmError: nothing is known of the mass of some link.
         """
-        return self._array("inverse_dynamics_with_wrench", q, qd, qdd, wrench, threads=threads, out=out)
 
     @_kernel_method
     def forward_dynamics(
@@ -251,7 +248,6 @@ class CompiledArm:
             UnsupportedArmError: some joint moves nothing that resists an acceleration, or nothing is known of the mass
                 of some link.
         """
-        return self._array("forward_dynamics", q, qd, tau, threads=threads, out=out)
 
     @_kernel_method
     def mass_matrix(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
@@ -268,7 +264,6 @@ class CompiledArm:
         Raises:
             UnsupportedArmError: nothing is known of the mass of some link.
         """
-        return self._array("mass_matrix", q, threads=threads, out=out)
 
     @_kernel_method
     def mass_and_bias(
@@ -289,7 +284,6 @@ class CompiledArm:
         Raises:
             UnsupportedArmError: nothing is known of the mass of some link.
         """
-        return self._arrays("mass_and_bias", q, qd, threads=threads, out=out)
 
     def kernel(self, quantity: str) -> Kernel:
         """Return the kernel behind a function, whose part for one configuration other compiled code can call.
@@ -306,13 +300,3 @@ class CompiledArm:
     def __reduce__(self) -> tuple[Callable[[Arm], CompiledArm], tuple[Arm]]:
         """Let another process compile for itself: it finds the kernels on disk."""
         return compile_arm, (self.arm,)
-
-    def _array(self, quantity: str, *inputs: ArrayLike, threads: int | None, out: Array | None) -> Array:
-        """Evaluate a quantity of one output."""
-        result: Array = self.kernel(quantity)(*inputs, threads=threads, out=out)
-        return result
-
-    def _arrays(self, quantity: str, *inputs: ArrayLike, threads: int | None, out: Any) -> tuple[Array, Any]:
-        """Evaluate a quantity of two outputs."""
-        result: tuple[Array, Any] = self.kernel(quantity)(*inputs, threads=threads, out=out)
-        return result

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import admitted, ask_for_degrees
@@ -19,7 +19,7 @@ from armwright.kinematics.forward_kinematics import link_frames, tool_frame
 from armwright.kinematics.inverse_kinematics.branches import branches, merged
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
 from armwright.kinematics.jacobians import frame_columns
-from armwright.tracing.emit import Emitted, Guarded, emit
+from armwright.tracing.emit import Emitted, Equation, Guarded, emit
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, Vector
@@ -46,11 +46,8 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
         weighed(arm)
     outputs = [tuple(_size(arm, x) for x in shape) for shape in quantity.outputs]
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
-
-    def equation(*lists: Numbers) -> Rows | Guarded:
-        return quantity.equation(arm, *lists)
-
     bounds = dict.fromkeys(_POSITIONS, admitted(arm).tolist())
+    equation: Equation = partial(quantity.equation, arm)
     return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags, bounds=bounds)
 
 
@@ -67,7 +64,7 @@ def quantity_kernel(arm: Arm, name: str) -> Kernel:
     """
     emitted = emit_quantity(arm, name)
     plain, remark = _QUANTITIES[name].plain, partial(_ask_for_degrees, arm, emitted.inputs)
-    return Kernel(emitted=emitted, raise_for_invalid=partial(plain, arm), remark=remark)
+    return Kernel(emitted=emitted, raise_for_invalid=plain and partial(plain, arm), remark=remark)
 
 
 def quantity_names() -> tuple[str, ...]:
@@ -134,10 +131,6 @@ def _pose(frame: tuple[Matrix, Vector]) -> Vector:
     return [x for row in [*rows, [0.0, 0.0, 0.0, 1.0]] for x in row]
 
 
-def _always_valid(*_inputs: Any) -> None:
-    """Raise nothing: the quantity has no conditions."""
-
-
 class _Quantity(NamedTuple):
     """One row of the table: shapes stand in letters, n for the number of joints and f for that of the frames.
 
@@ -146,14 +139,14 @@ class _Quantity(NamedTuple):
         inputs: their shapes by their names.
         outputs: their shapes.
         flags: which outputs are truth values.
-        plain: the plain function; raises what belongs to inputs that break a condition.
+        plain: the plain function, which raises what belongs to inputs that break a condition; None without conditions.
     """
 
     equation: Callable[..., Rows | Guarded]
     inputs: Mapping[str, tuple[str | int, ...]]
     outputs: tuple[tuple[str | int, ...], ...]
     flags: tuple[int, ...] = ()
-    plain: Callable[..., object] = _always_valid
+    plain: Callable[..., object] | None = None
 
 
 def _size(arm: Arm, letter: str | int) -> int:

@@ -68,24 +68,23 @@ class Watched(NamedTuple):
 class Code:
     """The assignments of a kernel, the same for one configuration and for many."""
 
-    def __init__(self, graph: Graph, outputs: Sequence[int], watched: Watched) -> None:
+    def __init__(self, graph: Graph, outputs: Sequence[int], watched: Watched | None = None) -> None:
         self._graph, self._outputs, self._watched = graph, outputs, watched
-        required = [*outputs, *watched.positive]
-        self._order = reachable(graph, [*watched.inputs, *required])
+        required = [*outputs, *(watched.positive if watched else ())]
+        self._order = reachable(graph, [*(watched.inputs if watched else ()), *required])
         self.joined = fused(graph, self._order, required)
-        self._gone = set(self.joined.values())
 
-    def lines(self, load: Sequence[str], store: Sequence[str], *, watched: bool = True) -> str:
-        """Write one assignment per node, and whether the inputs can be trusted.
+    def lines(self, load: Sequence[str], store: Sequence[str]) -> str:
+        """Write one assignment per node and, of what is watched, whether the inputs can be trusted.
 
         Args:
             load: where each input comes from.
             store: the statement that takes each output, with a gap for its name.
-            watched: whether to say if the inputs can be trusted.
         """
         lines: list[str] = []
         names: dict[int, str] = {}
-        circular: set[int] = set()
+        angles: set[int] = set()
+        joined_products = set(self.joined.values())
         for i in self._order:
             node = self._graph.nodes[i]
             names[i] = f"v{i}"
@@ -96,17 +95,15 @@ class Code:
             elif node.op in ("sin", "cos"):
                 angle = node.operands[0]
                 names[i] = f"{node.op}{angle}"
-                if angle not in circular:
-                    circular.add(angle)
+                if angle not in angles:
+                    angles.add(angle)
                     lines.append(f"sin{angle}, cos{angle} = sine_cosine({names[angle]})")
             elif i in self.joined:
                 lines.append(f"v{i} = {self._fused(node, self.joined[i], names)}")
-            elif i not in self._gone:
+            elif i not in joined_products:
                 lines.append(f"v{i} = {_INFIX[node.op].format(*(names[j] for j in node.operands))}")
         lines += [statement.format(names[node]) for statement, node in zip(store, self._outputs, strict=True)]
-        if not watched:
-            return "\n".join(lines)
-        return "\n".join([*lines, *self._watched.lines(names)])
+        return "\n".join([*lines, *(self._watched.lines(names) if self._watched else ())])
 
     def _fused(self, node: Node, product: int, names: dict[int, str]) -> str:
         a, b = (names[j] for j in self._graph.nodes[product].operands)

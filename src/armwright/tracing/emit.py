@@ -12,6 +12,7 @@ import inspect
 import math
 import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from itertools import islice
 from keyword import iskeyword
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -19,8 +20,8 @@ import attrs
 import numpy as np
 
 from armwright.errors import InvalidValueError, shown
-from armwright.tracing import elementary
 from armwright.tracing.assignments import Code, Watched
+from armwright.tracing.elementary import arc_tangent, sine_cosine
 from armwright.tracing.graph import Graph, Traced, operation_count, reachable
 from armwright.tracing.scalar import Scalar
 
@@ -167,50 +168,41 @@ def emit(
         if not (name.isascii() and name.isidentifier()) or iskeyword(name):
             raise InvalidValueError(f"inputs: expected names such as 'qd', got {shown(name)}")
     graph = Graph()
-    taken = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}
-    lists = [graph.inputs(math.prod(shape)) for shape in taken.values()]
-    result = equation(*lists)
+    input_shapes = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}
+    scalars = {name: graph.inputs(math.prod(shape)) for name, shape in input_shapes.items()}
+    result = equation(*scalars.values())
     rows, positive = result if isinstance(result, Guarded) else (result, ())
     outputs = [[_node(graph, x) for x in row] for row in rows]
     row_shapes = tuple((len(row),) for row in outputs) if shapes is None else tuple(shapes)
     flat = [node for row in outputs for node in row]
-    far = {
-        x.node: float(bound)
-        for name, row in zip(taken, lists, strict=True)
-        for x, bound in zip(row, (bounds or {}).get(name, ()), strict=False)
-        if math.isfinite(bound)
-    }
-    turned = set(_turned(graph))
-    every = [x.node for row in lists for x in row]
+    # The nodes that the argument of a sine or cosine comes of.
+    turned = set(reachable(graph, [node.operands[0] for node in graph.nodes if node.op in ("sin", "cos")]))
+    nodes = [x.node for row in scalars.values() for x in row]
     watched = Watched(
-        angles=[node for node in every if node in turned],
-        others=[node for node in every if node not in turned],
+        angles=[node for node in nodes if node in turned],
+        others=[node for node in nodes if node not in turned],
         positive=[_node(graph, x) for x in positive],
-        bounds=far,
+        bounds={
+            x.node: float(bound)
+            for name, numbers in (bounds or {}).items()
+            for x, bound in zip(scalars.get(name, ()), numbers, strict=False)
+            if math.isfinite(bound)
+        },
     )
     code = Code(graph, flat, watched)
     operations = operation_count(graph, flat)
-    signature = ArraySignature(tuple(taken.values()), row_shapes, tuple(flags))
-    top = head(sum(operations.values()))
-    helpers = "".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations))
+    signature = ArraySignature(tuple(input_shapes.values()), row_shapes, tuple(flags))
     return Emitted(
         title=title,
-        rows=top + helpers + _rows_source(code, signature),
-        single=top + helpers + _one_source(code, signature),
-        inputs=taken,
-        angles=frozenset(
-            name for name, row in zip(taken, lists, strict=True) if turned.intersection(x.node for x in row)
-        ),
+        rows=head(operations) + _rows_source(code, signature),
+        single=head(operations) + _single_source(code, signature),
+        inputs=input_shapes,
+        angles=frozenset(name for name, row in scalars.items() if turned.intersection(x.node for x in row)),
         outputs=row_shapes,
         flags=tuple(flags),
         operations=operations,
         joined=len(code.joined),
     )
-
-
-def _turned(graph: Graph) -> list[int]:
-    """Return the nodes that the argument of a sine or cosine comes of."""
-    return reachable(graph, [node.operands[0] for node in graph.nodes if node.op in ("sin", "cos")])
 
 
 @attrs.frozen(kw_only=True)
@@ -219,15 +211,11 @@ class KernelBody:
 
     Attributes:
         lines: assignments for lane ``k``, that read ``x[row * LANES + k]`` and write ``y[row * LANES + k]``.
-        helpers: source of the functions that they call.
-        inputs: how many rows are read.
         outputs: how many rows are written.
         operations: how many of each kind, per configuration.
     """
 
     lines: str
-    helpers: str
-    inputs: int
     outputs: int
     operations: dict[str, int]
 
@@ -240,30 +228,28 @@ def kernel_body(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: in
         inputs: how many scalars it takes.
     """
     graph = Graph()
-    scalars = graph.inputs(inputs)
-    outputs = [_node(graph, x) for x in equation(list(scalars))]
-    code = Code(graph, outputs, Watched([], [], [], {}))
-    operations = operation_count(graph, outputs)
+    outputs = [_node(graph, x) for x in equation(list(graph.inputs(inputs)))]
+    lines = _lane_lines(Code(graph, outputs), inputs, len(outputs))
+    return KernelBody(lines=lines, outputs=len(outputs), operations=operation_count(graph, outputs))
+
+
+def _lane_lines(code: Code, inputs: int, outputs: int) -> str:
+    """Return the assignments for lane ``k`` of a block."""
     load = [f"x[{row} * {LANES} + k]" for row in range(inputs)]
-    store = [f"y[{row} * {LANES} + k] = {{}}" for row in range(len(outputs))]
-    return KernelBody(
-        lines=code.lines(load, store, watched=False),
-        helpers="".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations)),
-        inputs=inputs,
-        outputs=len(outputs),
-        operations=operations,
-    )
+    return code.lines(load, [f"y[{row} * {LANES} + k] = {{}}" for row in range(outputs)])
 
 
-def head(count: int) -> str:
-    """Return the first lines of an emitted source.
+def head(operations: Mapping[str, int]) -> str:
+    """Return the first lines of an emitted source: its imports, and the functions that its operations call.
 
     No name or title stands in it: a source is executed, and those are texts that a user wrote.
 
     Args:
-        count: operations per configuration.
+        operations: how many of each kind, per configuration.
     """
-    return _HEAD.format(count=count)
+    helpers = (helper for helper, ops in _HELPERS.items() if not ops.isdisjoint(operations))
+    texts = (f'\n@njit(error_model="numpy", forceinline=True)\n{inspect.getsource(helper)}\n' for helper in helpers)
+    return _HEAD.format(count=sum(operations.values())) + "".join(texts)
 
 
 def function_source(function: Callable[..., object], decorator: str = "") -> str:
@@ -283,12 +269,7 @@ def function_source(function: Callable[..., object], decorator: str = "") -> str
     return f"{decorator}\n{ast.unparse(definition)}".lstrip("\n")
 
 
-_HELPERS = {"sine_cosine": {"sin", "cos"}, "arc_tangent": {"atan2"}}
-
-
-def _helper(name: str) -> str:
-    text = inspect.getsource(getattr(elementary, name))
-    return f'\n@njit(error_model="numpy", forceinline=True)\n{text}\n'
+_HELPERS: dict[Callable[..., object], set[str]] = {sine_cosine: {"sin", "cos"}, arc_tangent: {"atan2"}}
 
 
 def _node(graph: Graph, x: Scalar) -> int:
@@ -327,8 +308,7 @@ class ArraySignature(NamedTuple):
         """Yield the location of every number of the inputs or the outputs, such as ``in0[1, 2]``."""
         shapes = self.inputs if side == "in" else self.outputs
         for i, shape in enumerate(shapes):
-            for index in np.ndindex(shape):
-                yield f"{side}{i}[{before}{', '.join(map(str, index))}]"
+            yield from (f"{side}{i}[{before}{', '.join(map(str, index))}]" for index in np.ndindex(shape))
 
     def stores(self, before: str = "") -> Iterator[str]:
         """Yield the statement that fills every element of the outputs, with a gap for the value."""
@@ -340,15 +320,9 @@ class ArraySignature(NamedTuple):
 def _rows_source(code: Code, signature: ArraySignature) -> str:
     width_in = sum(map(math.prod, signature.inputs))
     width_out = sum(map(math.prod, signature.outputs))
-    body = code.lines(
-        [f"x[{row} * {LANES} + k]" for row in range(width_in)],
-        [f"y[{row} * {LANES} + k] = {{}}" for row in range(width_out)],
-    )
-    loads = enumerate(signature.elements("in", "start + r, "))
-    load = [f"x[{row} * {LANES} + r] = {element}" for row, element in loads]
-    store = [
-        statement.format(f"y[{row} * {LANES} + r]") for row, statement in enumerate(signature.stores("start + r, "))
-    ]
+    elements, stores = signature.elements("in", "start + r, "), signature.stores("start + r, ")
+    load = (f"x[{row} * {LANES} + r] = {element}" for row, element in enumerate(elements))
+    store = (statement.format(f"y[{row} * {LANES} + r]") for row, statement in enumerate(stores))
     return _ROWS.format(
         signature=signature.types(rows=True),
         arguments=", ".join(signature.names),
@@ -357,22 +331,21 @@ def _rows_source(code: Code, signature: ArraySignature) -> str:
         out_size=width_out * LANES,
         lanes=LANES,
         load=_moves(load, signature.inputs),
-        body=textwrap.indent(body, " " * 12),
+        body=textwrap.indent(_lane_lines(code, width_in, width_out), " " * 12),
         store=_moves(store, signature.outputs),
     )
 
 
-def _moves(lines: Sequence[str], shapes: Sequence[Shape]) -> str:
+def _moves(lines: Iterator[str], shapes: Sequence[Shape]) -> str:
     """Write the loops that carry rows in or out of a block, one per array."""
     text: list[str] = []
-    remaining = iter(lines)
     for shape in shapes:
         text.append("        for r in range(m):")
-        text += ["            " + next(remaining) for _ in range(math.prod(shape))]
+        text += ["            " + line for line in islice(lines, math.prod(shape))]
     return "\n".join(text)
 
 
-def _one_source(code: Code, signature: ArraySignature) -> str:
+def _single_source(code: Code, signature: ArraySignature) -> str:
     body = code.lines(list(signature.elements("in")), list(signature.stores()))
     return _SINGLE.format(
         signature=signature.types(rows=False),

@@ -6,16 +6,10 @@ an arm's twists and offsets cost nothing.
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, TypeAlias
 
-# Of each operation: how many numbers it takes. Comparisons and select work on truth values too.
-ARITY = {
-    "input": 0, "constant": 0,
-    "add": 2, "subtract": 2, "multiply": 2, "divide": 2, "negate": 1,
-    "sin": 1, "cos": 1, "sqrt": 1, "atan2": 2, "absolute": 1, "round": 1,
-    "less": 2, "less_equal": 2, "select": 3,
-}  # fmt: skip
 _COMMUTE = frozenset({"add", "multiply"})
 
 Key: TypeAlias = tuple[Any, ...]
@@ -50,8 +44,7 @@ class Graph:
         """Return the node of an operation, simplified where its value is known or it does nothing."""
         if all(self.nodes[i].op == "constant" for i in operands):
             return self.constant(_FOLD[op](*(self.nodes[i].value for i in operands)))
-        simple = _SIMPLIFY.get(op, _as_it_is)(self, *operands)
-        if simple is not None:
+        if op in _SIMPLIFY and (simple := _SIMPLIFY[op](self, *operands)) is not None:
             return simple
         if op in _COMMUTE:
             operands = tuple(sorted(operands))
@@ -142,12 +135,8 @@ def reachable(graph: Graph, outputs: Iterable[int]) -> list[int]:
 
 def operation_count(graph: Graph, outputs: Iterable[int]) -> dict[str, int]:
     """Count the operations that the outputs need, by kind; inputs and constants cost nothing."""
-    counts: dict[str, int] = {}
-    for i in reachable(graph, outputs):
-        op = graph.nodes[i].op
-        if ARITY[op]:
-            counts[op] = counts.get(op, 0) + 1
-    return dict(sorted(counts.items()))
+    nodes = (graph.nodes[i] for i in reachable(graph, outputs))
+    return dict(sorted(Counter(node.op for node in nodes if node.operands).items()))
 
 
 def _ratio(a: float, b: float) -> float:
@@ -175,16 +164,10 @@ _FOLD: dict[str, Callable[..., float]] = {
 }
 
 
-def _as_it_is(_graph: Graph, *_operands: int) -> int | None:
-    return None
-
-
 def _simple_add(graph: Graph, a: int, b: int) -> int | None:
-    if graph.value(a) == 0:
-        return b
-    if graph.value(b) == 0:
-        return a
     for x, y in ((a, b), (b, a)):
+        if graph.value(x) == 0:
+            return y
         if graph.nodes[y].op == "negate":
             return graph.apply("subtract", x, graph.nodes[y].operands[0])
     return None
@@ -236,13 +219,13 @@ def _simple_negate(graph: Graph, a: int) -> int | None:
     return None
 
 
-def _simple_odd(op: str) -> Callable[[Graph, int], int | None]:
+def _simple_parity(op: str) -> Callable[[Graph, int], int | None]:
     def simplify(graph: Graph, a: int) -> int | None:
         node = graph.nodes[a]
         if node.op != "negate":
             return None
-        inner = graph.apply(op, node.operands[0])
-        return inner if op in ("cos", "absolute") else graph.apply("negate", inner)
+        of_positive = graph.apply(op, node.operands[0])
+        return of_positive if op in ("cos", "absolute") else graph.apply("negate", of_positive)
 
     return simplify
 
@@ -262,8 +245,8 @@ _SIMPLIFY: dict[str, Callable[..., int | None]] = {
     "multiply": _simple_multiply,
     "divide": _simple_divide,
     "negate": _simple_negate,
-    "sin": _simple_odd("sin"),
-    "cos": _simple_odd("cos"),
-    "absolute": _simple_odd("absolute"),
+    "sin": _simple_parity("sin"),
+    "cos": _simple_parity("cos"),
+    "absolute": _simple_parity("absolute"),
     "select": _simple_select,
 }

@@ -1,6 +1,7 @@
 """Functions of an abstract scalar: a float, an array with one value per configuration, or a node of a graph."""
 
 import math
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,41 +13,36 @@ from armwright.tracing.graph import is_traced, traced
 Scalar: TypeAlias = Any
 
 
+def _evaluate(op: str, on_arrays: Callable[..., Any], on_floats: Callable[..., float], *operands: Scalar) -> Scalar:
+    """Apply a function to scalars: as an operation of a graph, to arrays or to floats."""
+    if is_traced(*operands):
+        return traced(op, *operands)
+    return (on_arrays if any(isinstance(x, np.ndarray) for x in operands) else on_floats)(*operands)
+
+
 def sin(x: Scalar) -> Scalar:
     """Return the sine of ``x`` [rad]."""
-    if is_traced(x):
-        return traced("sin", x)
-    return np.sin(x) if isinstance(x, np.ndarray) else math.sin(x)
+    return _evaluate("sin", np.sin, math.sin, x)
 
 
 def cos(x: Scalar) -> Scalar:
     """Return the cosine of ``x`` [rad]."""
-    if is_traced(x):
-        return traced("cos", x)
-    return np.cos(x) if isinstance(x, np.ndarray) else math.cos(x)
+    return _evaluate("cos", np.cos, math.cos, x)
 
 
 def sqrt(x: Scalar) -> Scalar:
     """Return the root of ``x``, and 0 for what rounding has pushed below 0."""
-    if is_traced(x):
-        return traced("sqrt", x)
-    return np.sqrt(np.maximum(x, 0.0)) if isinstance(x, np.ndarray) else math.sqrt(max(x, 0.0))
+    return _evaluate("sqrt", lambda x: np.sqrt(np.maximum(x, 0.0)), lambda x: math.sqrt(max(x, 0.0)), x)
 
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:
     """Return the angle of the point (x, y) [rad], in (-pi, pi]."""
-    if is_traced(y, x):
-        return traced("atan2", y, x)
-    if isinstance(y, np.ndarray) or isinstance(x, np.ndarray):
-        return np.arctan2(y, x)
-    return math.atan2(y, x)
+    return _evaluate("atan2", np.arctan2, math.atan2, y, x)
 
 
 def round_half_even(x: Scalar) -> Scalar:
     """Return the whole number nearest to ``x``, as a float; the even one of two."""
-    if is_traced(x):
-        return traced("round", x)
-    return np.round(x) if isinstance(x, np.ndarray) else float(round(x))
+    return _evaluate("round", np.round, lambda x: float(round(x)), x)
 
 
 def select(condition: Any, then: Scalar, otherwise: Scalar) -> Scalar:
@@ -60,6 +56,4 @@ def select(condition: Any, then: Scalar, otherwise: Scalar) -> Scalar:
 
 def reciprocal(x: Scalar) -> Scalar:
     """Return 1 / ``x``, and infinity for a float 0 as for one in an array."""
-    if isinstance(x, float) and x == 0:
-        return math.inf
-    return 1.0 / x
+    return math.inf if isinstance(x, float) and x == 0 else 1.0 / x

@@ -32,11 +32,7 @@ def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
 
 def cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> Vector:
     """Return a × b."""
-    return [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def apply(M: Sequence[Sequence[Scalar]], v: Sequence[Scalar]) -> Vector:
