@@ -12,13 +12,8 @@ from armwright.program.language.source import Source
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
-GENERATORS: Generators = {
-    **frames.GENERATORS,
-    **devices.GENERATORS,
-    **move.GENERATORS,
-    **control_flow.GENERATORS,
-    **output.GENERATORS,
-}
+_FAMILIES = (frames, devices, move, control_flow, output)
+GENERATORS: Generators = {node: generate for family in _FAMILIES for node, generate in family.GENERATORS.items()}
 
 
 def generate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow, spelling: Mapping[str, str]) -> Code:

@@ -70,11 +70,7 @@ def form_of(move: tree.Move, text: Callable[[tree.Expression], str]) -> Form:
     """Return the form of a MOVE, its places in the words that ``text`` gives for them."""
     clauses = {type(clause) for clause in move.clauses}
     via = [clause.points for clause in move.clauses if isinstance(clause, tree.Via)]
-    ends = {
-        type(clause): text(clause.point)
-        for clause in move.clauses
-        if isinstance(clause, tree.Approach | tree.Departure)
-    }
+    ends = {type(end): text(end.point) for end in move.clauses if isinstance(end, tree.Approach | tree.Departure)}
     return Form(
         goal=text(move.goal),
         via=tuple(map(text, via[-1])) if via else (),

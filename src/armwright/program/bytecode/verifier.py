@@ -139,10 +139,8 @@ class Verifier:
         """
         self.code, self._rule = code, rule
         self.at, self.entry = 0, Entry(0, Routine.PROGRAM, {})
-        self._entries = [self.entry]
-        self._entries += [
-            Entry(procedure.start, Routine.PROCEDURE, procedure.types) for procedure in code.procedures.values()
-        ]
+        procedures = [Entry(own.start, Routine.PROCEDURE, own.types) for own in code.procedures.values()]
+        self._entries = [self.entry, *procedures]
         self._owners: dict[int, Entry] = {}
         self._known: dict[int, State] = {}
         self._types: dict[str, ValueType] = {}

@@ -32,11 +32,7 @@ from armwright.program.language.kinds import VariableKind
 from armwright.program.syntax.pose_literals import EXACT_TOLERANCE
 from armwright.spatial.rotations import orthonormality_error
 
-_VALUES: Mapping[str, tuple[Value, ...]] = {
-    **dict.fromkeys("NC", (Value.NUMBER,)),
-    "P": (Value.POSE,),
-    "T": (Value.TRUTH, Value.NUMBER),
-}
+_VALUES = {"N": (Value.NUMBER,), "C": (Value.NUMBER,), "P": (Value.POSE,), "T": (Value.TRUTH, Value.NUMBER)}
 _NAMES = {"F": VariableKind.FRAME, "S": VariableKind.SCALAR, "E": VariableKind.EVENT}
 # The words that an operand may be, and what is said of others.
 _WORDS: Mapping[str, tuple[tuple[str, ...], str]] = {
@@ -285,10 +281,8 @@ def _fork(verifier: Verifier, state: State) -> Flow:
 
 def _try(verifier: Verifier, state: State) -> Flow:
     _check_nesting(verifier, state.attempts)
-    trying, recovering = (
-        attrs.evolve(state, attempts=(*state.attempts, Attempt(verifier.at, recovers, state.locks)))
-        for recovers in (False, True)
-    )
+    attempts = [Attempt(verifier.at, recovers, state.locks) for recovers in (False, True)]
+    trying, recovering = (attrs.evolve(state, attempts=(*state.attempts, attempt)) for attempt in attempts)
     return Flow(trying, (verifier.targets[0], recovering))
 
 

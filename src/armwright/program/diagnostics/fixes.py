@@ -73,16 +73,14 @@ def apply_fixes(source: Source, compile_source: Compile, *, rounds: int = MAX_RO
     cures: list[AppliedFix] = []
     rejected: set[tuple[str, str]] = set()
     for _ in range(rounds if "\0" not in source.text else 0):
-        offered = [
-            one for one in current.diagnostics if one.fixes and _message_key(one, current.source) not in rejected
-        ]
+        offered = [one for one in current.diagnostics if one.fixes and _message_id(one, current.source) not in rejected]
         selected = select_disjoint(offered)
         if not selected:
             break
         after = compile_source(_apply(current.source, selected))
         if not _improves(selected, current, after):
             selected, after = _select_improving(selected, current, compile_source)
-            rejected |= {_message_key(one, current.source) for one in offered if one not in selected}
+            rejected |= {_message_id(one, current.source) for one in offered if one not in selected}
         cures += [AppliedFix(current.source, one) for one in selected]
         current = after
     return FixResult(applied=tuple(cures), compilation=current)
@@ -171,7 +169,7 @@ def _select_improving(
     return accepted, after
 
 
-def _message_key(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:
+def _message_id(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:
     """Return what a message says and of which line, by which it is known again after other lines have changed."""
     return diagnostic.message, source.line_text(source.line(diagnostic.span.start))
 

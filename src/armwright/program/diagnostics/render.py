@@ -138,7 +138,5 @@ def _printable(character: str) -> str:
 
 def _column_width(cell: str) -> int:
     """Return how many columns of a terminal a shown character takes."""
-    return sum(
-        0 if unicodedata.combining(character) else 2 if unicodedata.east_asian_width(character) in "WF" else 1
-        for character in cell
-    )
+    spacing = [character for character in cell if not unicodedata.combining(character)]
+    return len(spacing) + sum(unicodedata.east_asian_width(character) in "WF" for character in spacing)

@@ -17,11 +17,7 @@ def to_sarif(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> di
         programs: of each the diagnostics, the text, and the path as it shall stand in the log.
     """
     codes = sorted({diagnostic.code for diagnostics, _, _ in programs for diagnostic in diagnostics})
-    results = [
-        _result(diagnostic, source, PurePath(path).as_posix(), codes)
-        for diagnostics, source, path in programs
-        for diagnostic in diagnostics
-    ]
+    results = [_result(one, source, path, codes) for diagnostics, source, path in programs for one in diagnostics]
     driver = {"name": "armwright", "version": __version__, "rules": [_rule(code) for code in codes]}
     run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
     return {"$schema": "https://json.schemastore.org/sarif-2.1.0.json", "version": "2.1.0", "runs": [run]}
@@ -32,7 +28,8 @@ def _rule(code: str) -> dict[str, Any]:
     return {"id": code, "shortDescription": {"text": page.title}, "fullDescription": {"text": page.text}}
 
 
-def _result(diagnostic: Diagnostic, source: Source, uri: str, codes: list[str]) -> dict[str, Any]:
+def _result(diagnostic: Diagnostic, source: Source, path: str, codes: list[str]) -> dict[str, Any]:
+    uri = PurePath(path).as_posix()
     advice = "".join(f"\n{head}: {text}" for head, text in diagnostic.remarks)
     result: dict[str, Any] = {
         "ruleId": diagnostic.code,

@@ -88,7 +88,7 @@ class Vocabulary(NamedTuple):
         name: of the standard.
         headers: what starts a part in front of BEGIN.
         statements: what starts a statement, but for names.
-        closing: what ends a stretch of statements or a part of one.
+        block_ends: what ends a stretch of statements or a part of one.
         types: of single things.
         plain_clauses: clauses of MOVE that stand without WITH.
         with_clauses: those that stand behind WITH.

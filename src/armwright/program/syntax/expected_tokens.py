@@ -10,11 +10,11 @@ class ExpectedTokens:
     Attributes:
         words: of the language, the likeliest first.
         operand: the value or name that is looked for, in the words of messages, and where; None where none is.
-        starts: whether a statement or a part of the program starts here.
-        recovering: whether the pose lies in the second part of a TRY.
-        given: the words of the clauses that a MOVE has in front of the pose.
-        target: the key of the variable that gets the value; empty where none does.
-        procedure: the key of the procedure around the pose; empty in the program itself.
+        starts_statement: whether a statement or a part of the program starts here.
+        is_in_recovery: whether the position lies in the second part of a TRY.
+        present_clauses: the words of the clauses that a MOVE has in front of the position.
+        assignment_target: the key of the variable that gets the value; empty where none does.
+        enclosing_procedure: the key of the procedure around the position; empty in the program itself.
     """
 
     words: list[str] = attrs.field(factory=list)

@@ -74,7 +74,7 @@ def expression(tokens: TokenStream, wants: str = "a value", where: str = "here",
 
 
 def _replace_foreign_operator(tokens: TokenStream) -> bool:
-    """Put the sign that was meant in the pose of one of another language."""
+    """Put the sign that was meant in place of one of another language."""
     token = tokens.current
     meant, text = FOREIGN_OPERATORS[token.key], f"`{token.text}` is not a symbol of RLO"
     replacement = f" {meant} " if meant.isalpha() else meant

@@ -14,9 +14,7 @@ from armwright.program.syntax.token_stream import TokenStream, describe_token
 
 # What other languages call a procedure.
 _FOREIGN_PROCEDURE_KEYWORDS = ("FUNCTION", "PROC", "SUB", "SUBROUTINE", "DEF")
-_NOTE_ON_RESULTS = (
-    "a procedure returns results in its FRAME, EVENT and ARRAY parameters, or in variables of the program"
-)
+_NO_RESULTS = "a procedure returns results in its FRAME, EVENT and ARRAY parameters, or in variables of the program"
 
 
 def parse_headers(tokens: TokenStream) -> list[tree.Header]:
@@ -35,7 +33,7 @@ def parse_headers(tokens: TokenStream) -> list[tree.Header]:
         elif word := _intended_header(tokens):
             _replace_misspelt_keyword(tokens, word)
             headers_ += parse_header(tokens)
-        elif tokens.matches(*tokens.vocabulary.statements) or after.key == "=" or tokens.index >= tokens.next_begin():
+        elif after.key == "=" or tokens.matches("BEGIN", *tokens.vocabulary.statements) or not tokens.has_begin_ahead:
             break
         else:
             headers_.append(_skip_nonsense(tokens))
@@ -192,7 +190,7 @@ def _parameters(tokens: TokenStream) -> list[tree.Declaration]:
         start = tokens.current
         if tokens.matches("VAR"):
             text = "a parameter has no VAR in front"
-            tokens.report_once("E117", text, start.span, "leave it out", note=_NOTE_ON_RESULTS)
+            tokens.report_once("E117", text, start.span, "leave it out", note=_NO_RESULTS)
             tokens.take()
         names: list[tree.Name] = []
         kind = tokens.attempt(partial(names_and_type, names=names))
@@ -214,7 +212,7 @@ def _skip_result_type(tokens: TokenStream) -> None:
     start = tokens.take()
     tokens.skip_to(";", "VAR", "BEGIN")
     span = tokens.span_since(start)
-    tokens.report_once("E117", "a procedure returns no value", span, "leave this out", note=_NOTE_ON_RESULTS)
+    tokens.report_once("E117", "a procedure returns no value", span, "leave this out", note=_NO_RESULTS)
 
 
 def _parameter_separator(tokens: TokenStream) -> bool:
@@ -256,7 +254,8 @@ def _restore_main_program(tokens: TokenStream, head: Span, body: tree.Block) -> 
     open_ended = isinstance(last, tree.Block) and last.end.start == last.end.end
     if not open_ended or last is None or body.end.start != body.end.end or not tokens.matches("END"):
         return body
-    tokens.rewind_to_offset(last.span.start)
+    while tokens.current.start > last.span.start:
+        tokens.rewind(tokens.index - 1)
     tokens.diagnostics[:] = [diagnostic for diagnostic in tokens.diagnostics if diagnostic.span.start < last.span.start]
     gap = tokens.gap_span()
     label = Label(head, "this procedure")

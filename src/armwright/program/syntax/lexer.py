@@ -101,7 +101,7 @@ _WITH_UNIT = re.compile(rf"({_DIGITS}){_UNIT}", re.VERBOSE)
 # Where a text that is not closed may have been meant to end.
 _AFTER_STRING = re.compile(r"[ \t]*\)?[ \t]*;?[ \t]*\Z")
 
-# Characters of other keyboards that stand for one of the language; each takes one pose, like the one it stands for.
+# Characters of other keyboards that stand for one of the language; each takes one position, like the one it stands for.
 # Those of `"` and `}` are none: they may stand in a text or a comment without ending it.
 CONFUSABLES = {0xFF01 + i: chr(0x21 + i) for i in range(94) if chr(0x21 + i) not in '"}'} | {
     ord(other): meant

@@ -14,7 +14,7 @@ _CONTINUED = re.compile(r"[ \t]*[,;)]")
 def blank_line_numbers(source: Source) -> tuple[str, list[Diagnostic]]:
     """Return the text with every line number blanked out, and what is odd about the numbers.
 
-    A text is numbered when its first line that is not blank starts with digits and a blank. Blanks take the pose
+    A text is numbered when its first line that is not blank starts with digits and a blank. Blanks take the place
     of the digits, so that every other character stays where it was.
     """
     text = source.text.replace("\ufeff", " ", 1) if source.text.startswith("\ufeff") else source.text

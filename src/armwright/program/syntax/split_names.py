@@ -28,13 +28,9 @@ def join_split_names(
         declared: names of variables that were declared before this text.
 
     Returns:
-        The tokens with one in the pose of each pair, and what was found.
+        The tokens with one in place of each pair, and what was found.
     """
-    pairs = [
-        index
-        for index in range(1, len(tokens))
-        if tokens[index].kind is _NUMBER and _is_name_and_number(source, tokens, index)
-    ]
+    pairs = [i for i in range(1, len(tokens)) if tokens[i].kind is _NUMBER and _is_name_and_number(source, tokens, i)]
     if not pairs:
         return tokens, []
     inside, names = _declarations(tokens, frozenset(pairs))

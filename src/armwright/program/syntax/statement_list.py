@@ -16,19 +16,10 @@ _NAME, _KEYWORD, _ARM, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.AR
 _BEFORE_STATEMENTS = frozenset((";", "BEGIN", "TRY", "RECOVER", "REPEAT"))
 # What stands behind a name that is given a value.
 ASSIGNMENT_SIGNS = ("=", ":=", "==")
-_STATEMENT_FORMS = (
-    "statements begin with a keyword such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
-)
+_BEGINNINGS = "statements begin with a keyword such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
 # What opens the stretch that a word ends, for one that ends none.
-_OPENER_OF = {
-    "UNTIL": "REPEAT",
-    "COEND": "COBEGIN",
-    "PRIORITY": "COBEGIN",
-    "RECOVER": "TRY",
-    "ELSE": "IF",
-    "THEN": "IF",
-    "DO": "WHILE or FOR",
-}
+_OPENER_OF = {"UNTIL": "REPEAT", "COEND": "COBEGIN", "PRIORITY": "COBEGIN", "RECOVER": "TRY"}
+_OPENER_OF |= {"ELSE": "IF", "THEN": "IF", "DO": "WHILE or FOR"}
 
 
 # statements = [ statement ] { ";" [ statement ] } ;
@@ -112,7 +103,7 @@ def _replace_misspelt_end(tokens: TokenStream) -> bool:
 
 
 def replace_misspelt_statement(tokens: TokenStream, near: str) -> None:
-    """Say that a word is misspelt, and put the one that was meant in its pose."""
+    """Say that a word is misspelt, and put the one that was meant in its place."""
     token = tokens.current
     text = f"unknown statement `{token.text}`"
     tokens.report("E105", text, token.span, "not a statement", advice=did_you_mean(near))
@@ -195,7 +186,7 @@ def _report_no_statement(tokens: TokenStream) -> tree.Statement:
         advice = f"write `{token.text} = {token.text} {sign} ...`" if sign in ("+", "-", "*", "/") else ""
         text = f"`{token.text}` needs `=` and a value"
         tokens.fail(text, "a name alone is not a statement", code="E109", advice=advice)
-    advice = did_you_mean(FOREIGN_STATEMENTS.get(token.key)) or UNSUPPORTED_STATEMENTS.get(token.key, _STATEMENT_FORMS)
+    advice = did_you_mean(FOREIGN_STATEMENTS.get(token.key)) or UNSUPPORTED_STATEMENTS.get(token.key, _BEGINNINGS)
     note = "line numbers are allowed only if the first line has one" if token.kind is _NUMBER else ""
     tokens.report("E105", text, token.span, label, note=note, advice=advice)
     raise PanicModeError
@@ -229,7 +220,7 @@ def parse_or_skip(tokens: TokenStream, read: Callable[[TokenStream], _Parsed]) -
 
 
 def expect_closer(tokens: TokenStream, key: str, opening: Token) -> Span | None:
-    """Read the word that ends what ``opening`` opened; None when it is missing, which is said once for one pose."""
+    """Read the word that ends what ``opening`` opened; None when it is missing, which is said once for one position."""
     token = tokens.current
     if tokens.matches(key):
         point = tokens.peek()

@@ -18,8 +18,8 @@ MAX_DEPTH = 100
 # What an expression is for where nothing more is known.
 ANY_VALUE = ("a value", "")
 
-_Parsed = TypeVar("_Parsed")
-_Parts = ParamSpec("_Parts")
+_T = TypeVar("_T")
+_P = ParamSpec("_P")
 _NAME, _KEYWORD, _SYMBOL, _END = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.SYMBOL, TokenKind.END
 
 
@@ -32,42 +32,38 @@ class NestingError(Exception):
 
 
 class TokenStream:
-    """The tokens of a program, the pose the parser has come to, and what it has found.
+    """The tokens of a program, the position that the parser has come to, and what it has found.
 
     Attributes:
         source: the text.
         tokens: its tokens, those that were misspelt replaced by what was meant.
         standard: the language that the program is to be in; all of them are read as RLO-2.
-        words: those of RLO-2.
-        offered: those of its own language, for messages.
+        vocabulary: the words of RLO-2.
+        standard_vocabulary: those of its own language, for messages.
         rules: how to read each statement, by the word that starts it, or the sign behind the name that does.
         diagnostics: what is wrong.
-        at: how many tokens have been read.
-        now: the token to be read next.
-        before: the token read last; the first one where none has been read.
-        depth: how deep the pose lies in statements, parentheses and operations.
+        index: how many tokens have been read.
+        current: the token to be read next.
+        previous: the token read last; the first one where none has been read.
+        depth: how deep the position lies in statements, parentheses and operations.
         statement_depth: how deep the statement lies that was begun last.
         height: how deep the expression is that was read last.
-        waiting: the words that the open statements around the pose wait for, the innermost last.
-        deep: where the outermost statement was last found to be too deep; -1 if it was not.
-        late: headers that stand behind BEGIN.
+        open_closers: the words that the open statements around the position wait for, the innermost last.
+        overflow_index: where the outermost statement was last found to be too deep; -1 if it was not.
+        late_headers: headers that stand behind BEGIN.
         declared: the names declared so far.
         procedures: the names of the procedures read so far.
-        missed: the words whose absence has been reported.
-        in_procedure: the key of the procedure that the pose lies in; empty outside of all.
-        recovering: how many TRYs the pose lies in the second part of.
-        target: the key of the variable that the statement gives a value; empty where it gives none.
-        asked: what the expression is for that is being read, in the words of messages, and where.
+        reported_missing: the words whose absence has been reported.
+        enclosing_procedure: the key of the procedure that the position lies in; empty outside of all.
+        recover_depth: how many TRYs the position lies in the second part of.
+        assignment_target: the key of the variable that the statement gives a value; empty where it gives none.
+        operand_context: what the expression is for that is being read, in the words of messages, and where.
         expected: what may stand at the end of the text, where somebody asks for that.
-        spare: how many ENDs have been reported that close nothing but the program.
+        surplus_ends: how many ENDs have been reported that close nothing but the program.
     """
 
     def __init__(
-        self,
-        source: Source,
-        tokens: Sequence[Token],
-        rules: "Mapping[str, Rule]",
-        standard: Standard = Standard.RLO_2,
+        self, source: Source, tokens: Sequence[Token], rules: "Mapping[str, Rule]", standard: Standard = Standard.RLO_2
     ) -> None:
         """Start at the first token; the last must be the end of the text."""
         self.source = source
@@ -96,7 +92,7 @@ class TokenStream:
         self.surplus_ends = 0
         self._reported_reserved: set[str] = set()
         self._reported_index = -1
-        self._next_begin_index = -1
+        self._last_begin_index = max((index for index, token in enumerate(tokens) if token.key == "BEGIN"), default=-1)
         self._surplus_counts: list[int] | None = None
 
     # ---- looking and taking
@@ -138,18 +134,13 @@ class TokenStream:
         self.current = self.tokens[index]
         self.previous = self.tokens[max(0, index - 1)]
 
-    def rewind_to_offset(self, offset: int) -> None:
-        """Return to the token that begins at a character."""
-        while self.current.start > offset:
-            self.rewind(self.index - 1)
-
     def matches(self, *keys: str) -> bool:
         """Whether the next token is one of these keywords or symbols."""
         token = self.current
         return token.key in keys and (token.kind is _SYMBOL or token.kind is _KEYWORD)
 
     def matches_name(self, *keys: str) -> bool:
-        """Whether the next token is a name that reads so: a word with a meaning in this pose only."""
+        """Whether the next token is a name that reads so: a word with a meaning in this position only."""
         return self.current.kind is _NAME and self.current.key in keys
 
     def accept(self, *keys: str) -> Token | None:
@@ -198,26 +189,23 @@ class TokenStream:
         token = self.current
         self.current = self.tokens[self.index] = Token(kind, token.text, key, token.start, token.end, damaged=True)
 
-    def next_begin(self) -> int:
-        """Return where the next BEGIN stands; -1 if there is none."""
-        if self._next_begin_index < self.index:
-            ahead = range(max(self.index, self._next_begin_index), self._end_index)
-            here = (index for index in ahead if self.tokens[index].key == "BEGIN")
-            self._next_begin_index = next(here, self._end_index)
-        return self._next_begin_index if self._next_begin_index < self._end_index else -1
+    @property
+    def has_begin_ahead(self) -> bool:
+        """Whether a BEGIN stands behind the next token."""
+        return self.index < self._last_begin_index
 
     def has_surplus_end(self) -> bool:
-        """Whether more ENDs follow than the statements around this pose and those further on wait for."""
+        """Whether more ENDs follow than the statements around this position and those further on wait for."""
         if self._surplus_counts is None:
             steps = [(token.key == "END") - (token.key in ("BEGIN", "TRY")) for token in reversed(self.tokens)]
             self._surplus_counts = list(accumulate(steps))[::-1]
         waiting = sum("END" in words or "RECOVER" in words for words in self.open_closers)
         return self._surplus_counts[self.index] > waiting
 
-    # ---- poses
+    # ---- spans
 
     def gap_span(self) -> Span:
-        """Return the pose right behind the token read last, where a missing thing belongs."""
+        """Return the position right behind the token read last, where a missing thing belongs."""
         end = self.previous.end if self.index else self.current.start
         return Span(end, end)
 
@@ -231,18 +219,14 @@ class TokenStream:
         return self.source.line(self.previous.start) == self.source.line(self.current.start)
 
     def node(
-        self,
-        kind: Callable[Concatenate[Span, _Parts], _Parsed],
-        start: Token | Span,
-        *parts: _Parts.args,
-        **named: _Parts.kwargs,
-    ) -> _Parsed:
+        self, kind: Callable[Concatenate[Span, _P], _T], start: Token | Span, *parts: _P.args, **named: _P.kwargs
+    ) -> _T:
         """Return a node of the tree that reaches from ``start`` to the token read last."""
         return kind(self.span_since(start), *parts, **named)
 
     # ---- going on after mistakes
 
-    def attempt(self, rule: "Callable[[TokenStream], _Parsed]") -> _Parsed | None:
+    def attempt(self, rule: "Callable[[TokenStream], _T]") -> _T | None:
         """Read something; None where it makes no sense: what has been read of it is passed over.
 
         Raises:
@@ -297,7 +281,7 @@ class TokenStream:
         return self.current.damaged or self._reported_index == self.index or broken_text
 
     def suppress_reports(self) -> None:
-        """Take this pose for one about which something has been said."""
+        """Take this position for one about which something has been said."""
         self._reported_index = self.index
 
     def report_once(self, code: str, message: str, span: Span, label: str, **details: Unpack[Details]) -> None:
@@ -312,7 +296,7 @@ class TokenStream:
         Raises:
             PanicModeError: always.
         """
-        # At the end of the text there is nothing to mark; the gap before it is the pose.
+        # At the end of the text there is nothing to mark; the gap before it is the position.
         span = self.gap_span() if self.is_at_end else self.current.span
         self.report_once(code, message, span, label, advice=advice)
         raise PanicModeError
