@@ -24,6 +24,7 @@ FUZZ = _fuzz()
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.share(0.03)
 @pytest.mark.parametrize("target", FUZZ.TARGETS)
 def test_changed_files(target: str, sample: Sample, tmp_path: Path) -> None:
     """Keys, numbers, lines and cells changed, lost, doubled, nested: no reader raises anything but its own error."""

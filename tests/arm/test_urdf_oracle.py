@@ -24,7 +24,7 @@ from armwright.dynamics.shares import coriolis_efforts
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.jacobians import jacobian
 from oracles.urdf import KINDS, RELATIONS, Oracle, joint, oracle, random_body, random_origin, random_urdf
-from samples import Sample
+from samples import Sample, examples
 
 EXACTLY = 1e-12
 AGREEMENT = 1e-9  # in parts of the largest number of the quantity
@@ -65,7 +65,7 @@ def test_random_chains(joints: int, rng: np.random.Generator, tmp_path: Path) ->
         check(read(tmp_path, text), oracle(text, "hand"), rng)
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     plan=st.lists(st.tuples(st.sampled_from(KINDS), st.sampled_from(RELATIONS)), min_size=2, max_size=6),
     seed=st.integers(0, 2**32 - 1),

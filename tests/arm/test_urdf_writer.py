@@ -21,6 +21,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from oracles.arms import random_arm, squared
 from oracles.urdf import oracle
+from samples import examples
 
 ROUND_TRIP = 1e-12  # in parts of the largest number of the quantity
 AGREEMENT = 1e-9
@@ -117,7 +118,7 @@ numbers = st.floats(1e-3, 1e3)
 bounds = st.one_of(st.just(math.inf), numbers)
 
 
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(50), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     kind=st.sampled_from(("revolute", "prismatic")),
     lower=bounds,
@@ -204,7 +205,7 @@ def test_nothing_is_lost(rng: np.random.Generator, back: Callable[[Arm], Arm]) -
     assert lost_in_urdf(back(some_arm(rng, 4, built=True))) == ["the source is not in the file"]
 
 
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(50), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(name=st.text(st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"), min_size=1))
 def test_names(name: str, back: Callable[[Arm], Arm]) -> None:
     """Whatever an arm is called, quotes and brackets too, it is called so when it is read back."""

@@ -14,6 +14,7 @@ from armwright.arm.model import Arm, Joint, Limits, Link, Motor
 from armwright.arm.write import toml_text
 from armwright.errors import InvalidValueError
 from oracles.arms import random_arm, squared
+from samples import examples
 
 
 @pytest.fixture
@@ -50,7 +51,7 @@ turned = st.one_of(st.just(math.inf), st.floats(1e-99, 6000.0))
 number = st.floats(-1e99, 1e99)
 
 
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(100), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     joint=st.builds(
         Joint,

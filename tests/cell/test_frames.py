@@ -10,7 +10,7 @@ from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.spatial.poses import homogeneous
 from oracles.arms import random_pose
-from samples import Sample
+from samples import Sample, examples
 
 ROUNDING = 1e-9  # products of a dozen poses some metres long
 
@@ -108,7 +108,7 @@ changes = st.lists(
 )
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(changes)
 def test_any_history(history: list[tuple[str, str, str, int]]) -> None:
     """Whatever is done to a tree: there is no ring, unfix keeps places, affix keeps places, parents carry children."""

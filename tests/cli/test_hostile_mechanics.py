@@ -309,14 +309,14 @@ def test_load_and_wrench_on_the_rows_of_a_file(call: Call, tmp_path: Path) -> No
 
 def test_simulation_with_a_load(call: Call) -> None:
     """An arm let go with a load falls as the arm with that load does, and without one as the arm alone."""
-    options = ("simulate", "puma560", "-q", "0,0,90,0,0,0", "--duration", "0.02", "--json")
+    options = ("simulate", "puma560", "-q", "0,0,90,0,0,0", "--duration", "0.005", "--json")
     start = np.radians([0, 0, 90, 0, 0, 0])
 
     loaded, bare = json.loads(call(*options, "--load", "2,0,0,30")[1]), json.loads(call(*options)[1])
 
     arm = load_arm("puma560")
     for found, model in ((loaded, payload(arm, 2.0, (0, 0, 0.03))), (bare, arm)):
-        motion = simulate(model, start, duration=0.02)
+        motion = simulate(model, start, duration=0.005)
         change = float(motion.potential[-1] - motion.potential[0])
         assert found["potential_change"] == pytest.approx(change, rel=1e-6)
     assert abs(loaded["potential_change"]) > abs(bare["potential_change"])

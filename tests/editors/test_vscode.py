@@ -17,6 +17,7 @@ from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from editors.textmate import Engine
 from program.shelf import ACCEPTED, CORPUS, REJECTED
+from samples import examples
 
 EXTENSION = Path(__file__).parents[2] / "editors" / "vscode"
 GRAMMAR = json.loads((EXTENSION / "syntaxes" / "rlo.tmLanguage.json").read_text(encoding="utf-8"))
@@ -137,7 +138,7 @@ def test_as_pygments(path: Path) -> None:
     assert by_grammar(text) == by_pygments(text)
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(st.lists(st.sampled_from(sorted(_SCRAPS)), max_size=25).map("".join))
 @example("UNITS/")
 def test_as_pygments_of_anything(text: str) -> None:

@@ -12,6 +12,7 @@ from hypothesis import example, given, settings, strategies as st
 from armwright.errors import FileFormatError
 from armwright.files.document import Document
 from armwright.files.key_lines import DuplicateKeyError, Keys, LineTree, json_lines, toml_lines
+from samples import examples
 
 # What TOML is made of, and what a careless reader stumbles over.
 TOML_PIECES = (
@@ -114,7 +115,7 @@ def check_toml(text: str) -> bool:
     return True
 
 
-@settings(max_examples=250)
+@settings(max_examples=examples(250))
 @given(st.lists(st.sampled_from(TOML_PIECES), max_size=12).map("".join))
 @example('a = "\\"" # "\nb = \'\\\'\n')
 @example("\"\".'' = 2\n")
@@ -163,7 +164,7 @@ def test_odd_toml_with_a_slip(text: str, data: st.DataObject) -> None:
     )
 
 
-@settings(max_examples=250)
+@settings(max_examples=examples(250))
 @given(st.lists(st.sampled_from(JSON_PIECES), max_size=10).map("".join), st.booleans())
 def test_what_json_accepts(text: str, braced: bool) -> None:  # noqa: FBT001
     """Every text that the parser accepts is scanned: exactly its keys are found, or one that is given twice."""
@@ -191,7 +192,7 @@ def refusal(path: Path) -> str | None:
     return None
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(
     st.binary(max_size=40) | st.lists(st.sampled_from(TOML_PIECES)).map(lambda p: "".join(p).encode()), st.booleans()
 )

@@ -13,6 +13,7 @@ from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.jacobians import jacobian, tool_twist
 from armwright.kinematics.singularity_analysis import singularities, singularity_factors
 from oracles.arms import random_arm, random_configurations, random_pose
+from samples import examples
 
 ROUNDING = 1e-10
 PUMA, STANFORD, UR5 = load_arm("puma560"), load_arm("stanford"), load_arm("ur5")
@@ -198,7 +199,7 @@ ANGLE = st.floats(-np.pi, np.pi)
 SPEED = st.floats(-10, 10)
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(
     st.sampled_from(sorted(ARMS)),
     st.tuples(*[ANGLE] * 6),

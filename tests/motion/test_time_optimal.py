@@ -26,6 +26,7 @@ from armwright.motion.quintic_polynomials import quintic
 from armwright.motion.time_optimal_path import time_optimal
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.motion.xspline_path import xspline
+from samples import Sample
 
 PUMA = load_arm("puma560-seed")
 SPEED, ACCELERATION, EFFORT = PUMA.limits.speed, PUMA.limits.acceleration, PUMA.limits.effort
@@ -168,9 +169,10 @@ def test_the_path_is_exactly_the_same() -> None:
     assert limits_hold(arm, run)
 
 
-def test_limits_hold_between_the_grid_points(rng: np.random.Generator) -> None:
+@pytest.mark.share(0.5)
+def test_limits_hold_between_the_grid_points(rng: np.random.Generator, sample: Sample) -> None:
     """On random paths of three kinds, grids coarse and fine: no limit is passed, and some limit is met."""
-    for k in range(12):
+    for k in range(sample.count(12)):
         knots = rng.uniform(-0.8, 0.8, (5, 6))
         path: Any = (
             knots,

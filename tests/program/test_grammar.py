@@ -15,7 +15,7 @@ from armwright.program.syntax.parser import parse
 from armwright.program.syntax.token_stream import MAX_DEPTH
 
 # So often a thing is repeated that no sound program would.
-MANY = 10_000
+MANY = 4_000
 # How much longer eight times the program may take: twice eight, for the noise of the machine; squared it were 64.
 LINEAR = 16.0
 

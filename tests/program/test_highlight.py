@@ -17,6 +17,7 @@ from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax.lexer import TokenKind, scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
 from program.shelf import ACCEPTED, CORPUS
+from samples import examples
 
 PROGRAMS = [*sorted(CORPUS.glob("*.rlo")), *ACCEPTED]
 RESERVED = VOCABULARIES[Standard.RLO_2].reserved
@@ -200,7 +201,7 @@ def test_as_the_translator_reads(path: Path) -> None:
     assert odd == []
 
 
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 @given(PIECES)
 def test_cut_like_the_translator(text: str) -> None:
     """Of any text without damage the lexer and the translator see the same tokens."""
