@@ -12,12 +12,12 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.kinematics.inverse_kinematics.geometry import first_three
+from armwright.kinematics.inverse_kinematics.geometry import solve_elbow, solve_joint_1
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import BRANCHES
 from armwright.tracing.emit import LANES, emit
 from armwright.tracing.kernel import CalledOff, Kernel, on_cores_for_long
-from armwright.tracing.scalar import atan2, cos, sin
+from armwright.tracing.scalar import Scalar, atan2, cos, sin
 from oracles.arms import random_arm, random_configurations
 
 
@@ -138,12 +138,17 @@ def test_choices_and_arc_tangents(rng: np.random.Generator) -> None:
     geometry = find_geometry(arm)
     assert geometry is not None
     side, elbow, _ = BRANCHES[2]
-    kernel = Kernel(emitted=emit("shoulder", lambda p: [first_three(geometry, p, side, elbow)], {"p": 3}))
+
+    def first_three(p: list[Scalar]) -> list[Scalar]:
+        theta_1, X = solve_joint_1(geometry, p, side, 0.0)
+        return [theta_1, *solve_elbow(geometry, X, p[2], elbow, 0.0)]
+
+    kernel = Kernel(emitted=emit("shoulder", lambda p: [first_three(p)], {"p": 3}))
     points = rng.uniform(-0.5, 0.5, size=(500, 3))
 
     found = kernel(points)
 
-    expected = np.array([first_three(geometry, p.tolist(), side, elbow) for p in points])
+    expected = np.array([first_three(p.tolist()) for p in points])
     difference = np.angle(np.exp(1j * (found - expected)))
     assert np.abs(difference).max() < 1e-7  # next to the edge of the reach a root loses half of the digits
     assert np.median(np.abs(difference)) < 1e-15
