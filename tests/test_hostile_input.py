@@ -228,7 +228,7 @@ def test_one_pose_only() -> None:
     """Where one pose is asked for many are refused, and none as well; the message says what takes many."""
     for poses in ([X, X], np.zeros((0, 4, 4))):
         with pytest.raises(
-            ShapeError, match=r"pose: expected one pose, shape \(4, 4\), got .* inverse_branches accepts arrays"
+            ShapeError, match=r"pose: expected one pose, shape \(4, 4\), got .* inverse_branches takes arrays"
         ):
             armwright.kinematics.inverse(PUMA, poses)
     q, singular = armwright.kinematics.inverse_branches(PUMA, np.zeros((0, 4, 4)))

@@ -193,9 +193,8 @@ def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
     inertia = table.number("inertia_kgm2" if revolute else "inertia_kg", default=0.0, lower=0.0)
     if "rotor_inertia_kgm2" in table:
         if inertia:
-            raise table.error(
-                "rotor_inertia_kgm2", "specify the inertia at the load side or that of the rotor, not both"
-            )
+            message = "specify the inertia at the load side or that of the rotor, not both"
+            raise table.error("rotor_inertia_kgm2", message)
         inertia = table.number("rotor_inertia_kgm2", lower=0.0) * ratio**2
     force = "Nm" if revolute else "N"
     motor = Motor(

@@ -345,10 +345,8 @@ class Arm:
             raise ShapeError(f"arm '{self.name}': expected at least one joint")
         _check_numbers(self, f"arm '{self.name}'", ("reach", "tool_speed"), "above 0")
         if self.gravity_from not in get_args(GravityFrom):
-            known = ", ".join(get_args(GravityFrom))
-            raise InvalidValueError(
-                f"arm '{self.name}': expected gravity_from to be one of {known}, got {shown(self.gravity_from)}"
-            )
+            known, got = ", ".join(get_args(GravityFrom)), shown(self.gravity_from)
+            raise InvalidValueError(f"arm '{self.name}': expected gravity_from to be one of {known}, got {got}")
         if self.gravity_from == "standard" and not np.array_equal(self.gravity, UPRIGHT_GRAVITY):
             object.__setattr__(self, "gravity_from", "stated")
 

@@ -121,9 +121,8 @@ def _rotation(table: Table) -> tuple[Array, float]:
     typed = np.array(rows)
     error = float(orthonormality_error(typed))
     if error > _TYPED_ROTATION:
-        raise table.error(
-            "rotation", f"expected the rows of a rotation matrix, got an orthonormality error of {error:.2g}"
-        )
+        message = f"expected the rows of a rotation matrix, got an orthonormality error of {error:.2g}"
+        raise table.error("rotation", message)
     if error < _COMPUTED_ROTATION:
         return typed, 0.0
     R = nearest_rotation(typed)

@@ -51,7 +51,6 @@ class Uncertainty:
         scaled = C / np.maximum(np.outer(size, size), np.finfo(float).tiny)
         symmetric = np.allclose(scaled, scaled.T, rtol=0, atol=_ROUNDING)
         if not symmetric or np.linalg.eigvalsh(scaled).min(initial=0.0) < -_SMALLEST:
-            raise InvalidValueError(
-                "uncertainty: expected a covariance matrix, symmetric and with variances of 0 or more"
-            )
+            message = "expected a covariance matrix, symmetric and with variances of 0 or more"
+            raise InvalidValueError(f"uncertainty: {message}")
         object.__setattr__(self, "noise", not_negative(self.noise, "uncertainty: noise", "m"))

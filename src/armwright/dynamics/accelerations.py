@@ -145,10 +145,8 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
 
 def less_friction(arm: Arm, qd: Sequence[Scalar], tau: Sequence[Scalar]) -> list[Scalar]:
     """Return the efforts less the friction of the moving drives, over abstract scalars."""
-    return [
-        effort - motor.viscous * speed - dry_friction(motor, speed)
-        for motor, speed, effort in zip(arm.motors, qd, tau, strict=True)
-    ]
+    joints = zip(arm.motors, qd, tau, strict=True)
+    return [effort - motor.viscous * speed - dry_friction(motor, speed) for motor, speed, effort in joints]
 
 
 def _without_drives(arm: Arm) -> Arm:

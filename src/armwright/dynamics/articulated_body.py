@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from armwright.arm.model import Arm, Joint, Link
-from armwright.dynamics.arguments import NO_WRENCH
+from armwright.dynamics.arguments import NO_WRENCH, Scalars
 from armwright.dynamics.bodies import body_of
 from armwright.dynamics.newton_euler import base_frame_acceleration, tool_reaction
 from armwright.kinematics.forward_kinematics import link_transform
@@ -66,7 +66,7 @@ class JointResponse(NamedTuple):
 
 
 def articulated_body(
-    arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar], tau: Sequence[Scalar], wrench: Sequence[Scalar] = NO_WRENCH
+    arm: Arm, q: Scalars, qd: Scalars, tau: Scalars, wrench: Scalars = NO_WRENCH
 ) -> tuple[list[Scalar], list[Pivot]]:
     """Return the accelerations that efforts cause, over abstract scalars, in time proportional to n.
 
@@ -108,9 +108,7 @@ def _zeros() -> Matrix:
     return [[0.0, 0.0, 0.0] for _ in range(3)]
 
 
-def _angular_velocities(
-    arm: Arm, transforms: Sequence[_Transform], qd: Sequence[Scalar]
-) -> list[tuple[Vector, Vector, Vector]]:
+def _angular_velocities(arm: Arm, transforms: Sequence[_Transform], qd: Scalars) -> list[tuple[Vector, Vector, Vector]]:
     """Return for each joint the angular velocity of frame i-1 and frame i in frame i-1, and of frame i in frame i."""
     w: Vector = [0.0, 0.0, 0.0]
     velocities = []

@@ -80,14 +80,8 @@ def bejczy_inertias(c: Coefficients, q: Sequence[Scalar]) -> list[Scalar]:
     """
     s2, s5, c5, q3 = sin(q[1]), sin(q[4]), cos(q[4]), q[2]
     boom = (c.b3 + c.b5 * c5) * q3 + c.b4 * q3 * q3
-    return [
-        c.b1 + s2 * s2 * (c.b2 + boom),
-        c.b13 + boom,
-        c.slide,
-        c.b14 + c.b15 * s5 * s5,
-        c.b17 + c.b18,
-        c.b19 + c.b20,
-    ]
+    D11, D22, D44 = c.b1 + s2 * s2 * (c.b2 + boom), c.b13 + boom, c.b14 + c.b15 * s5 * s5
+    return [D11, D22, c.slide, D44, c.b17 + c.b18, c.b19 + c.b20]
 
 
 def bejczy_gravity(c: Coefficients, q: Sequence[Scalar], gravity: float) -> list[Scalar]:
@@ -166,9 +160,7 @@ def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
         )
     q = positions(arm, q)
     if q.ndim != 2 or len(q) < len(attrs.fields(Coefficients)):
-        raise ShapeError(
-            f"q: expected (m, 6) configurations, as many as there are constants to fit or more, got {q.shape}"
-        )
+        raise ShapeError(f"q: expected (m, 6) configurations, at least as many as constants to fit, got {q.shape}")
     D = np.diagonal(mass_matrix(arm, q), axis1=-2, axis2=-1).T
     G = gravity_efforts(arm, q).T / arm.gravity[2]
     carried = sum(link.mass for link in arm.links[2:])

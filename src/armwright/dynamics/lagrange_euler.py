@@ -148,12 +148,9 @@ def gravity_coefficients(arm: Arm, derivatives: Derivatives) -> list[Scalar]:
         TR-83-008 eq. (16); subroutine CALCI.
     """
     n = arm.n
-    g = arm.gravity.tolist()
-    centres = [[*link.com.tolist(), 1.0] for link in arm.links]
-    return [
-        _sum(-arm.links[m].mass * dot(g, apply(derivatives.first[m][i][:3], centres[m])) for m in range(i, n))
-        for i in range(n)
-    ]
+    g, U, links = arm.gravity.tolist(), derivatives.first, arm.links
+    s = [[*link.com.tolist(), 1.0] for link in links]
+    return [_sum(-links[m].mass * dot(g, apply(U[m][i][:3], s[m])) for m in range(i, n)) for i in range(n)]
 
 
 def lagrange_euler(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar], qdd: Sequence[Scalar]) -> list[Scalar]:

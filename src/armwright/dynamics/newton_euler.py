@@ -23,10 +23,8 @@ def newton_euler(
     Arguments and sources are those of ``joint_wrenches``. The efforts are the components along or about each joint.
     """
     wrenches = joint_wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
-    return [
-        dot(link.moment if joint.revolute else link.force, link.axis)
-        for joint, link in zip(arm.joints, wrenches, strict=True)
-    ]
+    joints = zip(arm.joints, wrenches, strict=True)
+    return [dot(link.moment if joint.revolute else link.force, link.axis) for joint, link in joints]
 
 
 class JointWrench(NamedTuple):

@@ -70,9 +70,7 @@ def damped_rates(
     known_axes(frame)
     damping, length = number(damping, "damping"), number(length, "length")
     if not 0 < damping < np.inf:
-        raise InvalidValueError(
-            f"damping: expected a singular value above 0, below which damping begins, got {damping}"
-        )
+        raise InvalidValueError(f"damping: expected a singular value above 0, where damping begins, got {damping}")
     q, twist = broadcast_rows("q, twist", positions(arm, q), of_shape(twist, (6,), "twist", LARGEST))
     J = jacobian(arm, q, frame)
     weight = np.repeat((1.0, length), 3)

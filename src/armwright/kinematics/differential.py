@@ -161,9 +161,7 @@ def puma_geometry(arm: Arm, quantity: str, alternative: str) -> ClosedFormGeomet
     return geometry
 
 
-def wrist_motion(
-    arm: Arm, geometry: ClosedFormGeometry, q: Sequence[Scalar], twist: Sequence[Scalar], frame: Axes
-) -> Motion:
+def wrist_motion(arm: Arm, geometry: ClosedFormGeometry, q: Vector, twist: Vector, frame: Axes) -> Motion:
     """Return how the wrist moves for a twist of the tool, over abstract scalars."""
     R_BT, p_BT = tool_frame(arm, link_frames(arm, q)[-1])
     v, w = list(twist[:3]), list(twist[3:])

@@ -157,9 +157,8 @@ def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: fl
     )
     # What the factors call near decides; the singular values say in how many directions.
     rank = len(sigma) - (max(small, 1) if any(factor.near for factor in factors) else 0)
-    return Singularities(
-        factors=factors, singular_values=sigma, lost=U[:, rank:].T / np.repeat((1.0, length), 3), idle=Vt[rank:]
-    )
+    lost = U[:, rank:].T / np.repeat((1.0, length), 3)
+    return Singularities(factors=factors, singular_values=sigma, lost=lost, idle=Vt[rank:])
 
 
 def _factors(arm: Arm, q: Array, threshold: float) -> tuple[Factor, ...]:

@@ -12,6 +12,8 @@ from armwright.notebook import html_lines
 from armwright.spatial.poses import position_text
 
 LimitName: TypeAlias = Literal["speed", "acceleration", "effort"]
+# A limit and the joint, from 0, that is at it.
+BindingLimit: TypeAlias = tuple[LimitName, int]
 LIMITS: tuple[LimitName, ...] = ("speed", "acceleration", "effort")
 
 
@@ -52,24 +54,17 @@ class Certificate:
     samples: int
     peaks: dict[LimitName, Array]
     factor: float = 1.0
-    because: tuple[LimitName, int] | None = None
+    because: BindingLimit | None = None
     backward: float | None = None
 
-    def run_slower(
-        self, factor: float, peaks: dict[LimitName, Array], because: tuple[LimitName, int] | None
-    ) -> "Certificate":
+    def run_slower(self, factor: float, peaks: dict[LimitName, Array], because: BindingLimit | None) -> "Certificate":
         """Return that of the same motion run ``factor`` times slower for a limit, with the peaks that it has then."""
-        return attrs.evolve(
-            self, worst_time=self.worst_time * factor, peaks=peaks, factor=self.factor * factor, because=because
-        )
+        time, total = self.worst_time * factor, self.factor * factor
+        return attrs.evolve(self, worst_time=time, peaks=peaks, factor=total, because=because)
 
     def retimed(self, stretch: float) -> "Certificate":
         """Return that of the same motion, all of it run so many times slower; efforts are those of the faster one."""
-        peaks: dict[LimitName, Array] = {
-            "speed": self.peaks["speed"] / stretch,
-            "acceleration": self.peaks["acceleration"] / stretch**2,
-            "effort": self.peaks["effort"],
-        }
+        peaks = stretched_peaks(**self.peaks, stretch=stretch)
         return attrs.evolve(self, peaks=peaks, worst_time=self.worst_time * stretch)
 
     @property
@@ -147,13 +142,18 @@ class Certificate:
         return html_lines(str(self))
 
 
-def slower(arm: Arm, factor: float, because: tuple[LimitName, int], than: str = "") -> str:
+def stretched_peaks(speed: Array, acceleration: Array, effort: Array, stretch: float) -> dict[LimitName, Array]:
+    """Return the peaks (n,) of a motion run so many times slower, whose efforts are given as they are then."""
+    return {"speed": speed / stretch, "acceleration": acceleration / stretch**2, "effort": effort}
+
+
+def slower(arm: Arm, factor: float, because: BindingLimit, than: str = "") -> str:
     """Say how many times slower a motion is, and for which limit of which joint, from 0."""
     limit, joint = because
     return f"{factor:.2f} times slower{than}, limited by the {limit} of {arm.called(joint)}"
 
 
-def slowing(arm: Arm, trajectory: Trajectory) -> tuple[float, tuple[LimitName, int] | None]:
+def slowing(arm: Arm, trajectory: Trajectory) -> tuple[float, BindingLimit | None]:
     """Return by which factor a motion must be slowed to keep speeds and accelerations, at least 1, and for what."""
     needs: dict[LimitName, Array] = {
         "speed": trajectory.peaks(1) / arm.limits.speed,

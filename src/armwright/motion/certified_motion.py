@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import IncapableArmError
-from armwright.motion.certificate import LIMITS, Certificate, LimitName, slowing
+from armwright.motion.certificate import LIMITS, BindingLimit, Certificate, LimitName, slowing, stretched_peaks
 from armwright.motion.deviation import TrackingError
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
 from armwright.motion.solver import AnyArm, Solver, solver_of
@@ -35,7 +35,7 @@ class CertifiedMotion:
     trajectory: Trajectory
     certificate: Certificate
 
-    def slowed(self, arm: AnyArm, factor: float, because: tuple[LimitName, int]) -> "CertifiedMotion":
+    def slowed(self, arm: AnyArm, factor: float, because: BindingLimit) -> "CertifiedMotion":
         """Return the same motion run ``factor`` times slower, for a limit of a joint, from 0."""
         trajectory = self.trajectory.slowed(factor)
         certificate = self.certificate.run_slower(factor, limit_peaks(arm, trajectory), because)
@@ -140,11 +140,7 @@ def fastest(
     time = run.when(error.worst_time)
     trajectory, efforts, slower = _inside_efforts(arm, run.trajectory, weak=weak)
     stretch, factor = trajectory.duration / run.trajectory.duration, trajectory.duration / nominal
-    peaks: dict[LimitName, Array] = {
-        "speed": run.speed / stretch,
-        "acceleration": run.acceleration / stretch**2,
-        "effort": efforts,
-    }
+    peaks = stretched_peaks(run.speed, run.acceleration, efforts, stretch)
     certificate = attrs.evolve(
         certificate_of(arm, trajectory, error, allowed, time=time * trajectory.duration, peaks=peaks),
         factor=max(1.0, factor),

@@ -144,9 +144,8 @@ def _between(solver: Solver, first: Step, goal: Step, allowed: Tolerance, halvin
     if halvings == 0 or not _astray(solver.forward((first.q + last.q) / 2), halfway, allowed):
         yield last
         return last
-    middle = yield from _between(
-        solver, first, Step((first.place + goal.place) / 2, halfway, first.q), allowed, halvings - 1
-    )
+    step = Step((first.place + goal.place) / 2, halfway, first.q)
+    middle = yield from _between(solver, first, step, allowed, halvings - 1)
     return (yield from _between(solver, middle, goal, allowed, halvings - 1))
 
 
@@ -194,6 +193,5 @@ def _first_missed(solver: Solver, q: Array, X: Array) -> int | None:
 def missed(solver: Solver, q: Array, X: Array) -> Flags:
     """Return which configurations (..., n) miss their poses (..., 4, 4), as those of arms of few joints may."""
     difference = np.abs(solver.forward(q) - X)
-    return np.asarray(
-        (difference[..., :3, 3].max(axis=-1) > MET) | (difference[..., :3, :3].max(axis=(-2, -1)) > _TURN_MET)
-    )
+    p, R = difference[..., :3, 3], difference[..., :3, :3]
+    return np.asarray((p.max(axis=-1) > MET) | (R.max(axis=(-2, -1)) > _TURN_MET))

@@ -200,9 +200,8 @@ def _by_via(
             motion = join([there.trajectory, back.trajectory])
             distance, rotation = _apart(line, via)
             price = Price(distance=distance, rotation=rotation, time=motion.duration - line.duration)
-            ways.append(
-                Detour(trajectory=motion, method="via", obstacle=obstacle, via=via, price=price, legs=(there, back))
-            )
+            legs = (there, back)
+            ways.append(Detour(trajectory=motion, method="via", obstacle=obstacle, via=via, price=price, legs=legs))
         best = min(ways, key=lambda way: way.price.time, default=None)
         # Near the obstacle a detour may still be slow; farther off it is searched for only then.
         if best is not None and best.price.time < _LONG * line.duration:
@@ -302,11 +301,8 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
     except IncapableArmError:  # where gravity alone takes more than a joint may give there is no detour either
         return None
     trajectory = trajectory.slowed(factor)
-    price = Price(
-        distance=float(error.position.max()),
-        rotation=float(error.orientation.max()),
-        time=trajectory.duration - line.duration,
-    )
+    distance, rotation = float(error.position.max()), float(error.orientation.max())
+    price = Price(distance=distance, rotation=rotation, time=trajectory.duration - line.duration)
     return Detour(trajectory=trajectory, method="damped", obstacle=obstacle, price=price)
 
 

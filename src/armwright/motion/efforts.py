@@ -280,6 +280,5 @@ def _largest_part(arm: Arm, shares: _Shares, limits: Array) -> tuple[float, tupl
         worst = int(below.argmin())
         u, binding = min(float(below[worst]), u * (1 - _ROUNDING)), (int(k[worst]), int(j[worst]))
         if u < _CRAWL:
-            raise IncapableArmError(
-                f"{arm.called(binding[1])} would have to move {1 / u:.3g} times slower to keep its effort limit"
-            )
+            message = f"would have to move {1 / u:.3g} times slower to keep its effort limit"
+            raise IncapableArmError(f"{arm.called(binding[1])} {message}")

@@ -122,9 +122,8 @@ def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array
         ArmwrightError: its solver gives up, as it does for some problems that have a solution.
         MissingExtraError: toppra is not installed.
     """
-    algorithm, constraint = (
-        import_extra(f"toppra.{name}", "method='toppra'", "optimal") for name in ("algorithm", "constraint")
-    )
+    algorithm = import_extra("toppra.algorithm", "method='toppra'", "optimal")
+    constraint = import_extra("toppra.constraint", "method='toppra'", "optimal")
     logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what goes wrong is reported by errors
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     rows = bounds.a.shape[1]

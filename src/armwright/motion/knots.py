@@ -100,6 +100,11 @@ def rate_or_rest(rate: ArrayLike | None, joints: int, what: str) -> Array:
     return np.zeros(joints) if rate is None else one_per_joint(rate, joints, what)
 
 
+def segments_at(starts: Array, t: ArrayLike, count: int) -> npt.NDArray[np.intp]:
+    """Return which (...) of ``count`` segments, by their ``starts`` (k,), times (...) are in; at a start the next."""
+    return np.asarray(np.clip(np.searchsorted(starts, t, side="right") - 1, 0, count - 1), dtype=np.intp)
+
+
 def divided(times: Array, parts: npt.NDArray[np.intp]) -> Array:
     """Return times (k,) with every interval divided into so many parts (k - 1,)."""
     h = np.repeat(np.diff(times) / parts, parts)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.motion.certificate import LimitName, slowing
+from armwright.motion.certificate import BindingLimit, LimitName, slowing
 from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.trajectory import Trajectory
@@ -38,7 +38,7 @@ def limit_use(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
     }
 
 
-def slowing_for_limits(arm: AnyArm, trajectory: Trajectory) -> tuple[float, tuple[LimitName, int] | None]:
+def slowing_for_limits(arm: AnyArm, trajectory: Trajectory) -> tuple[float, BindingLimit | None]:
     """Return how many times slower a motion must run to keep its limits of speed, acceleration and effort.
 
     Args:

@@ -39,25 +39,23 @@ class MoveAssessment:
         if move.certificate:
             notes.append(f"certificate {move.certificate}")
         for start, end, detour in zip(self.names, self.names[1:], move.detours, strict=False):
-            method = (
-                "a line"
-                if detour.method == "line"
-                else f"line infeasible, {detour.obstacle}; detour by {detour.method}"
-            )
-            notes.append(f"{start} to {end}: {method}: {detour.price}")
+            bypass = f"line infeasible, {detour.obstacle}; detour by {detour.method}"
+            notes.append(f"{start} to {end}: {'a line' if detour.method == 'line' else bypass}: {detour.price}")
         return tuple(notes)
+
+    def _passages(self) -> Iterator[tuple[str, float, list[float], float]]:
+        """Yield of every pose its name, the time, the joint positions and the distance at which it is passed."""
+        columns = (self.move.times, self.move.configurations, self.move.passing_distances)
+        return zip(self.names, *(column.tolist() for column in columns), strict=True)
 
     def as_data(self) -> dict[str, Any]:
         """Return the assessment as plain data in SI units."""
         move = self.move
-        passages = zip(
-            self.names, move.times.tolist(), move.configurations.tolist(), move.passing_distances.tolist(), strict=True
-        )
         return {
             "arm": move.arm.name,
             "duration": move.trajectory.duration,
             "branch": move.label,
-            "poses": [{"name": name, "time": t, "q": q, "deviation": deviation} for name, t, q, deviation in passages],
+            "poses": [dict(zip(("name", "time", "q", "deviation"), each, strict=True)) for each in self._passages()],
             "certificate": None if move.certificate is None else move.certificate.as_data(),
             "of_limits": {name: use.tolist() for name, use in self.uses.items()},
             "segments": [
@@ -78,9 +76,7 @@ class MoveAssessment:
         units = [joint.units for joint in move.arm.joints]
         heads = ["pose", "s", *(f"j{i} {unit.display}" for i, unit in enumerate(units, 1))]
         rows = []
-        for name, t, q, distance in zip(
-            self.names, move.times, move.configurations, move.passing_distances, strict=True
-        ):
+        for name, t, q, distance in self._passages():
             values = [f"{x / unit.scale:z.1f}" for x, unit in zip(q, units, strict=True)]
             rows.append([name, f"{t:.3f}", *values, *([f"{distance * 1e3:.1f}"] if move.tool_path else [])])
         if move.tool_path:

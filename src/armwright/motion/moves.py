@@ -15,7 +15,7 @@ from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, 
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
 from armwright.motion.branch_selection import configurations_at, configurations_through
-from armwright.motion.certificate import Certificate, LimitName
+from armwright.motion.certificate import BindingLimit, Certificate
 from armwright.motion.certified_motion import certificate_of, limit_peaks
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
 from armwright.motion.limit_utilization import slowing_for_limits
@@ -66,7 +66,7 @@ class Move:
     certificate: Certificate | None = None
     detours: tuple[Detour, ...] = ()
 
-    def slowed(self, factor: float, because: tuple[LimitName, int] | None = None) -> "Move":
+    def slowed(self, factor: float, because: BindingLimit | None = None) -> "Move":
         """Return the same move run ``factor`` times slower, for a limit of a joint, from 0, if for any."""
         slow = self.trajectory.slowed(factor)
         certificate = self.certificate
@@ -196,7 +196,7 @@ def along(
 ) -> Move:
     """Return the move along a path of the tool, with its certificate; arguments and errors as of ``cartesian_move``."""
     solver, allowed = solver_of(arm), tolerance(deviation)
-    label, tracked = _followed(solver, hand, _near(solver.arm, near), allowed, from_rest=ends == "rest")
+    label, tracked = _followed(solver, hand, _near(solver.arm, near), allowed, rest=ends == "rest")
     certificate = certificate_of(arm, tracked.trajectory, tracked.error, allowed)
     return Move(
         arm=solver.arm,
@@ -311,9 +311,7 @@ def _inside_limits(arm: AnyArm, move: Move) -> Move:
     return move if factor == 1 else move.slowed(factor, because)
 
 
-def _followed(
-    solver: Solver, hand: ToolPath, near: Array, allowed: Tolerance, *, from_rest: bool
-) -> tuple[str, Tracking]:
+def _followed(solver: Solver, hand: ToolPath, near: Array, allowed: Tolerance, *, rest: bool) -> tuple[str, Tracking]:
     """Return a branch, and the joints that follow a path of the tool on it.
 
     The branch is chosen once and kept: of the configurations inside the limits at the start the nearest that leads to
@@ -329,7 +327,7 @@ def _followed(
     knots = hand.first_knots(_STEP, _MIN_KNOTS)
     errors: dict[str, PathError] = {}
     for branch in sorted(solution.allowed, key=lambda branch: joint_distance(arm, near, branch.q)):
-        task = Task(solver, hand, branch.q, allowed, allowed, rest=from_rest, whole_turns=True, max_knots=_MAX_KNOTS)
+        task = Task(solver, hand, branch.q, allowed, allowed, rest=rest, whole_turns=True, max_knots=_MAX_KNOTS)
         try:
             return branch.label, track(task, knots)
         except PathError as error:

@@ -219,12 +219,9 @@ def _check_state(task: _Task, jerk: Array, least: Array) -> None:
     """Refuse a state beyond a limit, or one that passes its limit of speed with jerks below the ``least`` (n,)."""
     arm, speed, acceleration = task.arm, task.arm.limits.speed, task.arm.limits.acceleration
     allowed = "; brake=True accepts it and first brakes to within the limits"
-    for does, per, rates, limits in (
-        ("accelerates by", "s²", task.qdd, acceleration),
-        ("moves at", "s", task.qd, speed),
-    ):
-        for j in np.flatnonzero(np.abs(rates) > limits * (1 + _AT_LIMIT)).tolist():
-            beyond = _beyond_limit(arm, j, per, rates[j], limits[j])
+    for does, per, rates, most in (("accelerates by", "s²", task.qdd, acceleration), ("moves at", "s", task.qd, speed)):
+        for j in np.flatnonzero(np.abs(rates) > most * (1 + _AT_LIMIT)).tolist():
+            beyond = _beyond_limit(arm, j, per, rates[j], most[j])
             raise OnlineError(f"{arm.called(j)} of '{arm.name}' {does} {beyond}{allowed}")
     for j in np.flatnonzero(least > jerk * (1 + _AT_LIMIT)).tolist():
         top, unit = task.qd[j] + task.qdd[j] * abs(task.qdd[j]) / (2 * jerk[j]), arm.joints[j].units.position
@@ -304,9 +301,8 @@ def _after(h: Array, q: Array, qd: Array, qdd: Array, jerk: Array) -> tuple[Arra
 def _check_range(task: _Task, motion: Trajectory) -> None:
     """Refuse a motion that passes the end of a joint's range; one that begins beyond it may come back."""
     # The goal, with which the last segment ends, has been checked.
-    positions = np.concatenate(
-        [motion.coefficients[:, 0], *turning_positions(motion.coefficients, np.diff(motion.times))]
-    )
+    c = motion.coefficients
+    positions = np.concatenate([c[:, 0], *turning_positions(c, np.diff(motion.times))])
     lowest, highest = positions.min(axis=0), positions.max(axis=0)
     if (lowest >= task.arm.limits.lower).all() and (highest <= task.arm.limits.upper).all():
         return

@@ -28,9 +28,7 @@ _CLOSEST = 0.1
 def _poses(value: ArrayLike) -> Array:
     X = of_shape(value, (4, 4), "poses")
     if X.ndim != 3 or len(X) < 2:
-        raise InvalidValueError(
-            f"path: expected an array of shape (n, 4, 4) with at least two poses, got shape {X.shape}"
-        )
+        raise InvalidValueError(f"path: expected shape (n, 4, 4) with at least two poses, got shape {X.shape}")
     return X
 
 

@@ -84,10 +84,10 @@ class Obstacle:
 
     cause: Cause
     reason: str
-    joint: int | None
+    joint: int | None = None
     pose: int
     fraction: float
-    length: float | None
+    length: float | None = None
     place: Array = attrs.field(converter=read_only)
     certain: bool
 
@@ -259,9 +259,7 @@ def _obstacle_on_path(arm: AnyArm, path: Path, error: PathError) -> Obstacle:
 
 def _at_pose(cause: Cause, reason: str, pose: int, X: Array) -> Obstacle:
     """Return the obstacle that a pose itself is."""
-    return Obstacle(
-        cause=cause, reason=reason, joint=None, pose=pose, fraction=1.0, length=None, place=X[:3, 3], certain=True
-    )
+    return Obstacle(cause=cause, reason=reason, pose=pose, fraction=1.0, place=X[:3, 3], certain=True)
 
 
 def _bypass(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> PlannedStage | None:

@@ -47,7 +47,6 @@ def read_poses(path: Path | str) -> PosesFile:
     Raises:
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
     """
-    path = Path(path)
     document = Document.read(path)
     top = document.root
     title = top.text("title", default="")
@@ -80,9 +79,8 @@ def read_poses(path: Path | str) -> PosesFile:
         lines.append(line)
     if any(blend is not None for blend in blends) and None in blends:
         i = blends.index(None)
-        raise tables[i].error(
-            "blend_s", "missing; other poses have one: specify it for all poses, or once at the top level"
-        )
+        message = "missing; other poses have one: specify it for all poses, or once at the top level"
+        raise tables[i].error("blend_s", message)
     return PosesFile(
         text=document.text,
         title=title,
@@ -112,8 +110,7 @@ def _time(table: Table, before: list[float | None], *, timed: bool) -> float | N
 
 def _blend(table: Table, shared: float | None, *, timed: bool) -> float | None:
     if not timed and (shared is not None or "blend_s" in table):
-        raise table.error(
-            "blend_s" if "blend_s" in table else None, "blends are allowed only for poses with times; specify time_s"
-        )
+        key = "blend_s" if "blend_s" in table else None
+        raise table.error(key, "blends are allowed only for poses with times; specify time_s")
     table.allow("blend_s")
     return table.positive("blend_s") if "blend_s" in table else shared

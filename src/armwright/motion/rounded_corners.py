@@ -204,9 +204,8 @@ def _never_slower(task: _Task) -> RoundedMotion:
     except PathError as error:
         if (stopping := with_stops()) is None:
             raise
-        return RoundedMotion(
-            motion=stopping, stops=_WITH_STOPS.format("the arm cannot follow rounded corners"), stopped_by=error
-        )
+        stops = _WITH_STOPS.format("the arm cannot follow rounded corners")
+        return RoundedMotion(motion=stopping, stops=stops, stopped_by=error)
     if ratio > MAX_SLOWDOWN and with_stops() is None:
         return _without_stop(task)
     # Where weight alone is too much for a motor the legs with stops fare no better.

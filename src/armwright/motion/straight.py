@@ -108,9 +108,7 @@ def certified_line(
     return fastest(arm, tracked, allowed, nominal=nominal, period=period, weak=weak)
 
 
-def coarse_line(
-    arm: AnyArm, q_start: ArrayLike, X_goal: ArrayLike, *, deviation: float, speed: float
-) -> CertifiedMotion:
+def coarse_line(arm: AnyArm, q_start: Array, X_goal: Array, *, deviation: float, speed: float) -> CertifiedMotion:
     """Return the line of a program: kept closer than asked where that is no obstruction, run even by a weak arm.
 
     More than a millimetre is not used but where a line can be run for it; more than 5 mm would only rotate the tool.

@@ -18,6 +18,7 @@ from armwright.motion.deviation import (
     rotated,
     spin_bound,
 )
+from armwright.motion.knots import segments_at
 from armwright.motion.path import NEGLIGIBLE, Path, place_knots
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.trajectory import Trajectory
@@ -82,7 +83,7 @@ class StraightPath:
 
     def _way(self, t: Array) -> SegmentNumbers:
         """Return the numbers of the segments (...) at times (...)."""
-        return np.asarray(np.clip(np.searchsorted(self.corners, t, side="right") - 1, 0, len(self.numbers) - 1))
+        return segments_at(self.corners, t, len(self.numbers))
 
     def _along(self, t: Array) -> tuple[SegmentNumbers, Array]:
         """Return the numbers of the segments (...) at times (...), and the fractions of them."""
@@ -150,8 +151,7 @@ class StraightPath:
         """
         middles, h = (times[1:] + times[:-1]) / 2, np.diff(times)
         way = self._way(middles)
-        piece = np.clip(np.searchsorted(self.progress.times, middles, side="right") - 1, 0, None)
-        piece = np.minimum(piece, len(self.progress.coefficients) - 1)
+        piece = segments_at(self.progress.times, middles, len(self.progress.coefficients))
         local = middles - self.progress.times[piece]
         first, second, third = (
             np.abs(evaluate(derivative(self.progress.coefficients, order)[piece], local[:, None])[:, 0])

@@ -12,7 +12,7 @@ from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike, integer
 from armwright.errors import IncapableArmError, InvalidValueError, ShapeError, one_of
 from armwright.kinematics.inverse_kinematics.solution import violations
-from armwright.motion.certificate import LIMITS, LimitName
+from armwright.motion.certificate import LIMITS, LimitName, stretched_peaks
 from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
 from armwright.motion.joint_path import Grid, gridded, pieces_of, through_knots
 from armwright.motion.phase_plane import SolverName, fastest
@@ -74,12 +74,10 @@ class TimeOptimal:
         """Say it in a few lines."""
         before = "" if self.duration_before is None else f" instead of {self.duration_before:.3f} s"
         stops = f", with {self.stops} stops on the path" if self.stops else ""
-        lines = [f"{self.trajectory.duration:.3f} s{before}{stops}"]
-        lines += [
-            f"{binding.share:.0%} of the time: {binding.limit} of {self.arm.called(binding.joint)}"
-            for binding in self.bindings
-        ]
-        return "\n".join(lines)
+        text = f"{self.trajectory.duration:.3f} s{before}{stops}"
+        for binding in self.bindings:
+            text += f"\n{binding.share:.0%} of the time: {binding.limit} of {self.arm.called(binding.joint)}"
+        return text
 
 
 def time_optimal(
@@ -149,7 +147,7 @@ def time_optimal(
         trajectory=run,
         duration_before=before,
         stops=max(0, len(pieces) - 1),
-        peaks={"speed": speeds / factor, "acceleration": accelerations / factor**2, "effort": efforts_found},
+        peaks=stretched_peaks(speeds, accelerations, efforts_found, factor),
         bindings=_bindings(solver, run, efforts=efforts) if runs else (),
         factor=factor,
     )

@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.motion.certificate import LimitName
+from armwright.motion.certificate import BindingLimit
 from armwright.motion.forward_backward import Bounds, largest_squares
+from armwright.motion.knots import segments_at
 from armwright.motion.polynomials import composed, derivative, evaluate, shifted
 from armwright.motion.trajectory import Trajectory
 
@@ -62,7 +63,7 @@ class Timed(NamedTuple):
 
     trajectory: Trajectory
     factor: float
-    because: tuple[LimitName, int] | None
+    because: BindingLimit | None
     progress: Trajectory
     speed: Array
     acceleration: Array
@@ -70,7 +71,7 @@ class Timed(NamedTuple):
     def when(self, s: float) -> float:
         """Return when the run is at ``s``, as a part of its duration."""
         starts = self.progress.coefficients[:, 0, 0]
-        k = int(np.clip(np.searchsorted(starts, s, side="right") - 1, 0, None))
+        k = int(segments_at(starts, s, len(starts)))
         t = np.linspace(self.progress.times[k], self.progress.times[k + 1], _LOOKED_UP)
         return float(np.interp(s, self.progress(t)[:, 0], t)) / self.progress.duration
 
@@ -252,7 +253,7 @@ def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Arra
     middles = (breaks[1:] + breaks[:-1]) / 2
 
     def around(length: Array, within: Array) -> Array:
-        piece = np.clip(np.searchsorted(begins, within, side="right") - 1, 0, len(integral) - 1)
+        piece = segments_at(begins, within, len(integral))
         return shifted(integral[piece][..., None], length - begins[piece])[..., 0]
 
     ahead, behind = around(breaks[:-1], middles), around(breaks[:-1] - window, middles - window)
@@ -264,15 +265,13 @@ def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
     arm, path, caps = grid.arm, grid.path, grid.caps
     knots = path.times[1:-1]
     begins = np.maximum.accumulate(law[:, 0])
-    piece = np.clip(np.searchsorted(begins, knots, side="right") - 1, 0, len(law) - 1)
+    piece = segments_at(begins, knots, len(law))
     times = _apart(np.concatenate([breaks, breaks[piece] + _when(law[piece], np.diff(breaks)[piece], knots)]))
     middles = (times[1:] + times[:-1]) / 2
-    piece = np.clip(np.searchsorted(breaks, middles, side="right") - 1, 0, len(law) - 1)
+    piece = segments_at(breaks, middles, len(law))
     inner = shifted(law[piece][..., None], times[:-1] - breaks[piece])
     there = evaluate(inner, (middles - times[:-1])[:, None])[:, 0]
-    interval = np.asarray(
-        np.clip(np.searchsorted(path.times, there, side="right") - 1, 0, len(caps) - 1), dtype=np.intp
-    )
+    interval = segments_at(path.times, there, len(caps))
     inner[:, 0, 0] -= path.times[interval]
     outer, steps = path.coefficients[interval], np.diff(times)
     rates, bends = derivative(inner, 1), derivative(inner, 2)
@@ -305,7 +304,7 @@ def _when(law: Array, steps: Array, knots: Array) -> Array:
     return t
 
 
-def _binding(joints: int, run: _Run) -> tuple[LimitName, int]:
+def _binding(joints: int, run: _Run) -> BindingLimit:
     """Return which limit of which joint binds for the longest time."""
     steps, of_joints = np.diff(run.times), run.uses[:, 1:]
     fullest = of_joints.argmax(axis=1)

@@ -17,7 +17,7 @@ from armwright.motion.deviation import (
     half_sines,
     spin_bound,
 )
-from armwright.motion.knots import divided
+from armwright.motion.knots import divided, segments_at
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
 from armwright.spatial.poses import homogeneous, position_text
@@ -60,16 +60,13 @@ class ToolPath:
 
     def slowed(self, factor: float) -> "ToolPath":
         """Return the same path run ``factor`` times slower."""
-        return ToolPath(
-            position=self.position.slowed(factor),
-            orientation=self.orientation.slowed(factor),
-            times=self.times * factor,
-        )
+        position, orientation = self.position.slowed(factor), self.orientation.slowed(factor)
+        return ToolPath(position=position, orientation=orientation, times=self.times * factor)
 
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
         """Return bounds of the error on the intervals between times: those of tool and path together."""
         middles = (times[1:] + times[:-1]) / 2
-        piece = np.clip(np.searchsorted(self.knots, middles, side="right") - 1, 0, len(self.knots) - 2)
+        piece = segments_at(self.knots, middles, len(self.knots) - 1)
         rate, change = (bound[piece] for bound in self.spin())
         return ErrorBounds(hand.pull + self.acceleration()[piece], spin_bound(hand, change, rate))
 
@@ -81,7 +78,7 @@ class ToolPath:
 
     def where(self, t: float) -> tuple[int, float, str]:
         """Return on which segment between poses a time is, at which fraction of it, and that in words."""
-        i = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2))
+        i = int(segments_at(self.times, t, len(self.times) - 1))
         fraction = float(np.clip((t - self.times[i]) / (self.times[i + 1] - self.times[i]), 0.0, 1.0))
         between = f"at {t:.3f} s, between poses {i + 1} and {i + 2}"
         return i, fraction, f"{between}, {position_text(self(t)[:3, 3])},"

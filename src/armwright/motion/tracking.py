@@ -122,9 +122,8 @@ def track(task: Task, knots: Array, *, diagnose: bool = True) -> Tracking:
 def excess(error: TrackingError, allowed: Tolerance) -> Array:
     """Return how many times the tolerance the error of the tool is on each interval (m,)."""
     backward = 0.0 if error.backward is None else error.backward
-    return np.asarray(
-        np.maximum(np.maximum(error.position, backward) / allowed.position, error.orientation / allowed.orientation)
-    )
+    position = np.maximum(error.position, backward) / allowed.position
+    return np.maximum(position, error.orientation / allowed.orientation)
 
 
 def too_far(task: Task, tracking: Tracking) -> Obstruction:
@@ -198,11 +197,10 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
     arm, configurations = task.solver.arm, None if guide is None else guide.guide
     for _ in range(_ROUNDS):
         X = task.motion(knots)
-        q, failed = (
-            chain(task.solver, X, task.q_start)
-            if configurations is None
-            else beside(task.solver, X, configurations(knots))
-        )
+        if configurations is None:
+            q, failed = chain(task.solver, X, task.q_start)
+        else:
+            q, failed = beside(task.solver, X, configurations(knots))
         q = _within_limits_by_revolutions(arm, q, failed) if task.whole_turns else q
         obstruction = beyond_limits(arm, q[:failed], knots)
         if obstruction is None and failed is not None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats, integer, not_negative, positive, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
-from armwright.motion.knots import one_way
+from armwright.motion.knots import one_way, segments_at
 from armwright.motion.polynomials import derivative, extremes, peaks, shifted
 from armwright.notebook import html_table
 
@@ -99,7 +99,7 @@ class Trajectory:
         integer(order, "order", least=0)
         t = floats(t, "t")
         inside = np.clip(t, 0.0, self.duration)
-        segment = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.coefficients) - 1)
+        segment = segments_at(self.times, inside, len(self.coefficients))
         local = (inside - self.times[segment])[..., None]
         terms = derivative(self.coefficients, order)[segment]
         value = np.zeros((*t.shape, self.coefficients.shape[2]))
@@ -322,10 +322,8 @@ def slowed_together(trajectories: Sequence[Trajectory], duration: float, period:
     # In whole numbers, so that nobody gets less than it has.
     slow_ends = [(2 * int(end) * ticks + least) // (2 * least) for end in ends]
     counts = np.diff([0, *slow_ends])
-    return [
-        each.retimed(count * period) if count else each
-        for each, count in zip(trajectories, counts.tolist(), strict=True)
-    ]
+    pairs = zip(trajectories, counts.tolist(), strict=True)
+    return [each.retimed(count * period) if count else each for each, count in pairs]
 
 
 def _ticks(duration: float, period: float) -> int:

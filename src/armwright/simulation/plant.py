@@ -188,11 +188,8 @@ class Plant:
         moving = ~phase.locked
         slides = moving & self.dry & (phase.direction != 0)
         below, above = moving & np.isfinite(self.lower), moving & np.isfinite(self.upper)
-        distances = [
-            (phase.direction * qd)[slides] / STILL + 1,
-            (q - self.lower)[below] / TOUCH + 1,
-            (self.upper - q)[above] / TOUCH + 1,
-        ]
+        distances = [(phase.direction * qd)[slides] / STILL + 1]
+        distances += [(q - self.lower)[below] / TOUCH + 1, (self.upper - q)[above] / TOUCH + 1]
         if (phase.locked & (phase.state != JointState.BRAKED)).any():
             hold = self.moment(t, q, qd, phase).hold
             for bound, side in ((phase.lower, 1.0), (phase.upper, -1.0)):

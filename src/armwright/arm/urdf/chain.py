@@ -125,9 +125,8 @@ def _default_tip(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
             f"the tip link is ambiguous: it could be {_listed(ends)}; specify one as tip: "
             f"load_urdf(path, tip='{ends[0]}'), or armwright convert {robot.path} --tip {ends[0]} -o arm.toml"
         )
-    return carrier, (
-        f"the tool is '{carrier}', which carries {_listed(ends)}; each moves as it does and may be the tip (--tip)",
-    )
+    note = f"the tool is '{carrier}', which carries {_listed(ends)}; each moves as it does and may be the tip (--tip)"
+    return carrier, (note,)
 
 
 def _carrier(robot: Robot, base: str, ends: list[str]) -> str | None:

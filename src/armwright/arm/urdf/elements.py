@@ -196,12 +196,11 @@ def _split(raw: Any) -> tuple[str, str]:
 
 
 def _element(path: Path, raw: Any, space: str, around: str) -> Element:
-    tag = _split(raw)[1]
+    tag, line = _split(raw)[1], raw.sourceline
     # lxml looks for each from the first one, so many take the square of the time.
     if len(raw.attrib) > limit("attributes"):
-        raise FileFormatError(
-            path, raw.sourceline, f"<{tag}>", f"too many attributes: {limit_message('attributes', len(raw.attrib))}"
-        )
+        message = f"too many attributes: {limit_message('attributes', len(raw.attrib))}"
+        raise FileFormatError(path, line, f"<{tag}>", message)
     attributes = dict(raw.attrib)
     if tag in {"link", "joint"} and not around:
         location = f"{tag} {shown(attributes['name'])}" if "name" in attributes else tag
@@ -209,9 +208,7 @@ def _element(path: Path, raw: Any, space: str, around: str) -> Element:
         location = ", ".join(part for part in (around, tag) if part and tag != "robot")
     inside = [each for each in raw if _split(each)[0] == space and _split(each)[1]] if tag in _KNOWN else []
     children = tuple(_element(path, each, space, location) for each in inside)
-    element = Element(
-        path=path, line=raw.sourceline, location=location, tag=tag, attributes=attributes, children=children
-    )
+    element = Element(path=path, line=line, location=location, tag=tag, attributes=attributes, children=children)
     _refuse_misspelt(element)
     return element
 

@@ -243,9 +243,8 @@ def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
     if element is None:
         if joint.kind == "continuous":
             return Limits(), []
-        raise joint.element.error(
-            "", f"a {joint.kind} joint needs <limit>; a joint without limits has the type continuous"
-        )
+        message = f"a {joint.kind} joint needs <limit>; a joint without limits has the type continuous"
+        raise joint.element.error("", message)
     largest, notes = {}, []
     for name, key in (("effort", "effort"), ("speed", "velocity")):
         value = element.number(key, math.inf, lower=0.0)

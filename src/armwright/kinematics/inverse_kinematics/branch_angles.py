@@ -7,6 +7,7 @@ from armwright.kinematics.inverse_kinematics.geometry import (
     ON_AXIS,
     ClosedFormGeometry,
     Sign,
+    Signs,
     reach_error,
     rotated_about_y,
     rotation_about_z_then_y,
@@ -37,9 +38,7 @@ class BranchAngles(NamedTuple):
     reach_error: Scalar
 
 
-def branch_angles(
-    geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: tuple[Sign, Sign, Sign], near: Vector
-) -> BranchAngles:
+def branch_angles(geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: Signs, near: Vector) -> BranchAngles:
     """Return the angles of one branch; a point out of reach gives the one that stretches, or folds, towards it.
 
     Args:
@@ -69,9 +68,7 @@ def branch_angles(
     return BranchAngles(angles, _vanish(*p[:2]), _vanish(X, p[2]), wrist_free, reach_error(geometry, p, X, p[2]))
 
 
-def _parallel(
-    geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: tuple[Sign, Sign, Sign], near: Vector
-) -> BranchAngles:
+def _parallel(geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: Signs, near: Vector) -> BranchAngles:
     """Solve three parallel axes: joint 1 by the side, 5, 6 and the sum of 2 to 4 by the orientation, 2 by the position.
 
     The rotation after joint 1 is about y, z and y: the parallel joints together, joint 5, joint 6. With joint 5

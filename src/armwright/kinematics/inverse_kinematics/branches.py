@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 from armwright.arm.model import Arm
 from armwright.kinematics.inverse_kinematics.branch_angles import branch_angles
-from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Sign
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Sign, Signs
 from armwright.tracing.scalar import Scalar, round_half_even, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, product, subtract, transpose
 
 _SIGNS: tuple[Sign, Sign] = (1, -1)
 # The order of the branches: arm, elbow (or slide), wrist.
-BRANCHES: tuple[tuple[Sign, Sign, Sign], ...] = tuple((a, e, w) for a in _SIGNS for e in _SIGNS for w in _SIGNS)
+BRANCHES: tuple[Signs, ...] = tuple((a, e, w) for a in _SIGNS for e in _SIGNS for w in _SIGNS)
 
 # A configuration whose tool is closer than this to the position reaches it; others stretch towards it [m].
 REACH_TOLERANCE = 1e-9

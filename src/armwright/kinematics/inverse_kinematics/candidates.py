@@ -42,9 +42,7 @@ def exact_pose(X_BT: ArrayLike) -> Array:
     """
     X = typed_poses(X_BT)
     if X.ndim != 2:
-        raise ShapeError(
-            f"pose: expected one pose, shape (4, 4), got {X.shape}; inverse_branches accepts arrays of poses"
-        )
+        raise ShapeError(f"pose: expected one pose, shape (4, 4), got {X.shape}; inverse_branches takes arrays of them")
     # A rotation that was computed is as exact as one can be; what is typed is off by far more.
     if float(orthonormality_error(X[:3, :3])) < _COMPUTED:
         return X

@@ -18,6 +18,8 @@ from armwright.tracing.vectors import Matrix, Vector
 
 Family: TypeAlias = Literal["puma", "stanford", "parallel"]
 Sign: TypeAlias = Literal[1, -1]
+# Of arm, elbow or slide, and wrist.
+Signs: TypeAlias = tuple[Sign, Sign, Sign]
 
 # Roots of less than this part of their terms are 0: the two branches fall together there, and what rounding leaves
 # of the radicand would be drawn out to a thousand times its size.
@@ -80,9 +82,8 @@ class ClosedFormGeometry:
     @property
     def max_reach(self) -> float:
         """Largest distance of the wrist centre from the shoulder [m]; infinite for a slide."""
-        return math.hypot(
-            abs(self.shoulder_offset) + self.outer_radius + math.hypot(*self.wrist_link), self.plane_offset
-        )
+        in_plane = abs(self.shoulder_offset) + self.outer_radius + math.hypot(*self.wrist_link)
+        return math.hypot(in_plane, self.plane_offset)
 
     def angles(self, q: Vector) -> Vector:
         """Return the angles of the build for joint positions, over abstract scalars."""

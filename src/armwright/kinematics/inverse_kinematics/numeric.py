@@ -138,9 +138,8 @@ def _search(task: _Task, near: Array) -> tuple[Array, Array]:
 def _named(task: _Task, reached: Array, near: Array) -> list[Candidate]:
     """Number the configurations, nearest first, one of each free family."""
     solutions: list[Candidate] = []
-    for q in sorted(
-        (nearest_equivalent(task.arm, q, near) for q in reached), key=lambda q: joint_distance(task.arm, near, q)
-    ):
+    nearest = (nearest_equivalent(task.arm, q, near) for q in reached)
+    for q in sorted(nearest, key=lambda q: joint_distance(task.arm, near, q)):
         if any(_same(task.arm, q, other) for other in solutions):
             continue
         solutions.append(Candidate(q, f"numeric {len(solutions) + 1}", _free_joints(task, q)))

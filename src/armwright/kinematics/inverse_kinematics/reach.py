@@ -9,6 +9,7 @@ from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import per_joint
 from armwright.kinematics.inverse_kinematics.branch_angles import BranchAngles, branch_angles
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Sign, rotated_about_y
+from armwright.tracing.vectors import Matrix
 
 # Angles of joint 1 looked at for the nearest place, and how often the neighbourhood of the best is looked at again,
 # each time twenty times closer: below 1e-8 rad the distance, flat at its least, has no digit left to tell.
@@ -58,7 +59,7 @@ def _nearest_in_ring(geometry: ClosedFormGeometry, p: Array) -> Array:
 
 def _nearest_by_turning(geometry: ClosedFormGeometry, p: Array, R: Array) -> Array:
     """Search the angles of joint 1: at each the nearest position is that of a ring in the plane of the arm."""
-    rows: list[list[float]] = R.tolist()
+    rows: Matrix = R.tolist()
     flips: tuple[Sign, ...] = (1, -1) if geometry.family == "parallel" else (1,)
     optima: list[tuple[float, Array]] = []
     for flip in flips:
@@ -73,9 +74,7 @@ def _nearest_by_turning(geometry: ClosedFormGeometry, p: Array, R: Array) -> Arr
     return min(optima, key=lambda optimum: optimum[0])[1]
 
 
-def _nearest_by_angle(
-    geometry: ClosedFormGeometry, p: Array, R: list[list[float]], flip: Sign
-) -> Callable[[Array], Array]:
+def _nearest_by_angle(geometry: ClosedFormGeometry, p: Array, R: Matrix, flip: Sign) -> Callable[[Array], Array]:
     """Return the function from angles of joint 1 (k,) to the nearest points (k, 3) in reach at them."""
 
     def nearest(theta: Array) -> Array:
@@ -96,7 +95,7 @@ def _nearest_by_angle(
     return nearest
 
 
-def _wrist_link_angle(geometry: ClosedFormGeometry, theta: Array, R: list[list[float]], flip: Sign) -> Array:
+def _wrist_link_angle(geometry: ClosedFormGeometry, theta: Array, R: Matrix, flip: Sign) -> Array:
     """Return the angle of the wrist link (k,) that the orientation asks for at angles of joint 1 (k,)."""
     # A wrist centre straight beside joint 1 makes the branch stand at just that angle.
     c, s = np.cos(theta), np.sin(theta)

@@ -75,9 +75,8 @@ def _few(choices: list[list[float]], values: list[float]) -> list[list[float]]:
     most = max(map(len, choices))
     while math.prod(min(len(turns), most) for turns in choices) > _MAX_EQUIVALENTS:
         most -= 1
-    return [
-        sorted(sorted(turns, key=lambda x: abs(x - value))[:most]) for turns, value in zip(choices, values, strict=True)
-    ]
+    joints = zip(choices, values, strict=True)
+    return [sorted(sorted(turns, key=lambda x: abs(x - value))[:most]) for turns, value in joints]
 
 
 def _equivalents(arm: Arm, q: ArrayLike, starts: list[float]) -> list[list[float]]:

@@ -1,12 +1,16 @@
 """Self-motion: where a pose leaves a joint free, the configuration that is inside the limits."""
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.inverse_kinematics.revolutions import nearest_equivalent
+
+# The members (k, n) of a family of configurations that joint positions (k, n) to stay near lead to.
+Members: TypeAlias = Callable[[Array], Array]
 
 # Positions of a free joint that are tried for one inside the limits; then, where none is, the neighbourhoods of those
 # that pass the limits least are looked at, each time four times closer: down to 1e-9 of the step.
@@ -23,7 +27,7 @@ _WHOLE_TURNS = np.arange(-2, 3)
 _INSIDE = 1e-10
 
 
-def search_within_limits(arm: Arm, q: Array, near: Array, members: Callable[[Array], Array], *, joint: int) -> Array:
+def search_within_limits(arm: Arm, q: Array, near: Array, members: Members, *, joint: int) -> Array:
     """Move a free joint on from ``near``, as little as it must, until all joints are inside their limits.
 
     As little as it must, that is to a step of the search; where no step is inside, because another joint has room for
@@ -45,9 +49,7 @@ def search_within_limits(arm: Arm, q: Array, near: Array, members: Callable[[Arr
     return q
 
 
-def _search(
-    arm: Arm, near: Array, members: Callable[[Array], Array], joint: int, interval: tuple[float, float]
-) -> Array | None:
+def _search(arm: Arm, near: Array, members: Members, joint: int, interval: tuple[float, float]) -> Array | None:
     """Return the member nearest to ``near`` of those with all joints inside that a search of a room finds."""
     (lower, upper), start = interval, near[joint - 1]
     values, width = np.linspace(lower, upper, _TRIED), (upper - lower) / (_TRIED - 1)
@@ -65,9 +67,7 @@ def _search(
     return None
 
 
-def counter_rotate_within_limits(
-    arm: Arm, q: Array, near: Array, members: Callable[[Array], Array], *, joint: int, other: int
-) -> Array:
+def counter_rotate_within_limits(arm: Arm, q: Array, near: Array, members: Members, *, joint: int, other: int) -> Array:
     """Rotate two joints whose axes lie on one line, against each other, until both are inside their limits.
 
     The members of such a family are known: what one joint rotates, the other rotates back. So the least rotation that

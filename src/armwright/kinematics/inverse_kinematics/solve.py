@@ -10,7 +10,7 @@ from armwright.arrays import Array, ArrayLike, Flags, leading_axes
 from armwright.kinematics.forward_kinematics import per_joint, stack
 from armwright.kinematics.inverse_kinematics.branches import BRANCHES, Branches, branches, merged, single_branch
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, exact_pose, rank, typed_poses
-from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Sign, rotated_about_y
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Signs, rotated_about_y
 from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse
 from armwright.kinematics.inverse_kinematics.reach import nearest_wrist_centre
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry, find_geometry
@@ -83,7 +83,7 @@ def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> Inverse
     return numeric_inverse(arm, X, reference) if geometry is None else _closed(arm, geometry, X, reference)
 
 
-def label(geometry: ClosedFormGeometry, signs: tuple[Sign, Sign, Sign], angles: Array) -> str:
+def label(geometry: ClosedFormGeometry, signs: Signs, angles: Array) -> str:
     """Name a branch: arm, elbow or slide, wrist.
 
     The elbow is up where it is above the line from joint 2 to the end of the forearm, above as the axis of joint 1
@@ -114,11 +114,8 @@ def _configurations(arm: Arm, geometry: ClosedFormGeometry, X_BT: Array, near: A
     """Return eight configurations (..., 8, 6), which choices are free (..., 8, 3), and reach errors (..., 8) [m]."""
     lead, solutions = _branches(arm, geometry, X_BT, near)
     free = [stack([select(choice, 1.0, 0.0) for choice in choices], lead) > 0 for choices in solutions.free]
-    return (
-        np.stack([stack(q, lead) for q in solutions.q], axis=-2),
-        np.stack(free, axis=-2),
-        stack(solutions.reach_error, lead),
-    )
+    q = np.stack([stack(each, lead) for each in solutions.q], axis=-2)
+    return q, np.stack(free, axis=-2), stack(solutions.reach_error, lead)
 
 
 def _closed(arm: Arm, geometry: ClosedFormGeometry, X: Array, near: Array) -> InverseSolution:
