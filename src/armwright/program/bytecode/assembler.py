@@ -218,9 +218,8 @@ class _Reader:
         words = _OPERAND_OR_COMMENT.findall(match["rest"])
         operands = tuple(self._operand(word) for word in words if word[0] != ";")
         self._numbers.append(self._number)
-        self._instructions.append(
-            Instruction(op=Op[name], operands=operands, span=self._span(span), begins=bool(span["begins"]))
-        )
+        at, begins = self._span(span), bool(span["begins"])
+        self._instructions.append(Instruction(op=Op[name], operands=operands, span=at, begins=begins))
 
     def _span(self, match: re.Match[str]) -> Span:
         """Return the part of the program that a location such as 12:5+20 stands for."""

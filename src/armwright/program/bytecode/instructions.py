@@ -200,9 +200,8 @@ def stages_of(form: Form) -> tuple[StagePlan, ...]:
     if form.departure:
         stages.append(StagePlan(kind=MotionKind.LINE, frames=(form.departure,)))
     end = form.approach or form.goal
-    gross = MotionKind.LINE if form.straight else MotionKind.PTP
-    if form.via:
-        gross = MotionKind.BLEND if form.blend else MotionKind.SPLINE
+    past = MotionKind.BLEND if form.blend else MotionKind.SPLINE
+    gross = past if form.via else MotionKind.LINE if form.straight else MotionKind.PTP
     stages.append(StagePlan(kind=gross, frames=(*form.via, end)))
     if form.approach:
         stages.append(StagePlan(kind=MotionKind.LINE, frames=(form.goal,)))

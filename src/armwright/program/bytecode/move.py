@@ -27,12 +27,9 @@ def move(context: Context, node: tree.Move) -> None:
     guards = [clause for clause in node.clauses if isinstance(clause, tree.On)]
     moved, goal = context.out.value(node.moved), out.value(node.goal)
     # Places are worked out before the motion begins, so that its own instructions follow one another.
-    parts = [
-        (op, clause.span, context.values(clause))
-        for kind, op in _CLAUSES.items()
-        for clause in node.clauses
-        if isinstance(clause, kind)
-    ]
+    kinds = list(_CLAUSES)
+    clauses = sorted((one for one in node.clauses if type(one) in kinds), key=lambda one: kinds.index(type(one)))
+    parts = [(_CLAUSES[type(clause)], clause.span, context.values(clause)) for clause in clauses]
     out.emit(Op.MVBEG, moved, goal, span=node.span)
     form = form_of(node, context.text)
     if form.direct:

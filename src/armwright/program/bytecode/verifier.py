@@ -43,11 +43,7 @@ class Element:
 
 
 ValueType: TypeAlias = Value | Element
-OF_KIND: Mapping[VariableKind, Value] = {
-    VariableKind.SCALAR: Value.NUMBER,
-    VariableKind.TRANS: Value.POSE,
-    VariableKind.FRAME: Value.POSE,
-}
+OF_KIND = {VariableKind.SCALAR: Value.NUMBER, VariableKind.TRANS: Value.POSE, VariableKind.FRAME: Value.POSE}
 _FRAME = VariableType(VariableKind.FRAME)
 
 

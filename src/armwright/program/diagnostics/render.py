@@ -79,10 +79,8 @@ def _diagnostic_rows(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
         yield [(f"{number:>{width}} | ", _GUTTER_STYLE), (shown, "")]
         for label in sorted(line_labels, key=lambda one: one.span.start):
             mark, style = ("^", loud) if label is labels[0] else ("-", _GUTTER_STYLE)
-            yield [
-                (" " * width + " | " + " " * len(before_it), _GUTTER_STYLE),
-                *_marker_row(label, mark, style, source, (first, last)),
-            ]
+            marks = _marker_row(label, mark, style, source, (first, last))
+            yield [(" " * width + " | " + " " * len(before_it), _GUTTER_STYLE), *marks]
     for head, text in diagnostic.remarks:
         yield [(" " * width + " = ", _GUTTER_STYLE), (f"{head}: ", "bold"), (text, "")]
 

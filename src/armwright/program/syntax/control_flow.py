@@ -221,7 +221,7 @@ def _loop_variable(tokens: TokenStream) -> tree.Name | tree.Poison:
         tokens.report_reserved_name()
         tokens.take()
         return tree.Poison(token.span, frozenset((token.key,)))
-    return tokens.fail("expected the name of a SCALAR after FOR", f"found {describe_token(token)}")
+    return tokens.fail("expected the name of a SCALAR after FOR")
 
 
 # "COBEGIN" branch { ";" branch } [";"] "COEND"

@@ -8,7 +8,7 @@ from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import number, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.token_stream import PanicModeError, TokenStream, describe_token, either
+from armwright.program.syntax.token_stream import PanicModeError, TokenStream, either
 
 
 def skip_declaration(tokens: TokenStream, names: list[tree.Name]) -> tree.Declaration:
@@ -120,7 +120,7 @@ def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
         tokens.report_reserved_name()
         names.append(tokens.take_name())
     else:
-        tokens.fail("expected a name", f"found {describe_token(token)}")
+        tokens.fail("expected a name")
 
 
 # type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;
@@ -160,7 +160,7 @@ def _array_size(tokens: TokenStream, wants: str, where: str) -> tree.Number:
         return number(tokens)
     start = tokens.current
     if start.kind is not TokenKind.NAME and start.key != "-":
-        tokens.fail(f"expected {wants} {where or f'after `{tokens.previous.text}`'}", f"found {describe_token(start)}")
+        tokens.fail(f"expected {wants} {where or f'after `{tokens.previous.text}`'}")
     tokens.report_once("E111", "the size of an array is a plain number", start.span, "such as `6`")
     tokens.take()
     if start.key == "-":

@@ -133,7 +133,7 @@ def number(tokens: TokenStream) -> tree.Number:
         if start.key == "+":
             tokens.report("E113", "a number has no `+` in front", start.span, "leave it out", replacement="")
     if token.kind is not _NUMBER:
-        tokens.fail("expected a number", f"found {describe_token(token)}")
+        tokens.fail("expected a number")
     tokens.take()
     tokens.height = 1
     value = math.nan if token.damaged else float(token.key)
@@ -342,7 +342,7 @@ def _report_missing_value(tokens: TokenStream, wants: str, where: str) -> tree.P
         tokens.report_reserved_name()
         tokens.take()
         return tree.Poison(token.span, frozenset((token.key,)))
-    return tokens.fail(f"expected {wants} {where}".rstrip(), f"found {describe_token(token)}")
+    return tokens.fail(f"expected {wants} {where}".rstrip())
 
 
 def is_reserved_as_name(tokens: TokenStream) -> bool:

@@ -103,8 +103,7 @@ def _import(tokens: TokenStream) -> list[tree.Header]:
     start = tokens.take()
     token = tokens.current
     if token.kind is not TokenKind.STRING:
-        advice = 'write `IMPORT "cell.json" ;`'
-        tokens.fail("expected the name of a file after IMPORT", f"found {describe_token(token)}", advice=advice)
+        tokens.fail("expected the name of a file after IMPORT", advice='write `IMPORT "cell.json" ;`')
     node = tokens.node(tree.Import, start, tree.String(tokens.take().span, token.text[1:-1]))
     tokens.accept_semicolon("after the import")
     return [node]
@@ -127,8 +126,7 @@ def _unit(tokens: TokenStream) -> tree.Name:
     token = tokens.current
     tokens.note_expected_operand("a unit")
     if token.kind is not TokenKind.NAME:
-        advice = "write `UNITS MM, DEG ;`"
-        tokens.fail(f"expected a unit after `{tokens.previous.text}`", f"found {describe_token(token)}", advice=advice)
+        tokens.fail(f"expected a unit after `{tokens.previous.text}`", advice="write `UNITS MM, DEG ;`")
     return tokens.take_name()
 
 
@@ -170,7 +168,7 @@ def _procedure_name(tokens: TokenStream) -> tree.Name:
         tokens.report_once("E111", "expected the name of the procedure", gap, f"found {describe_token(token)}")
         return tree.Name(gap, "", "")
     elif token.kind is not TokenKind.NAME:
-        tokens.fail("expected the name of the procedure", f"found {describe_token(token)}")
+        tokens.fail("expected the name of the procedure")
     name = tokens.take_name()
     tokens.check_name_length(name)
     return name

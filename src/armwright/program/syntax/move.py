@@ -13,7 +13,7 @@ from armwright.program.syntax.expressions import expression, mobile, parenthesis
 from armwright.program.syntax.frames import expect_equals
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.statement_list import nested_statement
-from armwright.program.syntax.token_stream import TokenStream, describe_token, either
+from armwright.program.syntax.token_stream import TokenStream, either
 
 _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Print, tree.Poison)
 _ACTION_WORDS = ("HALT", "SIGNAL", "PRINT", "BEGIN")
@@ -37,7 +37,7 @@ def move(tokens: TokenStream) -> tree.Move:
             tokens.note_expected_words(*tokens.vocabulary.plain_clauses, *words, present_clauses=_clause_words(clauses))
         if not _starts_clause(tokens):
             if comma:
-                tokens.fail("expected a clause after `,`", f"found {describe_token(tokens.current)}")
+                tokens.fail("expected a clause after `,`")
             break
         if (clause := _clause(tokens, clauses)) is not None:
             clauses.append(clause)

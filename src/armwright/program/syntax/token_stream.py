@@ -290,15 +290,21 @@ class TokenStream:
             self.report(code, message, span, label, **details)
         self._reported_index = self.index
 
-    def fail(self, message: str, label: str, *, code: str = "E111", advice: str = "") -> NoReturn:
+    def fail(self, message: str, label: str = "", *, code: str = "E111", advice: str = "") -> NoReturn:
         """Say what is missing at the next token, unless that was reported before, and give up the statement.
+
+        Args:
+            message: what is missing.
+            label: what stands there instead; the token, unless something else is given.
+            code: of the diagnostic.
+            advice: what to write.
 
         Raises:
             PanicModeError: always.
         """
         # At the end of the text there is nothing to mark; the gap before it is the position.
         span = self.gap_span() if self.is_at_end else self.current.span
-        self.report_once(code, message, span, label, advice=advice)
+        self.report_once(code, message, span, label or f"found {describe_token(self.current)}", advice=advice)
         raise PanicModeError
 
     def insert_missing(self, key: str, what: str, *, advice: str = "", alone: bool = True) -> None:
