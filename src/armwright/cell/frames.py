@@ -91,17 +91,14 @@ class FrameTree:
         Raises:
             UnknownNameError: there is no such frame.
         """
-        if name == WORLD:
-            return None
-        return self._node(name).parent
+        return None if name == WORLD else self._node(name).parent
 
     def ancestors(self, name: str) -> list[str]:
         """Return the frames from the parent of ``name`` up to WORLD."""
         chain = []
-        ancestor = self.parent(name)
-        while ancestor is not None:
-            chain.append(ancestor)
-            ancestor = self.parent(ancestor)
+        while (parent := self.parent(name)) is not None:
+            chain.append(parent)
+            name = parent
         return chain
 
     def world(self, name: str) -> Array:
@@ -113,11 +110,9 @@ class FrameTree:
         """
         path = []
         while name != WORLD and (X_WF := self._worlds.get(name)) is None:
-            node = self._node(name)
-            if node.relation is None:
-                raise InvalidValueError(f"frame {name} has no value yet")
-            path.append((name, node.relation))
-            name = node.parent
+            parent, relation = self._attachment(name)
+            path.append((name, relation))
+            name = parent
         X = None if name == WORLD else X_WF
         for descendant, relation in reversed(path):
             self._worlds[descendant] = X = relation if X is None else _freeze(X @ relation)
@@ -132,11 +127,8 @@ class FrameTree:
         """
         X, name = None, child
         while name != ancestor:
-            node = self._node(name)
-            if node.relation is None:
-                raise InvalidValueError(f"frame {name} has no value yet")
-            X = node.relation if X is None else node.relation @ X
-            name = node.parent
+            name, relation = self._attachment(name)
+            X = relation if X is None else relation @ X
         return np.eye(4) if X is None else X
 
     def declare(self, name: str) -> "FrameTree":
@@ -168,8 +160,7 @@ class FrameTree:
         nodes = dict(self.nodes)
         for child, node in self.nodes.items():
             if node.parent == name:
-                relation = None if not self.has_value(child) else self.world(child)
-                nodes[child] = Node(parent=WORLD, relation=relation)
+                nodes[child] = Node(parent=WORLD, relation=self.world(child) if self.has_value(child) else None)
         nodes.pop(name, None)
         return FrameTree(nodes)
 
@@ -208,6 +199,12 @@ class FrameTree:
             return self.nodes[name]
         except KeyError:
             raise UnknownNameError("frame", name, [WORLD, *self.nodes]) from None
+
+    def _attachment(self, name: str) -> tuple[str, Array]:
+        node = self._node(name)
+        if node.relation is None:
+            raise InvalidValueError(f"frame {name} has no value yet")
+        return node.parent, node.relation
 
     def _with_node(self, name: str, node: Node) -> "FrameTree":
         # Only descendants of a changed frame have other poses in the world.

@@ -65,7 +65,6 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
-    height = contact.number("z", default=math.nan)
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
@@ -77,14 +76,14 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
         devices=_read_devices(top.table("devices")) if "devices" in top else None,
         contact=ContactPlane(
-            height=None if math.isnan(height) else height,
+            height=_optional_number(contact, "z"),
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
             max_depth=contact.number("deepest_mm", default=5.0, lower=1e-3, upper=1e3) * 1e-3,
         ),
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
-        corner=_read_corner(motion),
-        around=_read_around(motion),
+        corner=_optional_number(motion, "corner_mm", 1e-3, *CORNER_MM),
+        around=DETOURS[motion.choice("around", DETOURS, default="none")],
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):
@@ -103,17 +102,12 @@ def _read_gravity(top: Table) -> Array:
     return gravity
 
 
-def _read_corner(motion: Table) -> float | None:
-    """Read how far a path past several frames may be from its legs; without the key it depends on the deviation."""
-    if "corner_mm" not in motion:
-        motion.allow("corner_mm")
-        return None
-    return motion.number("corner_mm", lower=CORNER_MM[0], upper=CORNER_MM[1]) * 1e-3
-
-
-def _read_around(motion: Table) -> Around | None:
-    """Read the kind of detour of a straight line; without the key there is no detour."""
-    return DETOURS[motion.choice("around", DETOURS, default="none")]
+def _optional_number(
+    table: Table, key: str, unit: float = 1.0, lower: float = -math.inf, upper: float = math.inf
+) -> float | None:
+    """Read a number of units; without the key there is none."""
+    value = table.number(key, default=math.nan, lower=lower, upper=upper)
+    return None if math.isnan(value) else value * unit
 
 
 def _read_arms(table: Table, folder: Path) -> dict[str, CellArm]:
@@ -156,17 +150,15 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         weighed(arm)
     except ArmwrightError as error:
         raise table.error("model", f"{error}, but the motions of a program are computed with efforts") from error
-    if "tool" in table:
-        arm = attrs.evolve(arm, tool=_read_pose(table, "tool"))
-    table.allow("tool")
+    arm = attrs.evolve(arm, tool=_read_pose(table, "tool", default=arm.tool))
     base = _read_pose(table, "base", default=np.eye(4))
+    table.allow("hand", "joint_positions")
     start = _read_start(table, arm, base)
-    durations = {
-        name: table.number(key, default=0.3, lower=0.0, upper=_MAX_DURATION)
-        for name, key in (("open_time", "open_s"), ("grasp_time", "grasp_s"))
-    }
+    open_time, grasp_time = (
+        table.number(key, default=0.3, lower=0.0, upper=_MAX_DURATION) for key in ("open_s", "grasp_s")
+    )
     table.refuse_unknown_keys()
-    return CellArm(arm=arm, base=base, start=start, **durations)
+    return CellArm(arm=arm, base=base, start=start, open_time=open_time, grasp_time=grasp_time)
 
 
 def _read_start(table: Table, arm: Arm, base: Array) -> Array:
@@ -174,14 +166,12 @@ def _read_start(table: Table, arm: Arm, base: Array) -> Array:
     if "joint_positions" in table:
         if "hand" in table:
             raise table.error("hand", "the start is specified twice, as hand and as joint_positions")
-        table.allow("hand")
         q = table.vector("joint_positions", arm.n)
         if mistake := degrees_by_mistake(arm, q):
             raise table.error("joint_positions", mistake)
         for fault in violations(arm, q):
             raise table.error("joint_positions", str(fault))
         return q
-    table.allow("joint_positions")
     if "hand" not in table:
         raise table.error("hand", "missing; specify the initial pose of the gripper, or the joints as joint_positions")
     solution = inverse(arm, inverse_pose(base) @ _read_pose(table, "hand"))
@@ -193,35 +183,30 @@ def _read_start(table: Table, arm: Arm, base: Array) -> Array:
 def _read_frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
     _refuse_too_many(table, "frames")
     frames: dict[str, Node] = {}
-    keys: dict[str, str] = {}
+    entries: dict[str, Table] = {}
     for key in table:
         name = _read_name(table, key, frames)
-        keys[name] = key
         if table.is_table(key):
-            entry = table.table(key)
-            frames[name] = Node(
-                parent=_read_name(entry, "on", (), entry.text("on", default=WORLD)), relation=_read_pose(entry, "at")
-            )
+            entry = entries[name] = table.table(key)
+            parent = _read_name(entry, "on", (), entry.text("on", default=WORLD))
+            frames[name] = Node(parent=parent, relation=_read_pose(entry, "at"))
             entry.refuse_unknown_keys()
         else:
             frames[name] = Node(parent=WORLD, relation=_read_pose(table, key))
     known = {WORLD, "STATION", *arms, *frames}
     max_depth = limit("hanging")
-    for name, node in frames.items():
-        if node.parent not in known:
-            near = closest(node.parent, known - {name})
+    for name, entry in entries.items():
+        parent = frames[name].parent
+        if parent not in known:
+            near = closest(parent, known - {name})
             hint = f"; did you mean {near}?" if near else ""
-            raise table.table(keys[name]).error(
-                "on", f"{name} is attached to {node.parent}, which is not a frame of the cell{hint}"
-            )
+            raise entry.error("on", f"{name} is attached to {parent}, which is not a frame of the cell{hint}")
         path = _path_to_root(name, frames, max_depth)
         if frames[path[-1]].parent == name:
             by = f" by way of {', '.join(path[1:])}" if len(path) > 1 else ""
-            raise table.table(keys[name]).error("on", f"{name} is attached to itself{by}")
+            raise entry.error("on", f"{name} is attached to itself{by}")
         if len(path) > max_depth:
-            raise table.table(keys[name]).error(
-                "on", f"{name} is too deep in the frame tree: {limit_message('hanging')}"
-            )
+            raise entry.error("on", f"{name} is too deep in the frame tree: {limit_message('hanging')}")
     return frames
 
 
