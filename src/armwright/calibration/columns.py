@@ -32,7 +32,7 @@ def measured_columns(arm: Arm) -> Schema:
             name=name,
             quantity=ANGLE if joint.revolute else LENGTH,
             synonyms=(name, f"q{i}", joint.name),
-            explanation=f"{arm.called(i - 1)} of {arm.name} is {joint.kind}",
+            explanation=f"{arm.joint_label(i - 1)} of {arm.name} is {joint.kind}",
         )
         for i, (name, joint) in enumerate(zip(joint_columns(arm), arm.joints, strict=True), 1)
     ]

@@ -32,9 +32,8 @@ def find_contradictions(calibration: Calibration, measured: Readings, noise: flo
     Raises:
         InvalidValueError: the noise is not above 0.
     """
-    outlying = np.zeros(len(measured), dtype=np.bool_)
-    outlying[list(calibration.outliers)] = True
-    count = int(outlying.sum())
+    outlying = np.isin(np.arange(len(measured)), calibration.outliers)
+    count = len(calibration.outliers)
     shared = _shared_joint(measured.q, outlying) if _MIN_COUNT <= count <= len(measured) - _MIN_COUNT else None
     if shared is not None:
         yield (
@@ -77,11 +76,9 @@ def _excess_residuals(calibration: Calibration, measured: Readings, noise: float
 
 def _shared_joint(q: Array, outlying: Flags) -> int | None:
     """Return the joint, from 0, by which outliers differ most from the others; None if it is not significant."""
-    joints = [i for i in range(q.shape[1]) if np.ptp(q[:, i]) > 0]
-    p_values = []
-    for i in joints:
+    p_values: dict[int, float] = {}
+    for i in np.flatnonzero(np.ptp(q, axis=0) > 0).tolist():
         away = np.abs(q[:, i] - np.median(q[~outlying, i]))
-        p_values.append(float(mannwhitneyu(away[outlying], away[~outlying], alternative="greater").pvalue))
-    if not joints or min(p_values) * len(joints) > _SIGNIFICANCE:
-        return None
-    return joints[int(np.argmin(p_values))]
+        p_values[i] = float(mannwhitneyu(away[outlying], away[~outlying], alternative="greater").pvalue)
+    best = min(p_values, key=p_values.__getitem__, default=None)
+    return None if best is None or p_values[best] * len(p_values) > _SIGNIFICANCE else best

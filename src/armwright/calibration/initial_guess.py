@@ -28,11 +28,7 @@ _MAX_ANGLE = 0.5
 _MIN_TARGET_ANGLE = 0.05
 # Points whose second width is a smaller part of the first lie on a line, and leave a rotation about it free.
 _COLLINEARITY = 1e-3
-_UNIT_MISTAKES = (
-    (1e3, "millimetres read as metres"),
-    (1e-3, "metres read as millimetres"),
-    (39.37, "inches read as metres"),
-)
+_UNIT_MISTAKES = {1e3: "millimetres read as metres", 1e-3: "metres read as millimetres", 39.37: "inches read as metres"}
 
 
 def initial_guess(
@@ -113,7 +109,7 @@ def _refuse_other_units(chain: Chain, readings: Readings, first: Array) -> None:
         ("distances are", np.linalg.norm(tool[pairs] - other, axis=1).sum(), readings.distances[pairs].sum()),
     ):
         ratio = float(measured) / max(float(nominal), 1e-12)
-        for factor, mistake in _UNIT_MISTAKES:
+        for factor, mistake in _UNIT_MISTAKES.items():
             if 0.8 < ratio / factor < 1.25:
                 raise ContradictionError(
                     f"the {what} {ratio:.4g} times as far as {chain.arm.name} reaches in these configurations: "

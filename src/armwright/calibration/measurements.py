@@ -230,7 +230,7 @@ def _refuse_other_units(table: UnitTable, arm: Arm, q: Array, headings: Sequence
             mistake = degrees_by_mistake(arm, np.where(np.arange(arm.n) == i, position, 0.0))
         elif not joint.revolute and max(position - upper, lower - position) > _MAX_LIMIT_EXCESS * (upper - lower):
             limits = f"{lower:.4g} to {upper:.4g} m"
-            mistake = f"{arm.called(i)} of {arm.name} is at {position:.4g} m, and its limits are {limits}"
+            mistake = f"{arm.joint_label(i)} of {arm.name} is at {position:.4g} m, and its limits are {limits}"
         if mistake:
             raise table.error(worst, heading.column.name, f"{mistake}; are the units right?")
 
@@ -242,13 +242,13 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequ
         scale, unit = heading.scale, heading.unit
         if len(q) > 1 and np.ptp(q[:, i]) < _MIN_MOTION:
             yield (
-                f"{arm.called(i)} never moved: it is at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. Its errors "
-                f"cannot be distinguished from those of its neighbours"
+                f"{arm.joint_label(i)} never moved: it is at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. Its "
+                f"errors cannot be distinguished from those of its neighbours"
             )
         beyond = (q[:, i] < joint.limits.lower - _MIN_MOTION) | (q[:, i] > joint.limits.upper + _MIN_MOTION)
         if beyond.any():
             yield (
-                f"{arm.called(i)} is beyond its limits of {joint.limits.lower / scale:.6g} to "
+                f"{arm.joint_label(i)} is beyond its limits of {joint.limits.lower / scale:.6g} to "
                 f"{joint.limits.upper / scale:.6g} {unit} in {_lines_of_rows(np.flatnonzero(beyond).tolist(), lines)}"
             )
     revolute = [i for i, joint in enumerate(arm.joints) if joint.revolute]

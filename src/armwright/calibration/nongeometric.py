@@ -160,6 +160,13 @@ class _Candidate(NamedTuple):
     reason_for_none: str
 
 
+class _Model(NamedTuple):
+    """What is fitted beside the geometry."""
+
+    joints: tuple[JointErrorModel, ...] = ()
+    with_residual_model: bool = False
+
+
 class _FoldedReadings:
     """Readings in folds, with the calibrations and residual models without some of them; each is fitted once.
 
@@ -200,29 +207,23 @@ class _FoldedReadings:
         residuals = train.points - self.calibration(left_out, joints).predict(train.q)
         return _fit_residuals(self.arm, train.q, residuals, self.seed)
 
-    def fold_errors(
-        self, fold: int, without: frozenset[int], joints: tuple[JointErrorModel, ...], *, with_residual_model: bool
-    ) -> HeldOutErrors:
+    def fold_errors(self, fold: int, without: frozenset[int], model: _Model) -> HeldOutErrors:
         """Return the errors of the readings of a fold, predicted without some folds."""
-        model = self.residual_model(without, joints) if with_residual_model else None
-        return _errors(self.calibration(without, joints), model, self.measured.take(self.folds[fold]))
+        residual_model = self.residual_model(without, model.joints) if model.with_residual_model else None
+        return _errors(self.calibration(without, model.joints), residual_model, self.measured.take(self.folds[fold]))
 
-    def held_out_errors(
-        self, left_out: frozenset[int], joints: tuple[JointErrorModel, ...], *, with_residual_model: bool = False
-    ) -> HeldOutErrors:
+    def held_out_errors(self, left_out: frozenset[int], model: _Model) -> HeldOutErrors:
         """Return the errors of readings, each predicted without its fold and without the folds that are left out."""
         held = HeldOutErrors.unknown(len(self.measured))
         for fold in set(range(len(self.folds))) - left_out:
-            errors = self.fold_errors(fold, left_out | {fold}, joints, with_residual_model=with_residual_model)
-            held.put(self.folds[fold], errors)
+            held.put(self.folds[fold], self.fold_errors(fold, left_out | {fold}, model))
         return held
 
 
 class _Selection(NamedTuple):
     """The model that held-out points have selected."""
 
-    joints: tuple[JointErrorModel, ...]
-    with_residual_model: bool
+    model: _Model
     geometry: HeldOutErrors
     held_out: HeldOutErrors
     comparisons: tuple[ModelComparison, ...]
@@ -256,10 +257,11 @@ def calibrate_nongeometric(
         raise InvalidValueError("expected points in the measuring frame, whose residuals are modelled; got none")
     nothing: frozenset[int] = frozenset()
     selection = _select(data, nothing, report)
+    joints, with_residual_model = selection.model
     report("fitting the accepted model")
     return NongeometricCalibration(
-        calibration=data.calibration(nothing, selection.joints),
-        residual_model=data.residual_model(nothing, selection.joints) if selection.with_residual_model else None,
+        calibration=data.calibration(nothing, joints),
+        residual_model=data.residual_model(nothing, joints) if with_residual_model else None,
         comparisons=selection.comparisons,
         geometry=selection.geometry,
         held_out=selection.held_out,
@@ -277,8 +279,7 @@ def _cross_validate_selection(data: _FoldedReadings, report: Callable[[str], Non
             selection = _select(data, left_out, lambda _: None)
         except (ContradictionError, InvalidValueError):
             return None
-        with_residual_model = selection.with_residual_model
-        held.put(rows, data.fold_errors(fold, left_out, selection.joints, with_residual_model=with_residual_model))
+        held.put(rows, data.fold_errors(fold, left_out, selection.model))
     return held
 
 
@@ -298,21 +299,21 @@ def _select(data: _FoldedReadings, left_out: frozenset[int], report: Callable[[s
         return compare_held_out(name, before.distance[points], after.distance[points], data.configuration[points])
 
     report("cross-validating: geometry")
-    geometry = held_out = data.held_out_errors(left_out, ())
+    model, geometry = _Model(), data.held_out_errors(left_out, _Model())
+    held_out = geometry
     mean = float(geometry.distance[points].mean())
     comparisons = {"geometry": ModelComparison("geometry", mean, 0.0, 0.0, accepted=True, reason="")}
 
-    def improve(name: str, joints: tuple[JointErrorModel, ...], **more: bool) -> HeldOutErrors | None:
-        """Compare a model with the one accepted before; return its held-out errors if it is accepted."""
+    def choose(name: str, candidate: _Model) -> tuple[_Model, HeldOutErrors]:
+        """Compare a model with the one accepted before; return the better one with its held-out errors."""
         try:
-            better = data.held_out_errors(left_out, joints, **more)
+            errors = data.held_out_errors(left_out, candidate)
         except (ContradictionError, InvalidValueError, MissingExtraError) as error:
             comparisons[name] = ModelComparison.rejected(name, str(error))
-            return None
-        comparisons[name] = compare(name, held_out, better)
-        return better if comparisons[name].accepted else None
+            return model, held_out
+        comparisons[name] = compare(name, held_out, errors)
+        return (candidate, errors) if comparisons[name].accepted else (model, held_out)
 
-    joints: tuple[JointErrorModel, ...] = ()
     accepted: list[_Candidate] = []
     for candidate in data.candidates:
         name, models, reason = candidate
@@ -320,23 +321,21 @@ def _select(data: _FoldedReadings, left_out: frozenset[int], report: Callable[[s
             comparisons[name] = ModelComparison.rejected(name, reason)
             continue
         report(f"cross-validating: {name}")
-        better = improve(name, (*joints, *models))
-        if better is not None:
-            joints, held_out = (*joints, *models), better
+        model, held_out = choose(name, _Model((*model.joints, *models)))
+        if comparisons[name].accepted:
             accepted.append(candidate)
     # A model that was accepted early may explain the same errors as a later one.
     for name, models, _ in accepted[:-1]:
         report(f"cross-validating: without {name}")
-        fewer = tuple(error for error in joints if error not in models)
+        fewer = _Model(tuple(error for error in model.joints if error not in models))
         without = data.held_out_errors(left_out, fewer)
         if not compare(name, without, held_out).accepted:
-            joints, held_out = fewer, without
+            model, held_out = fewer, without
             reason = "superfluous beside a later candidate"
             comparisons[name] = comparisons[name]._replace(accepted=False, reason=reason)
     report("modelling the residuals")
-    better = improve("Gaussian process of the residuals", joints, with_residual_model=True)
-    best = held_out if better is None else better
-    return _Selection(joints, better is not None, geometry, best, tuple(comparisons.values()))
+    model, held_out = choose("Gaussian process of the residuals", _Model(model.joints, with_residual_model=True))
+    return _Selection(model, geometry, held_out, tuple(comparisons.values()))
 
 
 def _errors(calibration: Calibration, model: ResidualModel | None, measured: Readings) -> HeldOutErrors:

@@ -96,9 +96,7 @@ def json_lines(text: str) -> LineTree:
     Raises:
         DuplicateKeyError: an object has a key twice.
     """
-    scanner = _Scanner(text, ":")
-    scanner.skip_blanks()
-    return scanner.scan_json()
+    return _Scanner(text, ":").scan_json()
 
 
 class _Scanner:
@@ -111,33 +109,32 @@ class _Scanner:
     def scan_toml(self) -> LineTree:
         """Scan TOML: headers, and keys below them."""
         top = table = LineTree(1)
-        self.skip_blanks()
+        self._skip_blanks()
         while self._offset < len(self._text):
             if self._text[self._offset] == "[":
                 table = self._scan_header(top)
             else:
                 self._scan_pair(table, ())
-            self.skip_blanks()
+            self._skip_blanks()
         return top
 
     def scan_json(self) -> LineTree:
         """Scan JSON: one value."""
         top = LineTree(1)
+        self._skip_blanks()
         self._scan_value(top, 0, (), 1)
         first = top.children[0]
         return first if isinstance(first, LineTree) else LineTree(1)
 
-    def skip_blanks(self) -> None:
+    def _skip_blanks(self) -> None:
         """Skip blanks, line ends and comments."""
         self._match(_BLANK)
 
     def _scan_value(self, parent: LineTree, key: str | int, path: Keys, line: int) -> None:
         """Scan a value, and store its line and those of the keys in it."""
         first = self._text[self._offset]
-        if first == "{":
-            self._scan_members(parent.child(key, line), path)
-        elif first == "[":
-            self._scan_elements(parent.child(key, line), path)
+        if first in "{[":
+            self._scan_container(parent.child(key, line), path, "}" if first == "{" else "]")
         else:
             parent.children.setdefault(key, line)
             self._match(_STRING if first in "\"'" else _SCALAR)
@@ -175,18 +172,18 @@ class _Scanner:
         if self._separator == ":" and last in table.children:
             raise DuplicateKeyError((*path, last), line)
         self._offset += 1  # the separator
-        self.skip_blanks()
+        self._skip_blanks()
         self._scan_value(table, last, (*path, last) if self._separator == ":" else (), line)
 
     def _scan_key(self) -> Iterator[str]:
         while True:
-            self.skip_blanks()
+            self._skip_blanks()
             if self._text[self._offset] in "\"'":
                 quoted = self._match(_STRING)
                 yield self._unquote(quoted) if "\\" in quoted else quoted[1:-1]
             else:
                 yield self._match(_BARE_KEY)
-            self.skip_blanks()
+            self._skip_blanks()
             if self._text[self._offset] != ".":
                 return
             self._offset += 1
@@ -195,26 +192,19 @@ class _Scanner:
         # The two know different escapes, and TOML two kinds of quotes: each parser reads its own.
         return str(json.loads(quoted)) if self._separator == ":" else next(iter(tomllib.loads(f"{quoted}=0")))
 
-    def _scan_members(self, table: LineTree, path: Keys) -> None:
+    def _scan_container(self, tree: LineTree, path: Keys, end: str) -> None:
+        """Scan a table or a list up to its closing brace or bracket."""
         self._offset += 1
-        self.skip_blanks()
-        while self._text[self._offset] != "}":
-            self._scan_pair(table, path)
-            self._skip_comma()
-        self._offset += 1
-
-    def _scan_elements(self, row: LineTree, path: Keys) -> None:
-        self._offset += 1
-        self.skip_blanks()
+        self._skip_blanks()
         index = 0
-        while self._text[self._offset] != "]":
-            self._scan_value(row, index, (*path, index), self._line)
-            self._skip_comma()
+        while self._text[self._offset] != end:
+            if end == "}":
+                self._scan_pair(tree, path)
+            else:
+                self._scan_value(tree, index, (*path, index), self._line)
+            self._skip_blanks()
+            if self._text[self._offset] == ",":
+                self._offset += 1
+                self._skip_blanks()
             index += 1
         self._offset += 1
-
-    def _skip_comma(self) -> None:
-        self.skip_blanks()
-        if self._text[self._offset] == ",":
-            self._offset += 1
-            self.skip_blanks()

@@ -45,9 +45,7 @@ LIMITS: Mapping[str, Limit] = {
     "attributes": Limit(100, "attributes", "attributes of an element in XML"),
     "digits": Limit(1000, "digits", "digits of an integer in TOML and JSON"),
     "entries": Limit(
-        10_000,
-        "entries",
-        "tables of a list such as `[[pose]]`, devices, answers of a camera, measured poses and runs",
+        10_000, "entries", "tables of a list such as `[[pose]]`, devices, answers of a camera, measured poses and runs"
     ),
     "joints": Limit(100, "joints", "joints of an arm, from the base to the tip"),
     "bodies": Limit(100, "bodies", "bodies of a linkage, and also its joints, pins with clearance, drives and loads"),

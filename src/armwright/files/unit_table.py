@@ -39,6 +39,8 @@ class RequiredCells(NamedTuple):
 
 # The text of a cell of one row by the name of its column; empty where the file has no such column.
 CellText: TypeAlias = Callable[[str], str]
+# Names of columns by those in a file, or names of units by quantities.
+NameMap: TypeAlias = Mapping[str, str] | None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -229,13 +231,7 @@ class Header:
                 yield " or ".join(self.headings[name].text for name in columns), expected
 
 
-def read_header(
-    path: Path | str,
-    schema: Schema,
-    *,
-    columns: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None,
-) -> Header:
+def read_header(path: Path | str, schema: Schema, *, columns: NameMap = None, units: NameMap = None) -> Header:
     """Read the names of the columns of a file.
 
     Args:
@@ -254,11 +250,7 @@ def read_header(
 
 
 def read_headers(
-    paths: Sequence[Path | str],
-    schema: Schema,
-    *,
-    columns: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None,
+    paths: Sequence[Path | str], schema: Schema, *, columns: NameMap = None, units: NameMap = None
 ) -> list[Header]:
     """Read the names of the columns of several files that belong together; see ``read_header``.
 

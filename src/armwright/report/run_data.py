@@ -150,12 +150,12 @@ def _finger_opening(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
 
 
 def _frame_tracks(
-    recording: Recording, t: Array, tool_poses: dict[str, Array], names: Sequence[str]
+    recording: Recording, t: Array, tools: dict[str, Array], names: Sequence[str]
 ) -> Iterator[FrameTrack]:
     poses = {name: np.tile(np.eye(4), (len(t), 1, 1)) for name in names}
     first: dict[str, int] = {}
     for _, rows, tree in _valid_trees(recording, t):
-        known: dict[str, Array] = {WORLD: np.eye(4), **{arm: X[rows] for arm, X in tool_poses.items()}}
+        known: dict[str, Array] = {WORLD: np.eye(4), **{arm: X[rows] for arm, X in tools.items()}}
         for name in names:
             if _add_world_pose(name, tree, known):
                 poses[name][rows] = known[name]
