@@ -13,7 +13,7 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
 from armwright.program.semantics import type_check
-from armwright.program.semantics.expression_types import ACCEPTED_TYPES, TYPE_OF_KIND, ExpressionType, type_phrase
+from armwright.program.semantics.expression_types import ACCEPTED_TYPES, TYPE_OF_KIND, ExpressionType, type_texts
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
@@ -133,7 +133,7 @@ def evaluate_as(machine: Machine, frame: StackFrame, text: str, kind: VariableKi
     parsed = parse_expression(text, machine, frame.procedure)
     expected = TYPE_OF_KIND[kind]
     if parsed.type not in ACCEPTED_TYPES[expected]:
-        actual = "an array" if parsed.type is None else type_phrase(parsed.node, parsed.type)
+        actual = "an array" if parsed.type is None else type_texts(parsed.node, parsed.type)[0]
         raise ExpressionError(f"expected {expected.value}, but `{text}` is {actual}")
     return evaluate(machine, frame, parsed)
 

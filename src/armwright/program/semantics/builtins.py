@@ -1,19 +1,12 @@
-"""The functions of the language: what they take and what they give."""
+"""The built-in functions of the language: their parameters, and the types of their results."""
 
 from collections.abc import Mapping, Sequence
 
 import attrs
 
+from armwright.errors import counted
 from armwright.program.language.units import Dimension
-from armwright.program.semantics import events
-from armwright.program.semantics.expression_types import (
-    ACCEPTED_TYPES,
-    ExpressionType,
-    quote_expression,
-    type_phrase,
-    variable_keys,
-    without_article,
-)
+from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType, quote_expression, variable_keys
 from armwright.program.semantics.quantities import check_unit
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.syntax import tree
@@ -21,15 +14,15 @@ from armwright.program.syntax import tree
 AXES = ("X", "Y", "Z")
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen
 class Signature:
-    """What a function takes and gives.
+    """The parameters and the result of a function.
 
     Attributes:
-        takes: the arguments, as a message says it.
-        count: how many.
-        sorts: what each argument may be.
-        gives: the sort of the value; of INV it depends on the argument.
+        parameters: as a message says it.
+        count: how many there are.
+        argument_types: what each argument may be.
+        result: the type of the value; of INV it depends on the argument.
         dimension: what a number with a unit must measure.
     """
 
@@ -41,31 +34,14 @@ class Signature:
 
 
 _SCALARS = ACCEPTED_TYPES[ExpressionType.SCALAR]
-_ROTATION = Signature(
-    parameters="one angle", count=1, argument_types=_SCALARS, result=ExpressionType.TRANS, dimension="angle"
-)
+_FRAMES = ACCEPTED_TYPES[ExpressionType.FRAME]
+_INVERTIBLE = ACCEPTED_TYPES[ExpressionType.TRANS] | {ExpressionType.FRAME, ExpressionType.INVERSE}
 FUNCTIONS: Mapping[str, Signature] = {
-    "XYZ": Signature(
-        parameters="three lengths", count=3, argument_types=_SCALARS, result=ExpressionType.TRANS, dimension="length"
-    ),
-    "ROTX": _ROTATION,
-    "ROTY": _ROTATION,
-    "ROTZ": _ROTATION,
-    "INV": Signature(
-        parameters="one TRANS or FRAME",
-        count=1,
-        argument_types=ACCEPTED_TYPES[ExpressionType.TRANS] | {ExpressionType.FRAME, ExpressionType.INVERSE},
-        result=ExpressionType.TRANS,
-    ),
-    "DIST": Signature(
-        parameters="two FRAMEs",
-        count=2,
-        argument_types=ACCEPTED_TYPES[ExpressionType.FRAME],
-        result=ExpressionType.SCALAR,
-    ),
-    "FORCE": Signature(
-        parameters="one axis, X, Y or Z", count=1, argument_types=frozenset(), result=ExpressionType.SCALAR
-    ),
+    "XYZ": Signature("three lengths", 3, _SCALARS, ExpressionType.TRANS, "length"),
+    **dict.fromkeys(("ROTX", "ROTY", "ROTZ"), Signature("one angle", 1, _SCALARS, ExpressionType.TRANS, "angle")),
+    "INV": Signature("one TRANS or FRAME", 1, _INVERTIBLE, ExpressionType.TRANS),
+    "DIST": Signature("two FRAMEs", 2, _FRAMES, ExpressionType.SCALAR),
+    "FORCE": Signature("one axis, X, Y or Z", 1, frozenset(), ExpressionType.SCALAR),
 }
 _INVERSES = {ExpressionType.FRAME: ExpressionType.INVERSE, ExpressionType.INVERSE: ExpressionType.FRAME}
 
@@ -76,56 +52,35 @@ def result_type(
     """Return the type of the result of a built-in function, and report what is wrong with its arguments.
 
     Args:
-        names: for what is found.
+        names: the names, and where errors are reported.
         node: a call of one of ``FUNCTIONS``.
         argument_types: types of the arguments; not used where the argument is an axis.
     """
-    signature = FUNCTIONS[node.name.key]
+    key, signature = node.name.key, FUNCTIONS[node.name.key]
+    required = f"{key} takes {signature.parameters}"
     if len(node.arguments) != signature.count:
-        plural = "s" * (len(node.arguments) != 1)
-        text = f"{node.name.key} takes {signature.parameters}, not {len(node.arguments)} argument{plural}"
-        names.report("E220", text, node.span, f"{len(node.arguments)} argument{plural} here")
-        return signature.result if node.name.key != "INV" else None
-    if node.name.key == "FORCE":
+        count = counted(len(node.arguments), "argument")
+        names.report("E220", f"{required}, not {count}", node.span, f"{count} here")
+        return signature.result if key != "INV" else None
+    if key == "FORCE":
         _check_axis(names, node.arguments[0])
         return signature.result
     for argument, argument_type in zip(node.arguments, argument_types, strict=True):
-        if argument_type is None:
-            continue
-        if argument_type not in signature.argument_types:
-            _report_wrong_argument(names, node, argument, argument_type)
-        elif signature.dimension is not None:
-            check_unit(names, argument, signature.dimension, f"{node.name.key} takes {signature.parameters}")
-    if node.name.key != "INV":
+        if argument_type is ExpressionType.EVENT:
+            names.report_event(argument)
+        elif argument_type is not None and argument_type not in signature.argument_types:
+            names.report_type("E220", argument, argument_type, required)
+        elif argument_type is not None and signature.dimension is not None:
+            check_unit(names, argument, signature.dimension, required)
+    if key != "INV":
         return signature.result
-    return (
-        None
-        if argument_types[0] not in signature.argument_types
-        else _INVERSES.get(argument_types[0], argument_types[0])
-    )
+    inverted = argument_types[0]
+    return _INVERSES.get(inverted, inverted) if inverted in signature.argument_types else None
 
 
 def _check_axis(names: NameResolver, node: tree.Expression) -> None:
     if isinstance(node, tree.Poison) or (isinstance(node, tree.Name) and node.key in AXES):
         return
     names.mark_used(variable_keys(node))
-    names.report(
-        "E220",
-        f"FORCE takes one axis, X, Y or Z, not {quote_expression(node)}",
-        node.span,
-        "no axis",
-        advice="write `FORCE(Z)`",
-    )
-
-
-def _report_wrong_argument(
-    names: NameResolver, node: tree.Function, argument: tree.Expression, argument_type: ExpressionType
-) -> None:
-    if argument_type is ExpressionType.EVENT:
-        events.report_event_as_value(names, argument)
-        return
-    what, takes = type_phrase(argument, argument_type), FUNCTIONS[node.name.key].parameters
-    text = f"{node.name.key} takes {takes}, but {quote_expression(argument)} is {what}"
-    names.report(
-        "E220", text, argument.span, without_article(what), secondary=names.declaration_labels(*variable_keys(argument))
-    )
+    text = f"FORCE takes one axis, X, Y or Z, not {quote_expression(node)}"
+    names.report("E220", text, node.span, "no axis", advice="write `FORCE(Z)`")

@@ -1,7 +1,8 @@
-"""Calls of procedures: as many arguments as there are parameters, each of the right kind, and fit to be changed."""
+"""Calls of procedures: an argument for each parameter, of its type, and a variable where the procedure changes it."""
 
 import attrs
 
+from armwright.errors import counted
 from armwright.program.language.diagnostic import Fix, Label, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
@@ -17,11 +18,12 @@ from armwright.program.syntax import tree
 # What a misspelt call with parentheses may have been meant as, beside a procedure.
 _STATEMENTS = ("PRINT", "LOCK")
 _POSE_NUMBERS = 12
+_ROOT = "the root of all frames"
 
 
 @attrs.frozen
 class _ReferenceArgument:
-    """An argument that the procedure sees itself, not a copy of it."""
+    """An argument passed by reference."""
 
     caller: ProcedureSymbols | None
     argument: tree.Name | tree.ArmName
@@ -42,74 +44,54 @@ class CallChecker:
         """Check one call."""
         names, arguments = self._names, node.arguments
         procedure = names.resolve_call(node.name.key)
-        if procedure is None:
-            _report_unknown_procedure(names, node)
         if procedure is None or len(arguments) != len(procedure.parameters):
-            for argument in arguments:
-                _check_unknown_argument(names, argument)
-            if procedure is not None:
+            if procedure is None:
+                _report_unknown_procedure(names, node)
+            else:
                 _report_wrong_count(names, node, procedure)
+            for argument in arguments:
+                type_check.check_any(names, argument)
             return
         for position, (argument, parameter) in enumerate(zip(arguments, procedure.parameters, strict=True)):
             kind = procedure.types.get(parameter)
             if kind is None or procedure.parameters.index(parameter) != position:
-                # Something has been said of this parameter.
-                _check_unknown_argument(names, argument)
+                # Its declaration has been reported.
+                type_check.check_any(names, argument)
                 continue
             _check_argument(names, argument, procedure, parameter, kind)
             if kind == VariableType(VariableKind.FRAME) and isinstance(argument, tree.Name | tree.ArmName):
                 self._reference_arguments.append(_ReferenceArgument(caller, argument, procedure, parameter))
 
     def note_change(self, node: tree.Expression, inside: ProcedureSymbols | None, span: Span) -> None:
-        """Take note that a statement gives a value to a variable, or hangs it elsewhere."""
+        """Note that a statement assigns a value to a variable, or affixes or unfixes it."""
         if inside is not None and isinstance(node, tree.Name) and node.key in inside.parameters:
             self._changed.setdefault((id(inside), node.key), span)
 
     def report_fixed_arguments(self) -> None:
-        """Say which arguments can be changed by nobody, though the procedure changes them."""
+        """Report arms and WORLD as arguments of a procedure that changes the parameter."""
         self._propagate_changes()
-        for passed_ in self._reference_arguments:
-            changed = self._changed.get((id(passed_.procedure), passed_.parameter))
-            argument = passed_.argument
-            fixed = isinstance(argument, tree.ArmName) or (
-                argument.key == WORLD and (passed_.caller is None or WORLD not in passed_.caller.types)
-            )
-            if changed is None or not fixed:
+        for reference in self._reference_arguments:
+            changed = self._changed.get((id(reference.procedure), reference.parameter))
+            argument, caller = reference.argument, reference.caller
+            is_arm = isinstance(argument, tree.ArmName)
+            is_world = argument.key == WORLD and (caller is None or WORLD not in caller.types)
+            if changed is None or not (is_arm or is_world):
                 continue
-            procedure, parameter = (
-                passed_.procedure.node.name.text,
-                _parameter_text(passed_.procedure, passed_.parameter),
-            )
-            text = f"`{procedure}` changes its parameter `{parameter}`, and `{argument.text}` cannot be changed"
-            label = "an arm" if isinstance(argument, tree.ArmName) else "the root of all frames"
-            here = labels(changed, "changed here")
+            parameter = _parameter_text(reference.procedure, reference.parameter)
+            changes = f"`{reference.procedure.node.name.text}` changes its parameter `{parameter}`"
+            text, label = f"{changes}, and `{argument.text}` cannot be changed", "an arm" if is_arm else _ROOT
             note = "a FRAME is passed by reference: the procedure changes the frame itself"
-            self._names.report("E220", text, argument.span, label, secondary=here, note=note)
+            self._names.report("E220", text, argument.span, label, secondary=labels(changed, "changed here"), note=note)
 
     def _propagate_changes(self) -> None:
-        """A parameter that is handed on to where it is changed is changed too."""
-        callers = [
-            passed_
-            for passed_ in self._reference_arguments
-            if passed_.caller and passed_.argument.key in passed_.caller.parameters
-        ]
-        news = True
-        while news:
-            news = False
-            for passed_ in callers:
-                key = (id(passed_.caller), passed_.argument.key)
-                changed = self._changed.get((id(passed_.procedure), passed_.parameter))
-                if changed is not None and key not in self._changed:
-                    self._changed[key] = changed
-                    news = True
-
-
-def _check_unknown_argument(names: NameResolver, argument: tree.Expression) -> None:
-    """Check an argument of which nothing is known: an array may be whole."""
-    if isinstance(argument, tree.Name):
-        names.type(argument)
-    else:
-        type_check.infer_type(names, argument)
+        """Note that a parameter is changed if it is passed on to a procedure that changes it."""
+        count = -1
+        while len(self._changed) > count:
+            count = len(self._changed)
+            for reference in self._reference_arguments:
+                changed = self._changed.get((id(reference.procedure), reference.parameter))
+                if changed is not None:
+                    self.note_change(reference.argument, reference.caller, changed)
 
 
 def _check_argument(
@@ -117,20 +99,15 @@ def _check_argument(
 ) -> None:
     what = f"parameter `{_parameter_text(procedure, parameter)}` of `{procedure.node.name.text}` is "
     if not kind.sizes:
-        takes = TYPE_OF_KIND[kind.kind]
-        type_check.require_type(names, argument, takes, "E220", what + takes.value)
-        return
-    if not isinstance(argument, tree.Name):
-        is_one = type_check.infer_type(names, argument)
-        if is_one is not None:
-            text = f"{what}an {kind}, but {quote_expression(argument)} is {is_one.value}"
+        required = TYPE_OF_KIND[kind.kind]
+        type_check.require_type(names, argument, required, "E220", what + required.value)
+    elif not isinstance(argument, tree.Name):
+        if (actual := type_check.infer_type(names, argument)) is not None:
+            text = f"{what}an {kind}, but {quote_expression(argument)} is {actual.value}"
             names.report("E220", text, argument.span, "no array")
-        return
-    argument_type = names.type(argument)
-    if argument_type is None or argument_type == kind:
-        return
-    message = f"{what}an {kind}, but `{argument.text}` is {declared_type_phrase(argument_type)}"
-    names.report("E220", message, argument.span, f"{argument_type}", secondary=names.declaration_labels(argument.key))
+    elif (array := names.type(argument)) is not None and array != kind:
+        text = f"{what}an {kind}, but `{argument.text}` is {declared_type_phrase(array)}"
+        names.report("E220", text, argument.span, f"{array}", secondary=names.declaration_labels(argument.key))
 
 
 def _parameter_text(procedure: ProcedureSymbols, parameter: str) -> str:
@@ -138,45 +115,41 @@ def _parameter_text(procedure: ProcedureSymbols, parameter: str) -> str:
 
 
 def _report_wrong_count(names: NameResolver, node: tree.Call, procedure: ProcedureSymbols) -> None:
-    takes, given = len(procedure.parameters), len(node.arguments)
-    listed = ", ".join(
-        f"{', '.join(name.text for name in declaration.names)} : {declaration.type.text}"
-        for declaration in procedure.node.parameters
-    )
-    text = f"`{node.name.text}` takes {takes} argument{'s' * (takes != 1)}, not {given}"
-    head, advice = labels(procedure.node.head, "declared here"), f"its parameters are ({listed})" if takes else ""
-    names.report("E220", text, node.span, f"{given} given here", secondary=head, advice=advice)
+    declared = ((", ".join(name.text for name in part.names), part.type.text) for part in procedure.node.parameters)
+    listed = ", ".join(f"{parameters} : {kind}" for parameters, kind in declared)
+    count = len(node.arguments)
+    text = f"`{node.name.text}` takes {counted(len(procedure.parameters), 'argument')}, not {count}"
+    head = labels(procedure.node.head, "declared here")
+    advice = f"its parameters are ({listed})" if procedure.parameters else ""
+    names.report("E220", text, node.span, f"{count} given here", secondary=head, advice=advice)
 
 
 def _report_unknown_procedure(names: NameResolver, node: tree.Call) -> None:
     name = node.name
     if not names.is_first_report("E227", name.key):
         return
-    kind = names.type_of_key(name.key)
+    kind = names.scope.type(name.key)
     secondary: tuple[Label, ...] = ()
     fixes: tuple[Fix, ...] = ()
     if kind is not None:
         names.mark_used([name.key])
         message, label = f"`{name.text}` is {declared_type_phrase(kind)} and no procedure", "no procedure"
         secondary = names.declaration_labels(name.key)
-        help_ = f"elements are written in `[ ]`: `{name.text}[...]`" if kind.sizes else ""
+        advice = f"elements are written in `[ ]`: `{name.text}[...]`" if kind.sizes else ""
         if not kind.sizes and node.arguments:
             # No other statement begins with a variable.
-            help_ = f"to give it a value write `{name.text} = ...`"
+            advice = f"to give it a value write `{name.text} = ...`"
             numbers = (1,) if kind.kind is VariableKind.SCALAR else (1, _POSE_NUMBERS)
             fixes = (Fix(Span(name.span.end, name.span.end), " ="),) if len(node.arguments) in numbers else ()
     elif name.key in FUNCTIONS:
         message, label = f"`{name.key}` is a function and no statement", "its value is not used"
-        help_ = f"assign its value: `... = {name.text}(...)`"
+        advice = f"assign its value: `... = {name.text}(...)`"
     else:
+        procedures = names.symbols.procedures.values()
         near = FOREIGN_STATEMENTS.get(name.key) or names.closest_name(
-            name.text, lambda: [*_procedure_names(names), *_STATEMENTS]
+            name.text, lambda: [*(procedure.node.name.text for procedure in procedures), *_STATEMENTS]
         )
         message, label = f"unknown procedure `{name.text}`", "unknown procedure"
         otherwise = UNSUPPORTED_STATEMENTS.get(name.key, "declare it with PROCEDURE before BEGIN")
-        help_ = f"did you mean `{near}`?" if near else otherwise
-    names.report("E227", message, name.span, label, secondary=secondary, advice=help_, fixes=fixes)
-
-
-def _procedure_names(names: NameResolver) -> list[str]:
-    return [procedure.node.name.text for procedure in names.symbols.procedures.values()]
+        advice = f"did you mean `{near}`?" if near else otherwise
+    names.report("E227", message, name.span, label, secondary=secondary, advice=advice, fixes=fixes)

@@ -10,13 +10,7 @@ from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
-CHECKS: Checks = {
-    **frames.CHECKS,
-    **devices.CHECKS,
-    **move.CHECKS,
-    **control_flow.CHECKS,
-    **output.CHECKS,
-}
+CHECKS: Checks = {**frames.CHECKS, **devices.CHECKS, **move.CHECKS, **control_flow.CHECKS, **output.CHECKS}
 
 
 def check(

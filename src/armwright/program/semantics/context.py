@@ -38,12 +38,8 @@ class Context:
         for statement in statements:
             self.checks[type(statement)](self, statement)
 
-    def check_concurrent(self, statement: tree.Statement) -> None:
-        """Check what runs beside the statements around it: it cannot start their TRY again."""
-        self.check_with(statement, recovering=False)
-
     def check_with(self, *statements: tree.Statement, recovering: bool) -> None:
-        """Check statements as those of a RECOVER part, or as others."""
+        """Check statements of a RECOVER part, or others: concurrent ones cannot RETRY the TRY around them."""
         outside, self.recovering = self.recovering, recovering
         self.check(*statements)
         self.recovering = outside

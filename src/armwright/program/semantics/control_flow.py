@@ -1,17 +1,11 @@
-"""Control flow: choices, loops, processes, events, locks, recovery, calls."""
+"""Conditionals, loops, concurrent branches, events, locks, recovery and calls."""
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType, declared_type_phrase
 from armwright.program.semantics.quantities import check_range, check_unit
-from armwright.program.semantics.scopes import NameResolver
-from armwright.program.semantics.type_check import infer_type, require_condition, require_quantity, require_type
+from armwright.program.semantics.type_check import check_any, require_condition, require_quantity, require_type
 from armwright.program.syntax import tree
-
-
-def block(context: Context, node: tree.Block) -> None:
-    """Check the statements of a block."""
-    context.check(*node.statements)
 
 
 def if_(context: Context, node: tree.If) -> None:
@@ -61,23 +55,14 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     for branch in node.branches:
         if branch.priority is not None:
             check_unit(context.names, branch.priority, None, "a priority has no unit")
-        context.check_concurrent(branch.body)
+        context.check_with(branch.body, recovering=False)
 
 
-def signal(context: Context, node: tree.Signal) -> None:
-    """Check the event of a SIGNAL."""
-    _event(context.names, node.event, "SIGNAL")
-
-
-def wait(context: Context, node: tree.Wait) -> None:
-    """Check the event of a WAIT."""
-    _event(context.names, node.event, "WAIT")
-
-
-def _event(names: NameResolver, node: tree.Variable, who: str) -> None:
-    """Check what SIGNAL or WAIT is about."""
+def event(context: Context, node: tree.Signal | tree.Wait) -> None:
+    """Check the event of a SIGNAL or WAIT."""
+    what = f"{type(node).__name__.upper()} needs an EVENT"
     advice = "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`"
-    require_type(names, node, ExpressionType.EVENT, "E223", f"{who} needs an EVENT", advice=lambda _: advice)
+    require_type(context.names, node.event, ExpressionType.EVENT, "E223", what, advice=lambda _: advice)
 
 
 def pause(context: Context, node: tree.Pause) -> None:
@@ -87,12 +72,9 @@ def pause(context: Context, node: tree.Pause) -> None:
 
 
 def lock(context: Context, node: tree.Lock) -> None:
-    """Check what is locked, which may be of any kind, and a whole array too; then the body."""
+    """Check what is locked, which may be of any type, and a whole array too; then the body."""
     for target in node.targets:
-        if isinstance(target, tree.Name):
-            context.names.type(target)
-        else:
-            infer_type(context.names, target)
+        check_any(context.names, target)
     context.check(node.body)
 
 
@@ -105,37 +87,31 @@ def try_(context: Context, node: tree.Try) -> None:
 def retry(context: Context, node: tree.Retry) -> None:
     """Check that a RETRY stands in a RECOVER part."""
     if not context.recovering:
-        text = "RETRY is outside of RECOVER"
+        text, advice = "RETRY is outside of RECOVER", "write `TRY ... RECOVER ... RETRY END`"
         note = "RETRY repeats the TRY of the RECOVER that contains it"
-        context.names.report(
-            "E225", text, node.span, "retry what?", note=note, advice="write `TRY ... RECOVER ... RETRY END`"
-        )
+        context.names.report("E225", text, node.span, "retry what?", note=note, advice=advice)
 
 
-def call(context: Context, node: tree.Call) -> None:
-    """Check procedure and arguments of a call."""
-    context.calls.check(node, context.procedure)
-
-
-def mention(context: Context, node: tree.Poison) -> None:
-    """Use the names of what could not be read."""
-    context.names.mark_skipped(node.names)
+def poison(context: Context, node: tree.Poison) -> None:
+    """Report nothing of the names in a statement that could not be parsed."""
+    context.names.mark_used(node.names)
+    context.names.poison(*node.names)
 
 
 CHECKS: Checks = {
-    tree.Block: block,
+    tree.Block: lambda context, node: context.check(*node.statements),
     tree.If: if_,
     tree.While: while_,
     tree.Repeat: repeat,
     tree.For: for_,
     tree.Cobegin: cobegin,
-    tree.Signal: signal,
-    tree.Wait: wait,
+    tree.Signal: event,
+    tree.Wait: event,
     tree.Pause: pause,
     tree.Lock: lock,
     tree.Try: try_,
     tree.Retry: retry,
     tree.Halt: lambda *_: None,
-    tree.Call: call,
-    tree.Poison: mention,
+    tree.Call: lambda context, node: context.calls.check(node, context.procedure),
+    tree.Poison: poison,
 }

@@ -1,5 +1,6 @@
-"""OPEN, GRASP, OPERATE and READ: grippers, devices and sensors."""
+"""OPEN, GRASP, OPERATE and READ: the arms, devices and frames that they name."""
 
+from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import (
@@ -11,7 +12,6 @@ from armwright.program.semantics.expression_types import (
 from armwright.program.semantics.quantities import check_range
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.type_check import (
-    declaration_labels,
     infer_type,
     is_world,
     report_world_assignment,
@@ -29,11 +29,6 @@ def open_(context: Context, node: tree.Open) -> None:
         check_range(names, node.width, "a width", zero=True)
 
 
-def grasp(context: Context, node: tree.Grasp) -> None:
-    """Check the arm of one GRASP, if it names one."""
-    _arm(context.names, node.arm, "GRASP")
-
-
 def operate(context: Context, node: tree.Operate) -> None:
     """Check that OPERATE names a device; devices are not declared."""
     names, device = context.names, node.device
@@ -46,26 +41,16 @@ def operate(context: Context, node: tree.Operate) -> None:
 
 def read_visions(context: Context, node: tree.ReadVisions) -> None:
     """Check the frames that the camera is to find."""
+    names, what = context.names, "READ VISIONS finds a FRAME"
     for target in node.targets:
         context.note_change(target, node.span)
-        _vision_target(context.names, target)
-
-
-def _vision_target(names: NameResolver, target: tree.Mobile) -> None:
-    """Check a frame that the camera is to find."""
-    if isinstance(target, tree.ArmName):
-        help_ = f"write `READ SYSTEM ({target.key})` to read the arm"
-        text = f"READ VISIONS finds a FRAME, but `{target.text}` is an arm"
-        names.report("E215", text, target.span, "an arm", advice=help_)
-    elif is_world(target):
-        report_world_assignment(names, target)
-    else:
-        require_type(names, target, ExpressionType.FRAME, "E215", "READ VISIONS finds a FRAME")
-
-
-def read_system(context: Context, node: tree.ReadSystem) -> None:
-    """Check the arm whose sensors are read."""
-    _arm(context.names, node.arm, "READ SYSTEM")
+        if isinstance(target, tree.ArmName):
+            advice = f"write `READ SYSTEM ({target.key})` to read the arm"
+            names.report("E215", f"{what}, but `{target.text}` is an arm", target.span, "an arm", advice=advice)
+        elif is_world(target):
+            report_world_assignment(names, target)
+        else:
+            require_type(names, target, ExpressionType.FRAME, "E215", what)
 
 
 def _arm(names: NameResolver, node: tree.Mobile | None, who: str) -> None:
@@ -77,27 +62,25 @@ def _arm(names: NameResolver, node: tree.Mobile | None, who: str) -> None:
         return
     key = node.key if isinstance(node, tree.Name) else node.name.key
     names.mark_used([key])
-    if names.is_poisoned(key):
+    if names.scope.is_poisoned(key):
         return
     near = names.closest_name(expression_text(node), names.arm_names)
-    kind = names.type_of_key(key)
+    kind = names.scope.type(key)
     if isinstance(node, tree.Index):
-        sort_ = infer_type(names, node)
-        if sort_ is None:
+        element_type = infer_type(names, node)
+        if element_type is None:
             return
-        kind = VariableType(VariableKind[sort_.name])
-    is_one = "is no arm" if kind is None else f"is {declared_type_phrase(kind)}"
-    text = f"{who} needs an arm, but {quote_expression(node)} {is_one}"
-    advice = f"did you mean `{near}`?" if near else f"write the name of an arm, such as `{names.arm_names()[0]}`"
-    names.report(
-        "E201", text, node.span, str(kind or "not an arm"), secondary=declaration_labels(names, node), advice=advice
-    )
+        kind = VariableType(VariableKind[element_type.name])
+    phrase = "no arm" if kind is None else declared_type_phrase(kind)
+    text, label = f"{who} needs an arm, but {quote_expression(node)} is {phrase}", str(kind or "not an arm")
+    advice = did_you_mean(near) or f"write the name of an arm, such as `{names.arm_names()[0]}`"
+    names.report("E201", text, node.span, label, secondary=names.declaration_labels(key), advice=advice)
 
 
 CHECKS: Checks = {
     tree.Open: open_,
-    tree.Grasp: grasp,
+    tree.Grasp: lambda context, node: _arm(context.names, node.arm, "GRASP"),
     tree.Operate: operate,
     tree.ReadVisions: read_visions,
-    tree.ReadSystem: read_system,
+    tree.ReadSystem: lambda context, node: _arm(context.names, node.arm, "READ SYSTEM"),
 }

@@ -1,4 +1,4 @@
-"""What expressions are: the kinds of variables, and what is none of them; and how a message speaks of both."""
+"""Types of expressions, those of variables among them, and how a message names a type or an expression."""
 
 import enum
 
@@ -6,7 +6,7 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.words import COMPARISONS, PRECEDENCE, PRECEDENCE_OF_NOT
 from armwright.program.syntax import tree
 
-# A longer expression is not repeated in a message; its pose is marked anyway.
+# A longer expression is not repeated in a message, which marks it in the text anyway.
 _MAX_SHOWN_LENGTH = 32
 # In advice it is repeated up to here.
 _MAX_WRITTEN_LENGTH = 100
@@ -15,7 +15,7 @@ _MINUS, _ATOM = 7, 8
 
 
 class ExpressionType(enum.Enum):
-    """What the value of an expression is.
+    """The type of the value of an expression.
 
     ``MATRIX`` is twelve numbers that may be a FRAME or a TRANS, ``INVERSE`` what INV makes of a FRAME: the step
     from it back to the world, which makes sense in front of another FRAME only.
@@ -30,6 +30,7 @@ class ExpressionType(enum.Enum):
     INVERSE = "the inverse of a FRAME"
 
 
+# The kinds of variables as types.
 TYPE_OF_KIND = {kind: ExpressionType[kind.name] for kind in VariableKind}
 # What each kind of variable, parameter or operand takes.
 ACCEPTED_TYPES = {expression_type: frozenset({expression_type}) for expression_type in ExpressionType} | {
@@ -38,22 +39,17 @@ ACCEPTED_TYPES = {expression_type: frozenset({expression_type}) for expression_t
 }
 
 
-def type_phrase(node: tree.Expression, expression_type: ExpressionType) -> str:
-    """Return what an expression is, with its article: of arms and numbers in the words of users."""
-    if isinstance(node, tree.ArmName):
-        return "an arm"
-    return "a number" if isinstance(node, tree.Number) else expression_type.value
+def type_texts(node: tree.Expression, expression_type: ExpressionType) -> tuple[str, str]:
+    """Return how a message and its label name the type of an expression: ``a FRAME`` and ``FRAME``, or ``an arm``."""
+    names = {tree.ArmName: "an arm", tree.Number: "a number"}
+    phrase = names.get(type(node), expression_type.value)
+    last = phrase.split(" ", 1)[1]
+    return phrase, last if last.isupper() else phrase
 
 
 def declared_type_phrase(kind: VariableType) -> str:
     """Return a type with its article, such as ``an ARRAY [2,3] OF FRAME``."""
     return f"{'an' if kind.sizes or kind.kind is VariableKind.EVENT else 'a'} {kind}"
-
-
-def without_article(words: str) -> str:
-    """Return words without their article where they are a type: ``FRAME``, but ``an arm``."""
-    last = words.split(" ", 1)[1]
-    return last if last.isupper() else words
 
 
 def variable_keys(node: tree.Expression) -> tuple[str, ...]:
@@ -89,22 +85,17 @@ def _text_and_precedence(node: tree.Expression) -> tuple[str, int]:
                 left_text = text if own >= strength + (link.operation in COMPARISONS) else f"({text})"
                 text, own = f"{left_text} {link.operation} {_operand_text(link.right, strength + 1)}", strength
             return text, own
-        case _:
-            return _atom_text(node), _ATOM
-
-
-def _atom_text(node: tree.Expression) -> str:
-    match node:
         case tree.Name(text=text) | tree.ArmName(text=text) | tree.Number(text=text):
-            return text
+            pass
         case tree.Index(name=name, indices=items):
-            return f"{name.text}[{','.join(map(expression_text, items))}]"
+            text = f"{name.text}[{','.join(map(expression_text, items))}]"
         case tree.Function(name=name, arguments=items):
-            return f"{name.text}({', '.join(map(expression_text, items))})"
+            text = f"{name.text}({', '.join(map(expression_text, items))})"
         case tree.Matrix(items=items):
-            return f"({', '.join(map(expression_text, items))})"
+            text = f"({', '.join(map(expression_text, items))})"
         case _:
-            return "..."
+            text = "..."
+    return text, _ATOM
 
 
 def _operand_text(node: tree.Expression, strength: int) -> str:

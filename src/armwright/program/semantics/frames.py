@@ -1,26 +1,18 @@
-"""AFFIX, UNFIX and assignments: what gives variables their values and frames their parents."""
+"""Assignments, AFFIX and UNFIX: the variables they change, and the types of values, parents and transformations."""
 
 from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.language.words import Standard
-from armwright.program.semantics import events
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import (
     ACCEPTED_TYPES,
     ExpressionType,
     expression_text,
     quote_expression,
-    type_phrase,
+    type_texts,
     variable_keys,
-    without_article,
 )
 from armwright.program.semantics.scopes import NameResolver
-from armwright.program.semantics.type_check import (
-    declaration_labels,
-    infer_type,
-    is_world,
-    report_world_assignment,
-    require_type,
-)
+from armwright.program.semantics.type_check import infer_type, is_world, report_world_assignment, require_type
 from armwright.program.syntax import tree
 
 _VALUE_PHRASES = {
@@ -31,56 +23,57 @@ _VALUE_PHRASES = {
 
 
 def assign(context: Context, node: tree.Assign) -> None:
-    """Check that a variable can be given a value, and gets one of its kind."""
+    """Check that a variable can be assigned a value, and is assigned one of its type."""
     context.note_change(node.target, node.span)
     names, target = context.names, node.target
     actual = infer_type(names, node.value)
     if isinstance(target, tree.ArmName):
-        help_ = f"move it, or write `READ SYSTEM ({target.key})`"
-        names.report(
-            "E218", f"`{target.text}` is an arm and cannot be assigned a value", target.span, "an arm", advice=help_
-        )
+        text = f"`{target.text}` is an arm and cannot be assigned a value"
+        advice = f"move it, or write `READ SYSTEM ({target.key})`"
+        names.report("E218", text, target.span, "an arm", advice=advice)
     elif is_world(target):
         report_world_assignment(names, target)
     else:
-        takes = infer_type(names, target)
-        if takes is ExpressionType.EVENT:
-            events.report_event_as_value(names, target, "given a value")
-        elif takes is not actual and takes is not None and actual is not None and actual not in ACCEPTED_TYPES[takes]:
-            _report_wrong_value(names, node, takes, actual)
+        required = infer_type(names, target)
+        if required is ExpressionType.EVENT:
+            names.report_event(target, "given a value")
+        elif required is not None and actual is not None and actual not in ACCEPTED_TYPES[required]:
+            _report_wrong_value(names, node, required, actual)
 
 
-def _report_wrong_value(names: NameResolver, node: tree.Assign, takes: ExpressionType, actual: ExpressionType) -> None:
+def _report_wrong_value(
+    names: NameResolver, node: tree.Assign, required: ExpressionType, actual: ExpressionType
+) -> None:
     target, value = node.target, node.value
     if actual is ExpressionType.EVENT:
-        events.report_event_as_value(names, value, "a value")
-        return
-    if not names.is_first_report("E217", *variable_keys(target)):
+        names.report_event(value, "a value")
         return
     if names.symbols.std is Standard.RLO_83:
-        what = "one number" if takes is ExpressionType.SCALAR else "twelve numbers in `( )`"
-        message, label = "", "a matrix" if actual is ExpressionType.MATRIX else "one number"
+        what = "one number" if required is ExpressionType.SCALAR else "twelve numbers in `( )`"
+        label, advice = "a matrix" if actual is ExpressionType.MATRIX else "one number", ""
     else:
-        what, is_one = _VALUE_PHRASES[takes], type_phrase(value, actual)
-        message, label = f", but {quote_expression(value)} is {is_one}", without_article(is_one)
-    help_ = _value_advice(target, value, takes, actual) if message else ""
-    text = f"{quote_expression(target)} is {takes.value} and takes {what}{message}"
-    names.report("E217", text, value.span, label, secondary=declaration_labels(names, target), advice=help_)
+        phrase, label = type_texts(value, actual)
+        what = f"{_VALUE_PHRASES[required]}, but {quote_expression(value)} is {phrase}"
+        advice = _value_advice(target, value, required, actual)
+    text = f"{quote_expression(target)} is {required.value} and takes {what}"
+    head = target.name if isinstance(target, tree.Index) else target
+    here = names.declaration_labels(*variable_keys(head))
+    names.report_once("E217", text, value.span, label, variable_keys(target), secondary=here, advice=advice)
 
 
 def _value_advice(
-    target: tree.Expression, value: tree.Expression, takes: ExpressionType, actual: ExpressionType
+    target: tree.Expression, value: tree.Expression, required: ExpressionType, actual: ExpressionType
 ) -> str:
-    match takes, actual:
+    name, text = expression_text(target), expression_text(value)
+    match required, actual:
         case _, ExpressionType.INVERSE:
             return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
         case ExpressionType.SCALAR, ExpressionType.CONDITION:
-            name = expression_text(target)
-            return f"write `IF {expression_text(value)} THEN {name} = 1 ELSE {name} = 0`"
+            return f"write `IF {text} THEN {name} = 1 ELSE {name} = 0`"
         case ExpressionType.FRAME, ExpressionType.TRANS:
-            return f"for the pose that this transformation gives from WORLD write `WORLD * {expression_text(value)}`"
+            return f"for the pose that this transformation gives from WORLD write `WORLD * {text}`"
         case ExpressionType.TRANS, ExpressionType.FRAME:
-            return f"for the transformation from WORLD to this pose write `INV(WORLD) * {expression_text(value)}`"
+            return f"for the transformation from WORLD to this pose write `INV(WORLD) * {text}`"
         case ((ExpressionType.FRAME | ExpressionType.TRANS), ExpressionType.SCALAR):
             return "write twelve numbers in `( )`, or make a transformation from numbers by XYZ, ROTX, ROTY and ROTZ"
         case _:
@@ -93,18 +86,18 @@ def affix(context: Context, node: tree.Affix) -> None:
     context.note_change(node.child, node.link)
     if node.rigid:
         context.note_change(node.parent, node.link)
-    whence = expression_text(node.parent)
-    swap = isinstance(node.child, tree.ArmName) and isinstance(node.parent, tree.Name | tree.Index)
-    swapped = f"AFFIX {whence} TO {expression_text(node.child)}" if swap else None
+    parent = expression_text(node.parent)
+    is_reversed = isinstance(node.child, tree.ArmName) and isinstance(node.parent, tree.Name | tree.Index)
+    swapped = f"AFFIX {parent} TO {expression_text(node.child)}" if is_reversed else None
     _check_child(names, node.child, "AFFIX hangs", "affixed to a frame", did_you_mean(swapped))
     require_type(names, node.parent, ExpressionType.FRAME, "E215", "AFFIX ... TO needs a FRAME or an arm")
     if node.at is None:
         return
-    where, is_arm = expression_text(node.at), isinstance(node.at, tree.ArmName)
+    at, is_arm = expression_text(node.at), isinstance(node.at, tree.ArmName)
 
     def advice(actual: ExpressionType) -> str:
-        is_place = actual is ExpressionType.FRAME and not (is_arm and names.symbols.std is Standard.RLO_83)
-        return f"for the transformation from {whence} to {where} write `AT INV({whence}) * {where}`" if is_place else ""
+        is_pose = actual is ExpressionType.FRAME and not (is_arm and names.symbols.std is Standard.RLO_83)
+        return f"for the transformation from {parent} to {at} write `AT INV({parent}) * {at}`" if is_pose else ""
 
     note = "a FRAME is a pose in the cell; a TRANS is the transformation from one frame to another"
     require_type(names, node.at, ExpressionType.TRANS, "E210", "AT needs a TRANS", note=note, advice=advice)

@@ -1,16 +1,16 @@
-"""What stands in front of BEGIN: variables with their types, units, imports, and the heads of procedures."""
+"""The declarations in front of BEGIN: variables with their types, units, imports, and the heads of procedures."""
 
 import math
 from collections.abc import Mapping
 
 from armwright.errors import ArmwrightError
-from armwright.program.language.diagnostic import Label, did_you_mean
+from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
 from armwright.program.semantics.scopes import NameResolver
-from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, SymbolTable
+from armwright.program.semantics.symbols import FRAME, PREDECLARED, ProcedureSymbols, SymbolTable
 from armwright.program.syntax import tree
 
 # More elements than this are a slip, and would take the memory of the machine.
@@ -68,8 +68,8 @@ def _is_frame(written: tree.TypeName) -> bool:
 
 
 def _report_duplicate(names: NameResolver, name: tree.Name, first: tree.Name) -> None:
-    text = f"`{name.text}` is declared twice"
-    names.report("E203", text, name.span, "again here", secondary=(Label(first.span, "first declared here"),))
+    here = labels(first.span, "first declared here")
+    names.report("E203", f"`{name.text}` is declared twice", name.span, "again here", secondary=here)
 
 
 def _declared_type(names: NameResolver, written: tree.TypeName) -> VariableType | None:
@@ -78,9 +78,7 @@ def _declared_type(names: NameResolver, written: tree.TypeName) -> VariableType 
     if written.key is None or None in sizes:
         return None
     known = tuple(size for size in sizes if size is not None)
-    count = 1
-    for size in known:
-        count *= size
+    count = math.prod(known)
     if count > MAX_ELEMENTS:
         span = written.sizes[0].span.to(written.sizes[-1].span)
         names.report("E222", f"an array of {count} elements is too large", span, f"more than {MAX_ELEMENTS}")
@@ -112,15 +110,11 @@ def _declare_units(names: NameResolver, program: tree.Program) -> None:
         for unit in header.units if isinstance(header, tree.Units) else ():
             if unit.key not in DECLARABLE:
                 _report_unknown_unit(names, unit)
-                continue
-            earlier = first.setdefault(dimension(unit.key), unit)
-            if earlier is not unit:
-                what = f"{dimension(unit.key)}s"
-                text = f"a program has one unit of {dimension(unit.key)}, but UNITS names two"
-                advice = f"leave one out; a number may carry a unit of its own where {what} are mixed: `25{unit.text}`"
-                names.report(
-                    "E224", text, unit.span, "second", secondary=(Label(earlier.span, "first"),), advice=advice
-                )
+            elif (earlier := first.setdefault(dimension(unit.key), unit)) is not unit:
+                what, here = dimension(unit.key), labels(earlier.span, "first")
+                text = f"a program has one unit of {what}, but UNITS names two"
+                advice = f"leave one out; a number may carry a unit of its own where {what}s are mixed: `25{unit.text}`"
+                names.report("E224", text, unit.span, "second", secondary=here, advice=advice)
     chosen = {dimension: unit.key for dimension, unit in first.items()}
     names.symbols.units = UnitSystem(length=chosen.get("length", "M"), angle=chosen.get("angle", "DEG"))
 
@@ -162,7 +156,7 @@ def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadI
             text = f"frame `{frame}` comes from two imports"
             names.report("E228", text, path.span, "it comes from here too")
         names.symbols.imported.add(frame)
-        names.symbols.types[frame] = VariableType(VariableKind.FRAME)
+        names.symbols.types[frame] = FRAME
 
 
 # ---- procedures ----------------------------------------------------------------------------------------------------

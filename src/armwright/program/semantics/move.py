@@ -1,4 +1,4 @@
-"""Names, types and clauses of one MOVE."""
+"""MOVE: the types of what it moves, its goal and its clauses, and which clauses go together."""
 
 from armwright.program.language.diagnostic import labels
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
@@ -31,19 +31,19 @@ def move(context: Context, node: tree.Move) -> None:
             case tree.Via(points=points):
                 for point in points:
                     _check_pose(names, point, "E212", "a via point must be a FRAME")
-            case tree.Approach(point=point):
-                _check_pose(names, point, "E215", "an approach point must be a FRAME")
-            case tree.Departure(point=point):
-                _check_pose(names, point, "E215", "a departure point must be a FRAME")
+            case tree.Approach(point=point) | tree.Departure(point=point):
+                article = "an approach" if isinstance(clause, tree.Approach) else "a departure"
+                _check_pose(names, point, "E215", f"{article} point must be a FRAME")
             case tree.Speed(value=value):
                 _check_speed(names, value)
-            case tree.Blend() | tree.Duration():
-                _check_amount(names, clause)
+            case tree.Blend(value=value) | tree.Duration(value=value):
+                required: Dimension = "length" if isinstance(clause, tree.Blend) else "time"
+                word = tree.clause_word(type(clause))
+                if require_quantity(names, value, required, f"{word} needs a {required}"):
+                    check_range(names, value, f"a {word}", zero=False)
             case tree.On(condition=wanted, action=action):
                 require_condition(names, wanted, "ON")
-                context.check_concurrent(action)
-            case _:
-                pass
+                context.check_with(action, recovering=False)
 
 
 def _check_pose(
@@ -62,21 +62,13 @@ def _check_pose(
 
 
 def _check_speed(names: NameResolver, node: tree.Expression) -> None:
-    if not require_type(names, node, ExpressionType.SCALAR, "E216", "SPEED needs a number or a SCALAR"):
-        return
-    if not isinstance(node, tree.Number) or not check_unit(names, node, None, "a speed has no unit"):
+    is_number = require_type(names, node, ExpressionType.SCALAR, "E216", "SPEED needs a number or a SCALAR")
+    if not is_number or not isinstance(node, tree.Number) or not check_unit(names, node, None, "a speed has no unit"):
         return
     # A number that was reported before is NaN and in no range, nor out of it.
     if node.value < LOWEST_SPEED or node.value > HIGHEST_SPEED:
         text = f"speed {node.text} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
         names.report("E207", text, node.span, "out of range", note=SPEED_NOTE)
-
-
-def _check_amount(names: NameResolver, clause: tree.Blend | tree.Duration) -> None:
-    wants: Dimension = "length" if isinstance(clause, tree.Blend) else "time"
-    what = tree.clause_word(type(clause))
-    if require_quantity(names, clause.value, wants, f"{what} needs a {wants}"):
-        check_range(names, clause.value, f"a {what}", zero=False)
 
 
 def _check_combination(names: NameResolver, clauses: tuple[tree.Clause, ...]) -> None:
@@ -97,18 +89,15 @@ def _check_combination(names: NameResolver, clauses: tuple[tree.Clause, ...]) ->
 def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
     direct, straight, blend = first.get(tree.Directly), first.get(tree.Straightly), first.get(tree.Blend)
     for kind, clause in first.items():
-        if direct and kind in _CONFLICTS_WITH_DIRECTLY:
-            label, against = _CONFLICTS_WITH_DIRECTLY[kind]
-            text, here = f"DIRECTLY cannot be combined with {tree.clause_word(kind)}", labels(direct.span, against)
-            names.report("E208", text, clause.span, label, secondary=here, advice="remove one of the two")
+        label, against = _CONFLICTS_WITH_DIRECTLY.get(kind, ("", ""))
+        combined = f"cannot be combined with {tree.clause_word(kind)}"
+        if direct and label:
+            here, advice = labels(direct.span, against), "remove one of the two"
+            names.report("E208", f"DIRECTLY {combined}", clause.span, label, secondary=here, advice=advice)
         elif straight and kind in (tree.Via, tree.Approach, tree.Departure):
-            text, (label, _) = (
-                f"STRAIGHTLY cannot be combined with {tree.clause_word(kind)}",
-                _CONFLICTS_WITH_DIRECTLY[kind],
-            )
             here = labels(straight.span, "requests one straight line")
             advice = "write one `MOVE ... STRAIGHTLY` for each leg"
-            names.report("E209", text, clause.span, label, secondary=here, advice=advice)
+            names.report("E209", f"STRAIGHTLY {combined}", clause.span, label, secondary=here, advice=advice)
     if blend and not direct and tree.Via not in first:
         text = "BLEND rounds the corners at via points, but there is no VIA"
         names.report("E226", text, blend.span, "no corners to round", advice="add `VIA ( ... )`, or leave BLEND out")

@@ -1,6 +1,5 @@
 """PRINT."""
 
-from armwright.program.semantics import events
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType
 from armwright.program.semantics.type_check import infer_type
@@ -11,7 +10,7 @@ def print_(context: Context, node: tree.Print) -> None:
     """Check what is printed: anything but an EVENT."""
     for item in node.items:
         if not isinstance(item, tree.String) and infer_type(context.names, item) is ExpressionType.EVENT:
-            events.report_event_as_value(context.names, item, "printed")
+            context.names.report_event(item, "printed")
 
 
 CHECKS: Checks = {tree.Print: print_}

@@ -1,4 +1,4 @@
-"""The names of a program: what each stands for, and where it was declared; of the program and of each procedure."""
+"""Symbol tables of a program and its procedures: the type of each name, and where it was declared."""
 
 from collections.abc import Mapping
 
@@ -17,12 +17,12 @@ PREDECLARED: Mapping[str, VariableType] = {WORLD: FRAME, STATION: FRAME}
 
 @attrs.define(kw_only=True, eq=False)
 class SymbolTable:
-    """The names that belong together: those of a program, or those of one procedure.
+    """The names of a program, or those of one procedure.
 
     Attributes:
-        types: what each stands for; None where that was reported as wrong.
-        declared: where each was declared; predeclared and imported names have no such place.
-        poisoned: names of which something has been said, so that they give no second message.
+        types: of each name; None where its declaration was reported as wrong.
+        declared: the declaration of each; predeclared and imported names have none.
+        poisoned: names that were reported, so that they give no second message.
         used: names that statements use.
     """
 
@@ -38,7 +38,7 @@ class ProcedureSymbols(SymbolTable):
 
     Attributes:
         node: the procedure.
-        parameters: their names, in order; a name given twice stands here twice.
+        parameters: their names, in order; a name declared twice stands here twice.
     """
 
     node: tree.Procedure
@@ -99,18 +99,17 @@ class Scope:
         return local if local is not None and key in local.types else self.symbols
 
     def type(self, key: str) -> VariableType | None:
-        """Return what a name stands for; None where it is unknown or was reported as wrong."""
+        """Return the type of a name; None where it is unknown or was reported as wrong."""
         return self.table(key).types.get(key)
 
     def declared(self, key: str) -> tree.Name | None:
-        """Return where a name was declared; None where it has no such place."""
+        """Return the declaration of a name; None where it has none."""
         return self.table(key).declared.get(key)
 
-    def declaration_labels(self, key: str) -> tuple[Label, ...]:
-        """Return a label on the declaration of a name, if it has one."""
-        name = self.declared(key)
-        return () if name is None else (Label(name.span, "declared here"),)
+    def declaration_labels(self, *keys: str) -> tuple[Label, ...]:
+        """Return labels on the declarations of names that have one."""
+        return tuple(Label(name.span, "declared here") for name in map(self.declared, keys) if name is not None)
 
     def is_poisoned(self, key: str) -> bool:
-        """Whether something has been said of a name, so that it is passed over in silence."""
+        """Whether a name was reported, so that it gives no second message."""
         return key in self.table(key).poisoned

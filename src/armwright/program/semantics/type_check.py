@@ -1,11 +1,10 @@
-"""The kinds of expressions: what each one is, and whether that is what its pose needs."""
+"""Type checking of expressions: the type of each, and whether it is the one that its position requires."""
 
 import math
 from collections.abc import Callable
 
 import attrs
 
-from armwright.program.language.diagnostic import Label
 from armwright.program.language.units import Dimension
 from armwright.program.language.words import Standard
 from armwright.program.semantics import array_elements, builtins, operators
@@ -17,9 +16,7 @@ from armwright.program.semantics.expression_types import (
     declared_type_phrase,
     expression_text,
     quote_expression,
-    type_phrase,
     variable_keys,
-    without_article,
 )
 from armwright.program.semantics.quantities import check_unit
 from armwright.program.semantics.scopes import NameResolver
@@ -27,20 +24,21 @@ from armwright.program.syntax import pose_literals, tree
 
 
 def infer_type(names: NameResolver, node: tree.Expression) -> ExpressionType | None:
-    """Return what an expression is; None where that is unknown, of which something has been said then.
+    """Return the type of an expression; None where it is unknown, the reason being reported.
 
     Args:
-        names: what is known, and for what is found.
+        names: the names, and where errors are reported.
         node: any expression.
     """
     return _TYPE_RULES[type(node)](names, node)
 
 
-def declaration_labels(names: NameResolver, node: tree.Expression) -> tuple[Label, ...]:
-    """Return where a variable is declared."""
-    if isinstance(node, tree.Index):
-        node = node.name
-    return names.declaration_labels(*variable_keys(node))
+def check_any(names: NameResolver, node: tree.Expression) -> None:
+    """Check an expression where any type will do, and a whole array too."""
+    if isinstance(node, tree.Name):
+        names.type(node)
+    else:
+        infer_type(names, node)
 
 
 def is_world(node: tree.Expression) -> bool:
@@ -49,72 +47,47 @@ def is_world(node: tree.Expression) -> bool:
 
 
 def report_world_assignment(names: NameResolver, node: tree.Expression) -> None:
-    """Say that the root of all frames cannot be assigned a value."""
+    """Report that the root of all frames cannot be assigned a value."""
     names.report("E218", f"{quote_expression(node)} cannot be assigned a value", node.span, "the root of all frames")
 
 
 def require_type(
     names: NameResolver,
     node: tree.Expression,
-    expected: ExpressionType,
+    required: ExpressionType,
     code: str,
     what: str,
     *,
     note: str = "",
     advice: Callable[[ExpressionType], str] | None = None,
 ) -> bool:
-    """Say that an expression is not what its pose needs; of a plain name nothing more is asked then.
+    """Report an expression that is not of the type that its position requires; a plain name is not reported again.
 
     Args:
-        names: what is known, and for what is found.
+        names: the names, and where errors are reported.
         node: the expression.
-        expected: what it must be.
+        required: the type.
         code: of the diagnostic.
         what: the first half of the message, such as ``AT needs a TRANS``.
         note: of the diagnostic.
-        advice: what to write instead, by what the expression is; empty for none.
+        advice: what to write instead, by the type that the expression has; empty for none.
 
     Returns:
-        Whether it is what is wanted.
+        Whether it is of that type.
     """
-    return _check_type(names, node, infer_type(names, node), expected, code, what, note, advice)
-
-
-def _check_type(  # noqa: PLR0917 - what ``need`` is given, and the sort
-    names: NameResolver,
-    node: tree.Expression,
-    actual: ExpressionType | None,
-    expected: ExpressionType,
-    code: str,
-    what: str,
-    note: str = "",
-    advice: Callable[[ExpressionType], str] | None = None,
-) -> bool:
-    """Do what ``need`` does for an expression of which one knows what it is."""
-    if actual is expected:
-        return True
-    if actual is None or actual in ACCEPTED_TYPES[expected]:
+    actual = infer_type(names, node)
+    if actual is None or actual in ACCEPTED_TYPES[required]:
         return actual is not None
-    for key in variable_keys(node):
-        names.poison(key)
-    is_one = type_phrase(node, actual)
-    names.report(
-        code,
-        f"{what}, but {quote_expression(node)} is {is_one}",
-        node.span,
-        without_article(is_one),
-        secondary=names.declaration_labels(*variable_keys(node)),
-        note=note,
-        advice=advice(actual) if advice else "",
-    )
+    names.poison(*variable_keys(node))
+    names.report_type(code, node, actual, what, note=note, advice=advice(actual) if advice else "")
     return False
 
 
 def require_quantity(names: NameResolver, node: tree.Expression, expected: Dimension, what: str) -> bool:
-    """Whether an expression is a number of the right dimension; say so if not.
+    """Report an expression that is not a number of the right dimension; return whether it is one.
 
     Args:
-        names: what is known, and for what is found.
+        names: the names, and where errors are reported.
         node: the expression.
         expected: what a number with a unit must measure.
         what: the first half of the message, such as ``PAUSE needs a time``.
@@ -123,17 +96,18 @@ def require_quantity(names: NameResolver, node: tree.Expression, expected: Dimen
 
 
 def require_condition(names: NameResolver, node: tree.Expression, who: str) -> None:
-    """Say that what should be a condition is none; a number is not one."""
+    """Report an expression that is not a condition; a number is not one."""
     _check_condition(names, node, infer_type(names, node), who)
 
 
 def _check_condition(names: NameResolver, node: tree.Expression, actual: ExpressionType | None, who: str) -> None:
-    def advice(actual: ExpressionType) -> str:
-        if actual is ExpressionType.SCALAR and not isinstance(node, tree.Number):
-            return f"write `{expression_text(node)} <> 0`"
-        return "a condition compares two numbers, such as `n > 0`"
-
-    _check_type(names, node, actual, ExpressionType.CONDITION, "E219", f"{who} needs a condition", advice=advice)
+    if actual is None or actual is ExpressionType.CONDITION:
+        return
+    advice = "a condition compares two numbers, such as `n > 0`"
+    if actual is ExpressionType.SCALAR and not isinstance(node, tree.Number):
+        advice = f"write `{expression_text(node)} <> 0`"
+    names.poison(*variable_keys(node))
+    names.report_type("E219", node, actual, f"{who} needs a condition", advice=advice)
 
 
 def _number(_names: NameResolver, node: tree.Number) -> ExpressionType | None:
@@ -155,21 +129,15 @@ def _poison(names: NameResolver, node: tree.Poison) -> None:
 
 
 def _function(names: NameResolver, node: tree.Function) -> ExpressionType | None:
-    name = node.name
-    if name.key in FUNCTIONS:
+    key, arguments = node.name.key, node.arguments
+    if key in FUNCTIONS:
         # An axis has a name but is no variable.
-        named = name.key == "FORCE"
-        argument_types = [
-            None if named and isinstance(argument, tree.Name) else infer_type(names, argument)
-            for argument in node.arguments
-        ]
-        return builtins.result_type(names, node, argument_types)
-    for argument in node.arguments:
+        is_axis = [key == "FORCE" and isinstance(argument, tree.Name) for argument in arguments]
+        types = [None if axis else infer_type(names, node) for axis, node in zip(is_axis, arguments, strict=True)]
+        return builtins.result_type(names, node, types)
+    for argument in arguments:
         # A procedure may be given a whole array, and this may have been meant as a call of one.
-        if not isinstance(argument, tree.Name):
-            infer_type(names, argument)
-        else:
-            names.type(argument)
+        check_any(names, argument)
     _report_unknown_function(names, node)
     return None
 
@@ -178,20 +146,20 @@ def _report_unknown_function(names: NameResolver, node: tree.Function) -> None:
     name = node.name
     if not names.is_first_report("E227", name.key):
         return
-    kind = names.type_of_key(name.key)
+    kind = names.scope.type(name.key)
     if names.resolve_call(name.key) is not None:
         message, label = f"`{name.text}` is a procedure and has no value", "a procedure"
-        help_ = "call it in a statement of its own, and let it set a parameter that is a FRAME"
+        advice = "call it in a statement of its own, and let it set a parameter that is a FRAME"
     elif kind is not None:
         names.mark_used([name.key])
         message, label = f"`{name.text}` is {declared_type_phrase(kind)} and no function", "no function"
-        inner = ",".join(map(expression_text, node.arguments))
-        help_ = f"write `{name.text}[{inner}]` for an element" if kind.sizes else ""
+        indices = ",".join(map(expression_text, node.arguments))
+        advice = f"write `{name.text}[{indices}]` for an element" if kind.sizes else ""
     else:
         near = names.closest_name(name.text, lambda: list(FUNCTIONS))
         message, label = f"unknown function `{name.text}`", "unknown function"
-        help_ = f"did you mean `{near}`?" if near else f"functions are {', '.join(FUNCTIONS)}"
-    names.report("E227", message, name.span, label, advice=help_)
+        advice = f"did you mean `{near}`?" if near else f"functions are {', '.join(FUNCTIONS)}"
+    names.report("E227", message, name.span, label, advice=advice)
 
 
 def _unary(names: NameResolver, node: tree.Unary) -> ExpressionType | None:
@@ -224,9 +192,9 @@ def _matrix(names: NameResolver, node: tree.Matrix) -> ExpressionType | None:
         if not isinstance(item, tree.Number):
             require_type(names, item, ExpressionType.SCALAR, "E216", "a matrix is made of numbers")
         elif item.unit is not None and fault is None:
-            turns = position < 9
-            what = "n, o, a of a matrix have no unit" if turns else "the last three numbers of a matrix are lengths"
-            check_unit(names, item, None if turns else "length", what)
+            is_axis = position < 9
+            what = "n, o, a of a matrix have no unit" if is_axis else "the last three numbers of a matrix are lengths"
+            check_unit(names, item, None if is_axis else "length", what)
     return None if fault is not None and fault.is_error else ExpressionType.MATRIX
 
 
