@@ -9,20 +9,14 @@ import sys
 import pytest
 
 from armwright.program.diagnostics.index import codes, find_page
+from cli_calls import armwright
 
 ENVIRONMENT = {**os.environ, "COLUMNS": "100", "PYTHONUTF8": "1", "TERM": "xterm-256color"}
 
 
 def explain(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Call the command where nobody watches."""
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", "explain", *arguments],
-        capture_output=True,
-        check=False,
-        encoding="utf-8",
-        env=ENVIRONMENT,
-        timeout=300,
-    )
+    return armwright("explain", *arguments, columns=100)
 
 
 def watched(*arguments: str) -> str:

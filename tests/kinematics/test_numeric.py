@@ -104,9 +104,10 @@ def test_against_the_closed_form(name: str, rng: np.random.Generator) -> None:
     assert found > 0.8 * known
 
 
-def test_seven_joints(rng: np.random.Generator) -> None:
+@pytest.mark.share(0.5)
+def test_seven_joints(rng: np.random.Generator, sample: Sample) -> None:
     """A redundant arm meets every pose; the configuration nearest to where it is comes first, and that is very near."""
-    for q in random_configurations(SEVEN, rng, 10):
+    for q in random_configurations(SEVEN, rng, sample.count(10)):
         near = np.clip(q + rng.normal(scale=0.05, size=7), -2.9, 2.9)
 
         solution = inverse(SEVEN, forward(SEVEN, q), near)
@@ -237,10 +238,11 @@ def test_a_stretched_arm_is_not_free(elbow: Arm) -> None:
     np.testing.assert_allclose(solution.best.q, (0.3, 0, 0), atol=1e-4)  # half of the digits are left at the edge
 
 
-def test_typed_poses_of_a_short_arm(rng: np.random.Generator) -> None:
+@pytest.mark.share(0.4)
+def test_typed_poses_of_a_short_arm(rng: np.random.Generator, sample: Sample) -> None:
     """A pose typed with six digits is off the few that an arm of four joints has, by less than counts, and solved."""
     arm = load_arm("ntu-3r")
-    for q in rng.uniform(-1.5, 1.5, size=(20, arm.n)):
+    for q in rng.uniform(-1.5, 1.5, size=(sample.count(20), arm.n)):
         solution = inverse(arm, np.round(forward(arm, q), 6))
 
         assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR)

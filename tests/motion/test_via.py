@@ -144,6 +144,7 @@ def test_random_paths_are_smooth_and_never_slower(name: str, sample: Sample) -> 
 
 @pytest.mark.share(0.03)
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.drawn(0.34)
 def test_wider_corners_are_no_slower(name: str, sample: Sample) -> None:
     """The farther the tool may be from the frames, the sooner it is there."""
     arm, worst, count = load_arm(name), 0.0, 0
