@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
-from armwright.cli.options import Json, OutputFolder, Quiet
+from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import print_result
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.shell_completion import paths
@@ -60,7 +60,7 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     if estimate is None:
         clearances = np.array(list(model.clearances.values()))
     elif clearance:
-        raise typer.BadParameter("give either --clearance or --estimate", param_hint="--clearance")
+        raise usage_error("--clearance", "give either --clearance or --estimate")
     else:
         warn_of_stray(estimate)
         clearances = read_estimate(estimate, model, _DRAWS)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.linkages import LinkageName
-from armwright.cli.options import Json
+from armwright.cli.options import Json, usage_error
 from armwright.cli.output import print_result
 from armwright.cli.progress import waiting
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
@@ -62,9 +62,7 @@ def _assess_paths(
     from armwright.errors import InvalidValueError
 
     if folder is None:
-        raise typer.BadParameter(
-            "measurements on paths need a sweep to compare with: `armwright clearance sweep`", param_hint="--sweep"
-        )
+        raise usage_error("--sweep", "measurements on paths need a sweep to compare with: `armwright clearance sweep`")
     if noise is None:
         raise InvalidValueError("--noise-um: expected the standard deviation of a measured coordinate, above 0")
     with waiting(f"learning from the simulations in {folder}") as progress:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
-from armwright.cli.options import Json, OutputFolder, Quiet
+from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
@@ -16,10 +16,6 @@ from armwright.errors import counted
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
     from armwright.clearance.paths import Path as TipPath
-    from armwright.clearance.predictability import Predictability
-    from armwright.clearance.scenario import Scenario
-    from armwright.clearance.settings import Settings
-    from armwright.clearance.simulation import Simulation
 
 # Samples of a run, and the time between two of them at most [s].
 _SAMPLES, _SAMPLE = 2500, 1e-4
@@ -95,8 +91,12 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --revolutions 2 --step 2e-6`
     """
+    import numpy as np
+
     from armwright.clearance.assessment import ClearanceRun
+    from armwright.clearance.predictability import simulate_with_predictability
     from armwright.clearance.reader import load_linkage
+    from armwright.clearance.scenario import prepare_scenario
 
     model = with_clearances(load_linkage(linkage), clearance or [], clearance_mm)
     tip_path = _path(model, path, speed_rpm, revolutions)
@@ -112,7 +112,9 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         start=start,
         located=locate,
     )
-    run = ClearanceRun.of(*_simulated(model, tip_path, settings, friction, watched=not (quiet or as_json)))
+    with waiting(f"{model.name}: the first run compiles it", quiet=quiet or as_json):
+        scenario, clearances = prepare_scenario(model, tip_path, settings), np.array(list(model.clearances.values()))
+        run = ClearanceRun.of(*simulate_with_predictability(scenario, clearances, friction=friction))
     if output is not None:
         from armwright.report.clearance_run_files import clearance_run_files
 
@@ -135,35 +137,20 @@ def _path(model: "Linkage", path: str | None, speed_rpm: float | None, revolutio
     option = "--path" if path is not None else "--speed-rpm"
     if (path is None) == (speed_rpm is None):
         example = "--path y1" if drives > 1 else "--speed-rpm 300"
-        text = f"expected either --path or --speed-rpm; {model.name} takes {example}"
-        raise typer.BadParameter(text, param_hint="--path")
+        raise usage_error("--path", f"expected either --path or --speed-rpm; {model.name} takes {example}")
     if drives != _DRIVES[option]:
         other = next((f"; use {name}" for name, number in _DRIVES.items() if number == drives), "")
         text = f"expected a linkage with {counted(_DRIVES[option], 'drive')}; {model.name} has {drives}{other}"
-        raise typer.BadParameter(text, param_hint=option)
+        raise usage_error(option, text)
     if path is not None:
         return named_path(path)
     assert speed_rpm is not None  # noqa: S101 - either path or speed_rpm is an argument
     if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < revolutions < math.inf):
-        raise typer.BadParameter(
+        raise usage_error(
+            "--speed-rpm",
             f"expected a speed other than 0 and revolutions above 0, got {speed_rpm:g} and {revolutions:g}",
-            param_hint="--speed-rpm",
         )
     speed = speed_rpm * 2 * math.pi / 60
     start_angle = model.assembly.get(model.drives[0].body, 0.0)
     name = f"{revolutions:g} revolution{'' if revolutions == 1 else 's'} at {speed_rpm:g} rev/min"
     return constant_speed_path(name, start_angle, speed, revolutions * 2 * math.pi / abs(speed))
-
-
-def _simulated(
-    model: "Linkage", path: "TipPath", settings: "Settings", friction: float | None, *, watched: bool
-) -> "tuple[Simulation, Predictability]":
-    """Simulate the linkage and indistinguishable copies of it, with a status line while its equations are compiled."""
-    import numpy as np
-
-    from armwright.clearance.predictability import simulate_with_predictability
-    from armwright.clearance.scenario import prepare_scenario
-
-    with waiting(f"{model.name}: the first run compiles it", quiet=not watched):
-        task: Scenario = prepare_scenario(model, path, settings)
-        return simulate_with_predictability(task, np.array(list(model.clearances.values())), friction=friction)

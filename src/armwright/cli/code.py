@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.programs import CellFile, Std, Strict
+from armwright.cli.programs import CellFile, Std, Strict, load_program, print_diagnostics
 from armwright.program.language.words import Standard
 
 
@@ -26,19 +26,12 @@ def code(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright code examples/bench.rlo -o out/bench.rlc`
     """
-    from armwright.cli.programs import print_diagnostics, read_cell_option
     from armwright.cli.terminal import print_verbatim
     from armwright.files.output import write_file
-    from armwright.program import ProgramError
-    from armwright.program.api import load
     from armwright.program.bytecode.assembler import assembly
     from armwright.program.bytecode.instructions import listing
 
-    try:
-        loaded = load(program, read_cell_option(cell), strict=strict, std=std)
-    except ProgramError as error:
-        print_diagnostics(error.compilation.diagnostics, error.compilation.source, to_errors=True)
-        raise typer.Exit(error.exit_status) from None
+    loaded = load_program(program, cell, strict=strict, std=std, to_errors=True)
     if loaded.diagnostics:
         print_diagnostics(loaded.diagnostics, loaded.code.source, to_errors=True)
     if output is not None:

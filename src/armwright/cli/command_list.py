@@ -2,7 +2,7 @@
 
 # ruff: noqa: E501 - a sentence a line
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from importlib import import_module
 from typing import Any
 
@@ -48,7 +48,7 @@ def register(app: App, words: Collection[str] | None) -> None:
     """
     for name, summary in COMMANDS.items():
         if words is not None and name not in words:
-            app.command(name)(_placeholder(summary))
+            app.command(name, help=summary)(_not_imported)
             continue
         function = name.replace("-", "_")
         command: Any = getattr(import_module(f"armwright.cli.{_MODULES.get(name, function)}"), function)
@@ -58,11 +58,6 @@ def register(app: App, words: Collection[str] | None) -> None:
             app.command(name)(command)
 
 
-def _placeholder(summary: str) -> Callable[[], None]:
-    """Return a function that is listed in place of a command whose module is not imported."""
-
-    def command() -> None:
-        raise AssertionError(summary)
-
-    command.__doc__ = summary
-    return command
+def _not_imported() -> None:
+    """Stand in the list of commands for a command whose module is not imported."""
+    raise AssertionError

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.options import ArmName, Json
+from armwright.cli.options import ArmName, Json, usage_error
 from armwright.cli.output import print_json
 from armwright.errors import counted
 
@@ -35,11 +35,9 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
 
     kind = output.suffix.lower()
     if kind not in {".urdf", ".toml"}:
-        raise typer.BadParameter(f"expected a name that ends in .urdf or .toml, got {output}", param_hint="-o")
+        raise usage_error("-o", f"expected a name that ends in .urdf or .toml, got {output}")
     if output.exists() and Path(arm).exists() and output.samefile(arm):
-        raise typer.BadParameter(
-            "expected another file than the input, which may hold more than an arm", param_hint="-o"
-        )
+        raise usage_error("-o", "expected another file than the input, which may hold more than an arm")
     model, notes = _read(arm, base, tip, lock)
     lost = lost_in_urdf(model) if kind == ".urdf" else []
     write_file(output, urdf_text(model) if kind == ".urdf" else toml_text(model))
@@ -62,9 +60,9 @@ def _locked_positions(path: str, text: str | None) -> "dict[str, float]":
         try:
             position = float(value)
         except ValueError:
-            raise typer.BadParameter(f"expected J1,J2=30, got {value!r} for {name}", param_hint="--lock") from None
+            raise usage_error("--lock", f"expected J1,J2=30, got {value!r} for {name}") from None
         if name in locked:
-            raise typer.BadParameter(f"{name} occurs twice; expected each joint once", param_hint="--lock")
+            raise usage_error("--lock", f"{name} occurs twice; expected each joint once")
         locked[name] = position * 1e-3 if kinds.get(name) == "prismatic" else math.radians(position)
     return locked
 
@@ -79,7 +77,5 @@ def _read(name: str, base: str | None, tip: str | None, lock: str | None) -> "tu
         return reading.arm, list(reading.notes)
     for option, value in (("--base", base), ("--tip", tip), ("--lock", lock)):
         if value:
-            raise typer.BadParameter(
-                f"expected a URDF file, whose links and joints have names, got '{name}'", param_hint=option
-            )
+            raise usage_error(option, f"expected a URDF file, whose links and joints have names, got '{name}'")
     return load_arm(name), []

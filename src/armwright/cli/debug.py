@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from armwright.cli.options import usage_error
 from armwright.cli.programs import CellFile, Std, Strict
 from armwright.program.language.words import Standard
 
@@ -32,9 +33,7 @@ def debug(
     """
     if program is None:
         if cell is not None:
-            raise typer.BadParameter(
-                "expected a program; an editor names the cell in its launch configuration", param_hint="--cell"
-            )
+            raise usage_error("--cell", "expected a program; an editor names the cell in its launch configuration")
         _serve()
         return
     from armwright.cli.debug_terminal import Terminal

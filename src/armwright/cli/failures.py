@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from armwright.cli.commands import NAME, Group
+from armwright.cli.options import usage_error
 from armwright.cli.output import print_json
 from armwright.cli.terminal import cleaned
 from armwright.errors import ArmwrightError, CheckFailedError, DoubtfulError, ExitStatus, FileFormatError, shortened
@@ -90,7 +91,7 @@ def _refuse_empty_output(words: list[str]) -> None:
     """Refuse an empty output path, from a variable that is not set: it would denote the current folder."""
     for word, after in itertools.pairwise([*words, "-"]):
         if (word in _OUTPUTS and not after) or word in {f"{option}=" for option in _OUTPUTS}:
-            raise typer.BadParameter("expected a path, got an empty text", param_hint=word.rstrip("="))
+            raise usage_error(word.rstrip("="), "expected a path, got an empty text")
 
 
 def _escaped(error: Exception) -> Exception:

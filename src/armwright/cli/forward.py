@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from armwright.cli.options import ArmName, Configuration, Json, Rows
+from armwright.cli.options import ArmName, Configuration, Json, Rows, usage_error
 from armwright.cli.output import print_json_rows
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 
@@ -79,7 +79,7 @@ def configurations(model: "Arm", configuration: str | None, file: TableFile | No
     from armwright.cli.joints import joint_values, rows
 
     if (configuration is None) == (file is None):
-        raise typer.BadParameter("expected joint positions, either here or as --csv FILE", param_hint="-q")
+        raise usage_error("-q", "expected joint positions, either here or as --csv FILE")
     if file is not None:
         return list(rows(model, file, ("q",))[0])
     assert configuration is not None  # noqa: S101 - without a file there is the option

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.options import ArmName, Json
+from armwright.cli.options import ArmName, Json, usage_error
 from armwright.cli.output import print_json
 from armwright.errors import ExitStatus
 
@@ -70,10 +70,10 @@ def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
     from armwright.spatial.rotations import rotation_from_vector
 
     if (xyz is None) == (noap is None):
-        raise typer.BadParameter("expected the pose, either as --xyz and --rpy or as --noap", param_hint="--xyz")
+        raise usage_error("--xyz", "expected the pose, either as --xyz and --rpy or as --noap")
     if noap is not None:
         if rpy is not None:
-            raise typer.BadParameter("the twelve numbers of --noap include the orientation", param_hint="--rpy")
+            raise usage_error("--rpy", "the twelve numbers of --noap include the orientation")
         return from_noap(numbers(noap, 12, "--noap"))
     assert xyz is not None  # noqa: S101 - without --noap there is --xyz
     roll, pitch, yaw = np.radians(numbers("0,0,0" if rpy is None else rpy, 3, "--rpy"))

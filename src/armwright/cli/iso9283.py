@@ -7,7 +7,7 @@ import typer
 
 from armwright.cli.failures import outcome
 from armwright.cli.numbers import Named, named_numbers
-from armwright.cli.options import Json, OutputFolder, Quiet
+from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
@@ -91,7 +91,7 @@ def _check_lengths(band_mm: float | None, corners_mm: float) -> None:
         ("--corners-mm", corners_mm, 0 <= corners_mm < float("inf")),
     ):
         if not valid:
-            raise typer.BadParameter(f"expected a number above 0, got {value:g}", param_hint=name)
+            raise usage_error(name, f"expected a number above 0, got {value:g}")
 
 
 def _assessed(
@@ -113,7 +113,7 @@ def _bounds(texts: list[str]) -> dict[str, Named]:
     bounds = named_numbers(texts, None, expected, "--limit")
     for text, bound in zip(texts, bounds.values(), strict=True):
         if not 0 <= bound.value < float("inf"):
-            raise typer.BadParameter(f"expected {expected}, got {text}", param_hint="--limit")
+            raise usage_error("--limit", f"expected {expected}, got {text}")
     return bounds
 
 
@@ -125,7 +125,5 @@ def _in_si(assessment: "Assessment", symbol: str, value: float, unit: str) -> fl
     measure = measures[one_of("measure", symbol, measures)]
     shown = measure.displayed_unit
     if unit != shown:
-        raise typer.BadParameter(
-            f"{symbol} is in {shown}: {symbol}={value:g}{shown}, got '{unit}'", param_hint="--limit"
-        )
+        raise usage_error("--limit", f"{symbol} is in {shown}: {symbol}={value:g}{shown}, got '{unit}'")
     return value / measure.scale

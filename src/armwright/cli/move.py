@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from armwright.cli.numbers import within
-from armwright.cli.options import ArmName, Json, OutputFolder, QuietButWarnings
+from armwright.cli.options import ArmName, Json, OutputFolder, QuietButWarnings, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import counting
 from armwright.cli.results import warn_of_stray, write_results
@@ -80,11 +80,9 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
 
     for name, option in (("--orientation", orientation), ("--deviation-mm", deviation_mm), ("--around", around)):
         if kind == "joint" and option is not None:
-            raise typer.BadParameter("expected a cartesian move for this option", param_hint=name)
+            raise usage_error(name, "expected a cartesian move for this option")
     if orientation is not None and around is not None:
-        raise typer.BadParameter(
-            "lines with stops (--around) rotate about a fixed axis; omit this option", param_hint="--orientation"
-        )
+        raise usage_error("--orientation", "lines with stops (--around) rotate about a fixed axis; omit this option")
     within(servo_ms, _PERIOD_MS, "--servo-ms")
     deviation = 0.1 if deviation_mm is None else within(deviation_mm, _DEVIATION_MM, "--deviation-mm")
     warn_of_stray(poses)

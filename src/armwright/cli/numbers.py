@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import typer
+from armwright.cli.options import usage_error
 
 # Possessive quantifiers: a text that is not a number is refused in time linear in its length.
 _NUMBER = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
@@ -25,14 +25,12 @@ def numbers(text: str, count: int, option: str) -> list[float]:
         try:
             values.append(float(word))
         except ValueError:
-            raise typer.BadParameter(f"expected {count} numbers, got '{word}'", param_hint=option) from None
+            raise usage_error(option, f"expected {count} numbers, got '{word}'") from None
     if len(values) != count:
-        raise typer.BadParameter(f"expected {count} finite numbers, got {len(values)}: {text}", param_hint=option)
+        raise usage_error(option, f"expected {count} finite numbers, got {len(values)}: {text}")
     for value, word in zip(values, words, strict=True):
         if not abs(value) <= LARGEST:  # not fulfilled by NaN
-            raise typer.BadParameter(
-                f"every number must be finite and no larger than {LARGEST:g}, got {word}", param_hint=option
-            )
+            raise usage_error(option, f"every number must be finite and no larger than {LARGEST:g}, got {word}")
     return values
 
 
@@ -46,7 +44,7 @@ def units_of(text: str | None) -> tuple[str, str] | None:
         return None
     parts = tuple(part.strip() for part in text.split(","))
     if len(parts) != 2:
-        raise typer.BadParameter(f"expected a length and an angle such as mm,deg, got {text}", param_hint="--units")
+        raise usage_error("--units", f"expected a length and an angle such as mm,deg, got {text}")
     return parts[0], parts[1]
 
 
@@ -77,10 +75,10 @@ def named_numbers(texts: Iterable[str], units: Sequence[str] | None, expected: s
     for text in texts:
         match = _NAMED.fullmatch(text.replace(" ", ""))
         if match is None or (units is not None and match["unit"] not in units):
-            raise typer.BadParameter(f"expected {expected}, got {text}", param_hint=option)
+            raise usage_error(option, f"expected {expected}, got {text}")
         name = match["name"]
         if name in named:
-            raise typer.BadParameter(f"{name} occurs twice; expected each name once", param_hint=option)
+            raise usage_error(option, f"{name} occurs twice; expected each name once")
         named[name] = Named(name, float(match["number"]), match["unit"])
     return named
 
@@ -93,5 +91,5 @@ def within(value: float, bounds: tuple[float, float], option: str) -> float:
     """
     lower, upper = bounds
     if not lower <= value <= upper:
-        raise typer.BadParameter(f"expected {lower:g} to {upper:g}, got {value:g}", param_hint=option)
+        raise usage_error(option, f"expected {lower:g} to {upper:g}, got {value:g}")
     return value

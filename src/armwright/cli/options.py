@@ -1,4 +1,4 @@
-"""Options that many commands have."""
+"""Options that many commands have, and errors about options."""
 
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -29,3 +29,8 @@ Quiet: TypeAlias = Annotated[bool, typer.Option("-q", "--quiet", help="Print not
 QuietButWarnings: TypeAlias = Annotated[
     bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")
 ]
+
+
+def usage_error(option: str, message: str) -> typer.BadParameter:
+    """Return an error of usage that concerns an option."""
+    return typer.BadParameter(message, param_hint=option)

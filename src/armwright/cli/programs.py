@@ -12,6 +12,7 @@ from armwright.program.language.words import Standard
 if TYPE_CHECKING:
     from armwright.cell.model import Cell
     from armwright.program import Compilation, Source
+    from armwright.program.api import LoadedProgram
     from armwright.program.language.diagnostic import Diagnostic
 
 ProgramFiles: TypeAlias = Annotated[
@@ -43,6 +44,29 @@ def read_cell_option(path: Path | None) -> "Cell | None":
     from armwright.cell.reader import read_cell
 
     return None if path is None else read_cell(path)
+
+
+def load_program(
+    path: Path, cell: Path | None, *, strict: bool, std: Standard, as_json: bool = False, to_errors: bool = False
+) -> "LoadedProgram":
+    """Return the code of a program with its cell; the diagnostics of a program with errors are printed.
+
+    Raises:
+        Exit: the program has errors.
+        FileFormatError: a file cannot be read, or is invalid.
+    """
+    from armwright.cli.output import print_json
+    from armwright.program.api import ProgramError, load
+
+    try:
+        return load(path, read_cell_option(cell), strict=strict, std=std)
+    except ProgramError as error:
+        compiled = error.compilation
+        if as_json:
+            print_json(diagnostics_data(compiled))
+        else:
+            print_diagnostics(compiled.diagnostics, compiled.source, to_errors=to_errors)
+        raise typer.Exit(error.exit_status) from None
 
 
 def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, to_errors: bool = False) -> None:

@@ -1,12 +1,14 @@
 """Progress bars and status lines on the error output, where it is a terminal."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from rich.console import Console
-    from rich.progress import TaskID
+    from rich.progress import Progress as Bars, ProgressColumn, TaskID
 
     from armwright.sweep.progress import Progress
 
@@ -31,11 +33,16 @@ def waiting(text: str, *, quiet: bool = False) -> "Iterator[Callable[[str], None
         update: replaces the text; None where nothing is shown.
     """
     console = watched_console(quiet=quiet)
-    if console is None:
-        yield None
-        return
-    with console.status(text) as status:
-        yield status.update
+    with nullcontext() if console is None else console.status(text) as status:
+        yield None if status is None else status.update
+
+
+def _bars(*columns: "ProgressColumn", quiet: bool) -> "AbstractContextManager[Bars | None]":
+    """Return the context of progress bars; of None where nothing is shown."""
+    from rich.progress import Progress as Bars
+
+    console = watched_console(quiet=quiet)
+    return nullcontext() if console is None else Bars(*columns, console=console, transient=True)
 
 
 @contextmanager
@@ -49,16 +56,15 @@ def counting(title: str, *, quiet: bool = False) -> "Iterator[Callable[..., None
     Yields:
         progress: takes the number of finished items, the number of all, and further text; None where nothing is shown.
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bar, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
-    console = watched_console(quiet=quiet)
-    if console is None:
-        yield None
-        return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[more]}"))
-    with Bar(*columns, console=console, transient=True) as bar:
-        line = bar.add_task(title, total=None, more="")
-        yield lambda done, total, more="": bar.update(line, total=total, completed=done, more=more)
+    with _bars(*columns, quiet=quiet) as bars:
+        if bars is None:
+            yield None
+        else:
+            line = bars.add_task(title, total=None, more="")
+            yield lambda done, total, more="": bars.update(line, total=total, completed=done, more=more)
 
 
 @contextmanager
@@ -68,21 +74,16 @@ def parts() -> "Iterator[Callable[[str, float], None] | None]":
     Yields:
         update: takes the name of a task and the finished part of it, 0 to 1; None where nothing is shown.
     """
-    from rich.progress import Progress as Bar
-
-    console = watched_console()
-    if console is None:
-        yield None
-        return
-    with Bar(console=console, transient=True) as bar:
+    with _bars(quiet=False) as bars:
         lines: dict[str, TaskID] = {}
 
         def update(task: str, part: float) -> None:
+            assert bars is not None  # noqa: S101 - it is not given away without bars
             if task not in lines:
-                lines[task] = bar.add_task(task, total=1.0)
-            bar.update(lines[task], completed=part)
+                lines[task] = bars.add_task(task, total=1.0)
+            bars.update(lines[task], completed=part)
 
-        yield update
+        yield None if bars is None else update
 
 
 @contextmanager

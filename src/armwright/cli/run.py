@@ -2,23 +2,21 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import typer
 
 from armwright.cli.numbers import within
-from armwright.cli.options import Json, OutputFolder, QuietButWarnings
+from armwright.cli.options import Json, OutputFolder, QuietButWarnings, usage_error
 from armwright.cli.output import command_line, print_json, print_result, print_result_table
-from armwright.cli.programs import CellFile, ProgramFile, Std, Strict, read_cell_option
+from armwright.cli.programs import CellFile, ProgramFile, Std, Strict, load_program, print_diagnostics
 from armwright.cli.progress import waiting
-from armwright.errors import ExitStatus
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from armwright.cell.model import Cell
-    from armwright.program import Compilation
     from armwright.program.bytecode.instructions import Code
     from armwright.program.language.diagnostic import Diagnostic
     from armwright.program.vm.interpreter import Limits, RunError
@@ -74,19 +72,14 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
     from armwright.cli.results import warn_of_stray
-    from armwright.program import ProgramError
-    from armwright.program.api import load
     from armwright.program.vm.interpreter import Limits, RunError
     from armwright.report.run_files import RunInputs
 
     warn_of_stray(program)
-    try:
-        loaded = load(program, read_cell_option(cell), strict=strict, std=std)
-    except ProgramError as wrong:
-        _refuse(wrong.compilation, as_json=as_json)
+    loaded = load_program(program, cell, strict=strict, std=std, as_json=as_json)
     if loaded.cell is None:
-        text = f"missing: {program} needs a cell to run in, and IMPORTs none; try examples/stanford_cell.toml"
-        raise typer.BadParameter(text, param_hint="--cell")
+        needs = "needs a cell to run in, and IMPORTs none; try examples/stanford_cell.toml"
+        raise usage_error("--cell", f"missing: {program} {needs}")
     used_cell = _adjust_cell(loaded.cell, servo_ms, deviation_mm, around)
     limits = Limits(steps=max_steps, time=max_time)
     error: RunError | None = None
@@ -126,7 +119,6 @@ def _finish(
     quiet: bool,
 ) -> None:
     """Write and print the results of a run, also of one that failed."""
-    from armwright.cli.programs import print_diagnostics
     from armwright.cli.terminal import console
     from armwright.program.vm.excerpt import EVENT_LOG_HINT, NO_EVENT_LOG_HINT
     from armwright.program.vm.interpreter import run_diagnostics
@@ -187,20 +179,6 @@ def _interpret(code: "Code", cell: "Cell", limits: "Limits", *, watched: bool) -
             update(f"{now:9.3f} s  line {line:<5} {text}")
 
         return interpret(code, cell, simulator, show, limits=limits)
-
-
-def _refuse(compiled: "Compilation", *, as_json: bool) -> NoReturn:
-    """Print the diagnostics of a program with errors, and end the command."""
-    from armwright.cli.programs import error_data, print_diagnostics
-    from armwright.program.language.diagnostic import to_json
-
-    source, diagnostics = compiled.source, compiled.diagnostics
-    if as_json:
-        rows = [to_json(diagnostic, source) for diagnostic in diagnostics]
-        print_json({**error_data(diagnostics, source), "program": source.name, "diagnostics": rows})
-    else:
-        print_diagnostics(diagnostics, source)
-    raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
 
 
 def _frame_positions(error: "RunError") -> dict[str, list[float] | None]:

@@ -6,6 +6,8 @@ from typing import Annotated, NamedTuple, TypeAlias
 
 import typer
 
+from armwright.cli.options import usage_error
+
 Units: TypeAlias = Annotated[
     str | None, typer.Option(help="Units of measurements whose header has none, as in mm,deg.")
 ]
@@ -50,7 +52,7 @@ def columns_of(text: str | None) -> dict[str, str] | None:
     try:
         return parse_column_map(text)
     except InvalidValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--columns") from error
+        raise usage_error("--columns", str(error)) from error
 
 
 def table_file(path: Path | None, columns: str | None, *, skip_incomplete: bool) -> TableFile | None:
@@ -63,5 +65,5 @@ def table_file(path: Path | None, columns: str | None, *, skip_incomplete: bool)
         return TableFile(path, columns_of(columns), skip_incomplete)
     for option, value in (("--columns", columns), ("--skip-incomplete", skip_incomplete)):
         if value:
-            raise typer.BadParameter("expected a table, --csv FILE, with this option", param_hint=option)
+            raise usage_error(option, "expected a table, --csv FILE, with this option")
     return None

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 import typer
 
 from armwright.cli.numbers import numbers
+from armwright.cli.options import usage_error
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm, Link
@@ -33,9 +34,9 @@ def read_payload(text: str) -> "Link":
     try:
         mass, *position = numbers(text, 4, "--load")
     except typer.BadParameter as error:
-        raise typer.BadParameter(f"{error.message}, or a file that ends in .toml", param_hint="--load") from error
+        raise usage_error("--load", f"{error.message}, or a file that ends in .toml") from error
     if mass < 0:
-        raise typer.BadParameter(f"expected a mass of 0 kg or more, got {mass:g}", param_hint="--load")
+        raise usage_error("--load", f"expected a mass of 0 kg or more, got {mass:g}")
     return Link(mass=mass, com=[x * 1e-3 for x in position])
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.options import ArmName, Configuration, Json
+from armwright.cli.options import ArmName, Configuration, Json, usage_error
 from armwright.cli.output import print_json_rows
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 from armwright.cli.tool_options import Load, read_payload
@@ -70,12 +70,11 @@ def _motion(model: "Arm", values: tuple[str | None, str | None, str | None], fil
 
     q, qd, qdd = values
     if (q is None) == (file is None):
-        raise typer.BadParameter("expected the motion, either as -q, --qd and --qdd or as --csv FILE", param_hint="-q")
+        raise usage_error("-q", "expected the motion, either as -q, --qd and --qdd or as --csv FILE")
     if file is not None:
         if qd is not None or qdd is not None:
-            raise typer.BadParameter(
-                "expected no --qd and --qdd with a table, which has its own velocities and accelerations",
-                param_hint="--csv",
+            raise usage_error(
+                "--csv", "expected no --qd and --qdd with a table, which has its own velocities and accelerations"
             )
         return rows(model, file, ("q", "qd", "qdd"))
     still = ",".join(["0"] * model.n)
