@@ -1,7 +1,7 @@
-"""What the statements do to the frames, along all paths through a program: values, affixments, arms; no numbers.
+"""Data-flow analysis along all paths through a program: values, affixments, arms.
 
-An error is said only where it is certain that a run that comes to the statement fails. Where paths meet, what they
-agree on stays known; a loop is followed twice: once as at its first pass, and once knowing nothing of what it changes.
+An error is reported only where every run that reaches the statement fails. Where paths merge, the facts on which they
+agree are kept; a loop is analysed twice: its first pass, and any pass, with what it changes invalidated.
 """
 
 from collections.abc import Mapping
@@ -22,11 +22,11 @@ STEPS: Steps = {**frames.STEPS, **devices.STEPS, **move.STEPS, **control_flow.ST
 
 @attrs.frozen(kw_only=True)
 class Flow:
-    """What the translator wants to know of statements, by where they start.
+    """Results of the analysis for code generation, by where statements start.
 
     Attributes:
         arms: the arm that a MOVE moves or a GRASP closes, where it is the same on every path there.
-        implied: MOVEs that always hang the grasped frame on its arm first.
+        implied: MOVEs that always affix the grasped frame to its arm first.
     """
 
     arms: Mapping[int, str]
@@ -42,7 +42,7 @@ def check(
     source: Source,
     strict: bool = False,
 ) -> tuple[Flow, list[Diagnostic]]:
-    """Follow a program from statement to statement.
+    """Analyse a program.
 
     Args:
         program: without errors of syntax.
@@ -53,12 +53,12 @@ def check(
         strict: whether an AFFIX that is only implied is an error.
 
     Returns:
-        What the translator needs, and what is wrong.
+        The results for code generation, and the diagnostics.
     """
     state = FlowState(program, symbols, spelling, cell, source=source, strict=strict)
     context = Context(STEPS, state)
     context.follow(*program.statements)
-    state.over = False
+    state.ended = False
     context.follow_uncalled()
     findings = [*state.diagnostics, *concurrency.check(program, symbols, source), *data_races.check(program, symbols)]
     return Flow(arms=state.arms, implied=state.implied), findings

@@ -1,10 +1,10 @@
-"""Branches side by side: waits that cannot end, equal priorities, arms that two of them want."""
+"""Concurrency: deadlocks, equal priorities, and arms that two branches use."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
 import attrs
 
-from armwright.program.flow_analysis.side_effects import every, parts, written_name
+from armwright.program.flow_analysis.side_effects import child_statements, walk_statements, written_name
 from armwright.program.flow_analysis.state import FlowState, Use, Uses
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label
 from armwright.program.language.kinds import VariableKind
@@ -28,91 +28,91 @@ def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagn
     """
     findings = DiagnosticList()
     events = _Events(scoped_bodies(program, symbols))
-    for _, fork in events.forks:
-        _priorities(findings, fork, source)
+    for _, cobegin in events.cobegins:
+        _check_priorities(findings, cobegin, source)
     if not events.waits or events.may_halt:
         return findings
-    _never_signalled(findings, events)
-    groups = [(scope, [branch.body.statements for branch in fork.branches]) for scope, fork in events.forks]
+    _report_never_signalled(findings, events)
+    groups = [(scope, [branch.body.statements for branch in cobegin.branches]) for scope, cobegin in events.cobegins]
     for scope, branches in [(symbols.scope(None), [program.statements]), *groups]:
-        _deadlock(findings, events.sequences(scope, branches), source, main=branches[0] is program.statements)
+        _check_deadlock(findings, events.sequences(scope, branches), source, main=branches[0] is program.statements)
     return findings
 
 
-# ---- priorities and arms -------------------------------------------------------------------------------------------
+# ---- priorities and arms ---------------------------------------------------------------------------------------------
 
 
-def _priorities(findings: DiagnosticList, fork: tree.Cobegin, source: Source) -> None:
+def _check_priorities(findings: DiagnosticList, cobegin: tree.Cobegin, source: Source) -> None:
     """Warn of branches of equal priority, where it is written."""
     first_use: dict[float, tree.Branch] = {}
-    for branch in fork.branches:
+    for branch in cobegin.branches:
         if branch.priority is None:
             continue
         first = first_use.setdefault(branch.priority.value, branch)
         if first is not branch:
-            text = f"{'both' if len(fork.branches) == 2 else 'two'} branches have priority {branch.priority.text}"
+            text = f"{'both' if len(cobegin.branches) == 2 else 'two'} branches have priority {branch.priority.text}"
             note = "frame-table requests of equal priority are served in the order of the text"
             findings.report("W502", text, branch.head, f"same as line {source.line(first.head.start)}", note=note)
 
 
-def shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
-    """Say which arms are used by more than one branch.
+def report_shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
+    """Report arms that more than one branch uses.
 
     Args:
-        state: for what is found.
-        branches: what each branch of one COBEGIN uses.
+        state: the abstract state, for diagnostics.
+        branches: the arms that each branch of one COBEGIN uses.
     """
     first_use: dict[str, Use] = {}
     used = {arm for branch in branches for arm in branch.arms}
     for branch in branches:
         for arm, use in branch.arms.items():
-            free = _other(state, used)
+            free = _unused_arm(state, used)
             first = first_use.setdefault(arm, use)
             if first is use:
                 continue
             does = "moved" if first.moves and use.moves else "used"
             text, note = f"{arm} is {does} in two branches of one COBEGIN", "each arm belongs to one process at a time"
-            here = (Label(first.span, "first branch"), *dict.fromkeys((*first.hung, *use.hung)))
+            here = (Label(first.span, "first branch"), *dict.fromkeys((*first.affixed_at, *use.affixed_at)))
             advice = f"use {free} in one branch, or give the arm over with SIGNAL and WAIT outside COBEGIN"
             state.report("E503", text, use.span, "second branch", secondary=here, note=note, advice=advice)
 
 
-def _other(state: FlowState, used: set[str]) -> str:
+def _unused_arm(state: FlowState, used: set[str]) -> str:
     """Return an arm that no branch uses."""
     free = sorted(state.cell.arms - used) if state.cell else []
     return free[0] if free else next(arm for n in range(1, len(used) + 2) if (arm := f"ARM_{n}") not in used)
 
 
-# ---- events --------------------------------------------------------------------------------------------------------
+# ---- events ----------------------------------------------------------------------------------------------------------
 
 
 @attrs.frozen
-class _Step:
-    """A SIGNAL or WAIT that is certain to be come to, if nothing before it goes wrong or waits for ever."""
+class _EventStep:
+    """A SIGNAL or WAIT that is certain to be reached, if nothing before it fails or waits for ever."""
 
     node: tree.Signal | tree.Wait
     event: str
 
 
 class _Events:
-    """Where a program signals and waits for which events, and where it parts into branches."""
+    """The SIGNALs, WAITs and COBEGINs of a program, by event."""
 
     def __init__(self, scoped_bodies: Sequence[tuple[Scope, Sequence[tree.Statement]]]) -> None:
-        self.forks: list[tuple[Scope, tree.Cobegin]] = []
+        self.cobegins: list[tuple[Scope, tree.Cobegin]] = []
         self.waits: dict[str, list[tuple[Scope, tree.Wait]]] = {}
         self.signals: dict[str, list[tree.Signal]] = {}
-        # Events that are given to procedures, so that one cannot see who signals them.
-        self.given: set[str] = set()
+        # Events that are passed to procedures, which may signal them.
+        self.passed: set[str] = set()
         for scope, statements in scoped_bodies:
-            for statement in every(statements):
-                self._take(scope, statement)
-        self.may_halt = bool(self.waits) and any(_may_halt_beside(*body) for body in scoped_bodies)
+            for statement in walk_statements(statements):
+                self._collect(scope, statement)
+        self.may_halt = bool(self.waits) and any(_may_halt_while_waiting(*body) for body in scoped_bodies)
 
-    def _take(self, scope: Scope, node: tree.Statement) -> None:
+    def _collect(self, scope: Scope, node: tree.Statement) -> None:
         if isinstance(node, tree.Cobegin):
-            self.forks.append((scope, node))
+            self.cobegins.append((scope, node))
         elif isinstance(node, tree.Call):
-            self.given.update(
+            self.passed.update(
                 array_name(name) for argument in node.arguments if (name := written_name(argument, scope))
             )
         elif isinstance(node, tree.Signal | tree.Wait) and (name := written_name(node.event, scope)) is not None:
@@ -123,11 +123,11 @@ class _Events:
 
     def is_signalled(self, name: str) -> bool:
         """Whether something may signal an event, or another element of its array."""
-        return array_name(name) in self.given or any(array_name(other) == array_name(name) for other in self.signals)
+        return array_name(name) in self.passed or any(array_name(other) == array_name(name) for other in self.signals)
 
-    def sequences(self, scope: Scope, branches: Iterable[Sequence[tree.Statement]]) -> list[list[_Step]]:
-        """Return what branches signal and wait for, one after the other; only events that nobody else deals with."""
-        steps = [[*_straight(branch, scope)] for branch in branches]
+    def sequences(self, scope: Scope, branches: Iterable[Sequence[tree.Statement]]) -> list[list[_EventStep]]:
+        """Return the SIGNALs and WAITs of branches in order, of events that no other statement uses."""
+        steps = [[*_unconditional_steps(branch, scope)] for branch in branches]
         here = {id(step.node) for several in steps for step in several}
         waiting = [{step.event for step in several if isinstance(step.node, tree.Wait)} for several in steps]
         names = {step.event for several in steps for step in several}
@@ -141,49 +141,49 @@ class _Events:
     def _is_closed(self, name: str, scope: Scope, here: set[int]) -> bool:
         procedure = scope.procedure
         if procedure is not None:
-            # Several runs of a procedure share what is not its own.
+            # Several activations of a procedure share what is not local to it.
             key = array_name(name).rpartition(".")[2]
             if not scope.is_local(key) or key in procedure.parameters:
                 return False
         unclear = is_any_element(name) or f"{array_name(name)}[]" in (*self.waits, *self.signals)
-        if unclear or array_name(name) in self.given or name not in self.signals:
+        if unclear or array_name(name) in self.passed or name not in self.signals:
             return False
         nodes = [*self.signals[name], *(node for _, node in self.waits.get(name, ()))]
         return all(id(node) in here for node in nodes)
 
 
-def _straight(statements: Sequence[tree.Statement], scope: Scope) -> Iterator[_Step]:
-    """Give what is signalled and waited for in any case, up to a HALT."""
+def _unconditional_steps(statements: Sequence[tree.Statement], scope: Scope) -> Iterator[_EventStep]:
+    """Yield the unconditional SIGNALs and WAITs, up to a HALT."""
     for node in statements:
         match node:
             case tree.Signal(event=event) | tree.Wait(event=event):
                 name = written_name(event, scope)
                 if name is not None:
-                    yield _Step(node, name)
+                    yield _EventStep(node, name)
             case tree.Block(statements=inner):
-                yield from _straight(inner, scope)
+                yield from _unconditional_steps(inner, scope)
             case tree.Lock(body=body):
-                yield from _straight((body,), scope)
+                yield from _unconditional_steps((body,), scope)
             case tree.Halt():
                 return
             case _:
                 pass
 
 
-def _may_halt_beside(scope: Scope, statements: Sequence[tree.Statement]) -> bool:
-    """Whether a HALT may end the program while others wait."""
+def _may_halt_while_waiting(scope: Scope, statements: Sequence[tree.Statement]) -> bool:
+    """Whether a HALT may end the program while other processes wait."""
     waiting = [(statement, scope.procedure is not None) for statement in statements]
     while waiting:
         node, beside = waiting.pop()
         if beside and isinstance(node, tree.Halt):
             return True
         # In an action of a MOVE it only ends the MOVE.
-        inside = () if isinstance(node, tree.Move) else parts(node)
+        inside = () if isinstance(node, tree.Move) else child_statements(node)
         waiting += [(inner, beside or isinstance(node, tree.Cobegin)) for inner in inside]
     return False
 
 
-def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
+def _report_never_signalled(findings: DiagnosticList, events: _Events) -> None:
     reported: set[str] = set()
     for name, waits in events.waits.items():
         scope, node = waits[0]
@@ -207,40 +207,40 @@ def _never_signalled(findings: DiagnosticList, events: _Events) -> None:
         )
 
 
-# ---- waits that cannot end -----------------------------------------------------------------------------------------
+# ---- waits that cannot end -------------------------------------------------------------------------------------------
 
 
-def _deadlock(findings: DiagnosticList, branches: list[list[_Step]], source: Source, *, main: bool) -> None:
-    """Say which branches wait for one another for ever."""
-    reached = _run(branches)
+def _check_deadlock(findings: DiagnosticList, branches: list[list[_EventStep]], source: Source, *, main: bool) -> None:
+    """Report branches that wait for one another for ever."""
+    reached = _simulate(branches)
     stuck = {number: branches[number][index] for number, index in enumerate(reached) if index < len(branches[number])}
     if not stuck:
         return
-    # Who waits for a branch that is stuck itself: going from one to the next comes back in the end.
-    signals: dict[str, tuple[int, _Step]] = {}
+    # Each waits for a branch that is stuck itself: following them closes a cycle.
+    signals: dict[str, tuple[int, _EventStep]] = {}
     for number in stuck:
         for step in branches[number][reached[number] :]:
             if isinstance(step.node, tree.Signal):
                 signals.setdefault(step.event, (number, step))
-    way: dict[int, None] = {}
+    path: dict[int, None] = {}
     now = min(stuck)
-    while now not in way:
-        way[now] = None
+    while now not in path:
+        path[now] = None
         if stuck[now].event not in signals:
-            _too_few(findings, stuck[now], branches)
+            _report_too_few_signals(findings, stuck[now], branches)
             return
         now, _ = signals[stuck[now].event]
-    ring = list(way)[list(way).index(now) :]
-    _wait_for_each_other(
-        findings, [(stuck[statement], signals[stuck[statement].event][1]) for statement in ring], source, main=main
+    cycle = list(path)[list(path).index(now) :]
+    _report_cyclic_wait(
+        findings, [(stuck[statement], signals[stuck[statement].event][1]) for statement in cycle], source, main=main
     )
 
 
-def _run(branches: list[list[_Step]]) -> list[int]:
-    """Return how far each branch comes: what is signalled is counted, and each event has one branch that waits."""
+def _simulate(branches: list[list[_EventStep]]) -> list[int]:
+    """Simulate the branches and return how far each comes: SIGNALs are counted, each event has one waiting branch."""
     reached = [0] * len(branches)
     counts: dict[str, int] = {}
-    asleep: dict[str, int] = {}
+    waiting_branches: dict[str, int] = {}
     ready = list(range(len(branches)))
     while ready:
         number = ready.pop()
@@ -249,10 +249,10 @@ def _run(branches: list[list[_Step]]) -> list[int]:
             step = steps[reached[number]]
             if isinstance(step.node, tree.Signal):
                 counts[step.event] = counts.get(step.event, 0) + 1
-                if step.event in asleep:
-                    ready.append(asleep.pop(step.event))
+                if step.event in waiting_branches:
+                    ready.append(waiting_branches.pop(step.event))
             elif counts.get(step.event, 0) == 0:
-                asleep[step.event] = number
+                waiting_branches[step.event] = number
                 break
             else:
                 counts[step.event] -= 1
@@ -260,7 +260,7 @@ def _run(branches: list[list[_Step]]) -> list[int]:
     return reached
 
 
-def _too_few(findings: DiagnosticList, step: _Step, branches: list[list[_Step]]) -> None:
+def _report_too_few_signals(findings: DiagnosticList, step: _EventStep, branches: list[list[_EventStep]]) -> None:
     nodes = [statement.node for several in branches for statement in several if statement.event == step.event]
     signals = [node.span for node in nodes if isinstance(node, tree.Signal)]
     text = f"`{expression_text(step.node.event)}` is waited for more often than it is signalled"
@@ -269,23 +269,23 @@ def _too_few(findings: DiagnosticList, step: _Step, branches: list[list[_Step]])
     findings.report("E501", text, step.node.span, "waits for ever", secondary=here, note=note)
 
 
-def _wait_for_each_other(
-    findings: DiagnosticList, ring: list[tuple[_Step, _Step]], source: Source, *, main: bool
+def _report_cyclic_wait(
+    findings: DiagnosticList, cycle: list[tuple[_EventStep, _EventStep]], source: Source, *, main: bool
 ) -> None:
-    """Speak of branches of which each waits for what the next would signal.
+    """Report branches of which each waits for what the next would signal.
 
     Args:
-        findings: for what is found.
-        ring: the WAIT at which each stands, and the SIGNAL that it waits for.
+        findings: the diagnostics.
+        cycle: the WAIT of each, and the SIGNAL that it waits for.
         source: of the program.
         main: whether it is the main program, waiting for itself.
     """
     labels = []
-    for wait, signal in ring:
+    for wait, signal in cycle:
         labels.append(Label(wait.node.span, f"waits for the SIGNAL in line {source.line(signal.node.span.start)}"))
         labels.append(Label(signal.node.span, "comes after that WAIT"))
     first, *others = sorted(labels, key=lambda label: label.span.start)
-    count = len(ring)
+    count = len(cycle)
     message = {
         1: f"{'the program' if main else 'this branch'} waits for itself for ever",
         2: "these two branches wait for each other for ever",

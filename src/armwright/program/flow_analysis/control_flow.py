@@ -1,11 +1,11 @@
-"""Control flow: what holds on every path through choices, loops, branches, TRY and calls."""
+"""Control flow: facts along the paths through IF, loops, COBEGIN, TRY and calls."""
 
 import itertools
 from collections.abc import Iterator, Sequence
 
 from armwright.program.flow_analysis import concurrency
 from armwright.program.flow_analysis.context import Context, Steps, of_state
-from armwright.program.flow_analysis.definite_assignment import need, need_indices
+from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.lattice import Outcome, Uncertainty
 from armwright.program.flow_analysis.side_effects import ANY_ARM, ANYTHING, SideEffects, union
@@ -15,186 +15,191 @@ from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 
-# Loops inside one another of which the first pass is followed by itself.
+# Nesting of loops whose first pass is analysed by itself.
 _MAX_LOOP_DEPTH = 3
-# Branches beside which one checks each other one.
+# Branches whose side effects are combined pair by pair.
 _MAX_BRANCHES = 30
-# Paths of one IF that are joined name by name where they meet.
+# Paths of one IF that are joined name by name.
 _MAX_PATHS = 100
 
 
 def event(state: FlowState, node: tree.Signal | tree.Wait) -> None:
     """Check the indices of an event."""
-    need_indices(state, node.event)
+    require_indices(state, node.event)
 
 
 def pause(state: FlowState, node: tree.Pause) -> None:
     """Check the time of a PAUSE."""
-    need(state, node.duration)
+    require_value(state, node.duration)
 
 
 def if_(context: Context, node: tree.If) -> None:
-    """Follow each path of an IF, and go on with what holds on all of them."""
+    """Analyse each path of an IF and join them."""
     state = context.state
-    need(state, node.condition)
-    if state.first:
-        state.forget(context.writes(node))
+    require_value(state, node.condition)
+    if state.is_first_pass:
+        state.forget(context.side_effects(node))
         return
     chain, otherwise = node.else_if_chain
-    ways: list[Outcome | None] = []
-    with state.perhaps():
+    outcomes: list[Outcome | None] = []
+    with state.conditional():
         for statement in chain:
             if statement is not node:
-                need(state, statement.condition)
-            ways.append(context.path(statement.then))
-        ways.append(context.path(*(() if otherwise is None else (otherwise,))))
-    if len(ways) > _MAX_PATHS and any(way is not None for way in ways):
-        state.forget(context.writes(node))
+                require_value(state, statement.condition)
+            outcomes.append(context.path(statement.then))
+        outcomes.append(context.path(*(() if otherwise is None else (otherwise,))))
+    if len(outcomes) > _MAX_PATHS and any(outcome is not None for outcome in outcomes):
+        state.forget(context.side_effects(node))
         return
-    says, advice = "it gets a value on one side of this IF only", "give it a value before the IF, or on both sides"
-    context.merge(*ways, parting=state.parting(node.head, says, advice))
+    message, advice = "it gets a value on one side of this IF only", "give it a value before the IF, or on both sides"
+    context.merge(*outcomes, divergence=state.divergence(node.head, message, advice))
 
 
 def while_(context: Context, node: tree.While) -> None:
-    """Follow a loop that is tested at its top."""
-    need(context.state, node.condition)
-    _perhaps_never(context, node, node.head, "WHILE", (node.body,), certain=bool(context.state.holds(node.condition)))
+    """Analyse a loop with its test at the top."""
+    require_value(context.state, node.condition)
+    _loop_that_may_not_run(
+        context, node, node.head, "WHILE", (node.body,), certain=bool(context.state.condition_value(node.condition))
+    )
 
 
 def repeat(context: Context, node: tree.Repeat) -> None:
-    """Follow a loop that is tested at its end."""
+    """Analyse a loop with its test at the end."""
     _loop(context, node, node.body)
-    if not context.state.over:
-        need(context.state, node.condition)
+    if not context.state.ended:
+        require_value(context.state, node.condition)
 
 
 def for_(context: Context, node: tree.For) -> None:
-    """Follow a loop that counts."""
+    """Analyse a counting loop."""
     state = context.state
-    need(state, node.first, node.last, node.step)
-    passes = state.passes(node)
+    require_value(state, node.first, node.last, node.step)
+    passes = state.iteration_count(node)
     variable = state.variable(node.variable, VariableKind.SCALAR)
     if passes == 0:
         return
     if variable is not None:
-        state.give(variable, state.number(node.first) if passes == 1 else None, node.head)
+        state.set_number(variable, state.number(node.first) if passes == 1 else None, node.head)
     if passes == 1:
         context.follow(node.body)
     else:
-        _perhaps_never(context, node, node.head, "FOR", (node.body,), certain=passes is not None)
+        _loop_that_may_not_run(context, node, node.head, "FOR", (node.body,), certain=passes is not None)
 
 
-def _perhaps_never(
+def _loop_that_may_not_run(
     context: Context, node: tree.Statement, head: Span, word: str, body: tuple[tree.Statement, ...], *, certain: bool
 ) -> None:
-    """Follow a loop that may not run once."""
+    """Analyse a loop that may not run at all."""
     state = context.state
-    says, advice = f"it gets a value inside this {word}, which may not run at all", f"give it a value before the {word}"
-    parting = state.parting(head, says, advice)
+    message, advice = (
+        f"it gets a value inside this {word}, which may not run at all",
+        f"give it a value before the {word}",
+    )
+    divergence = state.divergence(head, message, advice)
     if certain:
         _loop(context, node, body)
     else:
-        with state.perhaps():
-            _loop(context, node, body, parting)
+        with state.conditional():
+            _loop(context, node, body, divergence)
 
 
 def _loop(
-    context: Context, node: tree.Statement, body: tuple[tree.Statement, ...], parting: Divergence | None = None
+    context: Context, node: tree.Statement, body: tuple[tree.Statement, ...], divergence: Divergence | None = None
 ) -> None:
-    """Follow a loop: as at the first pass, then knowing nothing of what it changes.
+    """Analyse a loop: its first pass, then any pass, with what the loop changes invalidated.
 
     Args:
-        context: where it stands.
+        context: the analysis.
         node: the loop.
-        body: what it repeats.
-        parting: of a loop that may not run once.
+        body: its statements.
+        divergence: of a loop that may not run once.
     """
-    state, writes = context.state, context.writes(node)
-    if state.first:
-        if parting is None:
+    state, effects = context.state, context.side_effects(node)
+    if state.is_first_pass:
+        if divergence is None:
             context.follow(*body)
-        state.forget(writes)
+        state.forget(effects)
         return
     if context.loops < _MAX_LOOP_DEPTH:
-        # Follow what is certain to run at the first pass of several, and come back.
-        state.first = True
+        # Analyse what is certain to run in the first of several passes, and roll back.
+        state.is_first_pass = True
         context.path(*body)
-        state.first = False
+        state.is_first_pass = False
     context.loops += 1
     mark = state.facts.checkpoint()
     none = state.facts.outcome(mark)
-    state.forget(writes)
+    state.forget(effects)
     again = context.path(*body, mark=mark)
     context.loops -= 1
-    context.merge(*(again,) if parting is None else (none, again), parting=parting)
+    context.merge(*(again,) if divergence is None else (none, again), divergence=divergence)
 
 
 def cobegin(context: Context, node: tree.Cobegin) -> None:
-    """Follow each branch, knowing nothing of what the others change."""
+    """Analyse each branch with what the others may change invalidated."""
     state, facts = context.state, context.state.facts
-    writes = [context.writes(branch.body) for branch in node.branches]
-    last, shaky = state.last[LAST], facts.shaky
+    effects = [context.side_effects(branch.body) for branch in node.branches]
+    last, uncertainties = state.last[LAST], facts.uncertainties
     outcomes, uses = [], []
     mark = facts.checkpoint()
     for number, branch in enumerate(node.branches):
-        own, others = writes[number], _others(writes, number)
+        own, others = effects[number], _effects_of_others(effects, number)
         state.forget(others)
-        state.last.put(LAST, last)
-        facts.shaky = (*shaky, _shaky(context, own, others))
+        state.last.set(LAST, last)
+        facts.uncertainties = (*uncertainties, _uncertainty(context, own, others))
         state.branches.append(Uses({}, len(state.calls)))
         outcomes.append(context.path(branch.body))
         uses.append(state.branches.pop())
-        facts.shaky = shaky
-        facts.take_back(mark)
-    if not state.first:
-        concurrency.shared_arms(state, uses)
+        facts.uncertainties = uncertainties
+        facts.roll_back(mark)
+    if not state.is_first_pass:
+        concurrency.report_shared_arms(state, uses)
     if any(outcome is None for outcome in outcomes):
-        state.over = True
+        state.ended = True
     else:
-        facts.join([outcome for outcome in outcomes if outcome is not None], together=True)
-        state.last.put(LAST, last)
+        facts.join([outcome for outcome in outcomes if outcome is not None], concurrent=True)
+        state.last.set(LAST, last)
 
 
-def _shaky(context: Context, own: SideEffects, others: SideEffects) -> Uncertainty:
-    """Return what a branch cannot know because of the others."""
+def _uncertainty(context: Context, own: SideEffects, others: SideEffects) -> Uncertainty:
+    """Return what the other branches may change while a branch runs."""
     state = context.state
-    names = frozenset(state.kept(others.names))
-    mine = frozenset(arm for arm in state.kept(own.arms) if is_arm(arm) and arm not in names)
+    names = frozenset(state.slots(others.names))
+    mine = frozenset(arm for arm in state.slots(own.arms) if is_arm(arm) and arm not in names)
     return Uncertainty(
         names=names,
         everything=others.everything,
         arms=ANY_ARM in others.arms or bool(others.moved),
         excepted=mine | {LAST},
-        places=state.writing.rigid and bool(others.placed),
+        moves_frames=state.side_effects.rigid and bool(others.posed),
     )
 
 
 def try_(context: Context, node: tree.Try) -> None:
-    """Follow both parts: recovery begins with what holds whichever statement of the first part failed."""
-    state, writes = context.state, context.writes(node)
-    if state.first:
-        # What goes wrong at the first pass is recovered from, and may go well at the next.
-        state.forget(writes)
+    """Analyse both parts: RECOVER begins with the facts that hold whichever statement failed."""
+    state, effects = context.state, context.side_effects(node)
+    if state.is_first_pass:
+        # A failure in the first pass is recovered from, and the next pass may succeed.
+        state.forget(effects)
         return
-    retries = context.writes(*node.recovery).retries
+    retries = context.side_effects(*node.recovery).retries
     mark = state.facts.checkpoint()
     if retries:
-        state.forget_undone(writes)
-    well = context.path(*node.body, mark=mark)
-    state.forget_undone(writes if retries else context.writes(*node.body))
-    for name in _given_at_once(context, node.body):
-        state.table.has(name)
+        state.forget_undone(effects)
+    completed = context.path(*node.body, mark=mark)
+    state.forget_undone(effects if retries else context.side_effects(*node.body))
+    for name in _assigned_before_failure(context, node.body):
+        state.table.mark_assigned(name)
     outside, context.recovering = context.recovering, True
     recovered = context.path(*node.recovery, mark=mark)
     context.recovering = outside
-    says = "it gets a value in this TRY, where a statement before may fail"
+    message = "it gets a value in this TRY, where a statement before may fail"
     advice = "give it a value before the TRY, or after RECOVER too"
     word = Span(node.span.start, node.span.start + len("TRY"))
-    context.merge(well, recovered, parting=state.parting(word, says, advice))
+    context.merge(completed, recovered, divergence=state.divergence(word, message, advice))
 
 
-def _given_at_once(context: Context, statements: Sequence[tree.Statement]) -> Iterator[str]:
-    """Give the variables that have a value before anything can fail."""
+def _assigned_before_failure(context: Context, statements: Sequence[tree.Statement]) -> Iterator[str]:
+    """Yield the variables that are assigned before any statement can fail."""
     for link in itertools.takewhile(lambda statement: isinstance(statement, tree.Assign | tree.Print), statements):
         name = context.state.variable(link.target) if isinstance(link, tree.Assign) else None
         if name is not None and not is_any_element(name):
@@ -202,21 +207,21 @@ def _given_at_once(context: Context, statements: Sequence[tree.Statement]) -> It
 
 
 def lock(context: Context, node: tree.Lock) -> None:
-    """Follow the body of a LOCK."""
-    need_indices(context.state, *node.targets)
+    """Analyse the body of a LOCK."""
+    require_indices(context.state, *node.targets)
     context.follow(node.body)
 
 
 def end(context: Context, node: tree.Halt | tree.Retry) -> None:
     """End this path."""
-    # Of a RETRY that has no TRY to go back to something has been said.
-    says = isinstance(node, tree.Halt) or context.recovering
-    context.state.over, context.state.ended = True, node.span if says else None
+    # A RETRY without a TRY has been reported.
+    message = isinstance(node, tree.Halt) or context.recovering
+    context.state.ended, context.state.end_span = True, node.span if message else None
 
 
-def _others(writes: list[SideEffects], number: int) -> SideEffects:
-    """Return what all branches but one may change; where there are many of them, anything."""
-    return ANYTHING if len(writes) > _MAX_BRANCHES else union((*writes[:number], *writes[number + 1 :]))
+def _effects_of_others(effects: list[SideEffects], number: int) -> SideEffects:
+    """Return the side effects of all branches but one; of many branches, anything."""
+    return ANYTHING if len(effects) > _MAX_BRANCHES else union((*effects[:number], *effects[number + 1 :]))
 
 
 STEPS: Steps = {
@@ -234,5 +239,5 @@ STEPS: Steps = {
     tree.Retry: end,
     tree.Halt: end,
     tree.Call: lambda context, node: context.call(node),
-    tree.Poison: lambda context, node: context.state.forget(context.writes(node)),
+    tree.Poison: lambda context, node: context.state.forget(context.side_effects(node)),
 }

@@ -1,11 +1,11 @@
-"""Variables that several branches of a COBEGIN write, while nothing keeps the one behind the other."""
+"""Data races: variables that several branches of a COBEGIN write without an order between them."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations, islice, product
 
 import attrs
 
-from armwright.program.flow_analysis.side_effects import every, parts, written_name
+from armwright.program.flow_analysis.side_effects import child_statements, walk_statements, written_name
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, labels
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import array_name, is_any_element
@@ -13,21 +13,21 @@ from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import Scope, Symbols, scoped_bodies
 from armwright.program.syntax import tree
 
-# Branches beside one another of which one checks each, and pairs of writes, signals and waits that are compared.
+# Concurrent branches that are checked, and pairs of writes, signals and waits that are compared.
 _MAX_BRANCHES, _MAX_PAIRS = 30, 1000
-# An event of which nobody knows which it is.
+# An unknown event.
 _ANY = "?"
 
 
 @attrs.frozen
 class _Location:
-    """Where in a branch something is done: the number of the statement, and the outermost loop around it."""
+    """A location in a branch: the number of the statement, and the outermost loop around it."""
 
     order: int
     loop: int | None
 
     def may_precede(self, other: "_Location") -> bool:
-        """Whether it may be done before something else of its branch."""
+        """Whether it may run before another location of its branch."""
         return self.order < other.order or (self.loop is not None and self.loop == other.loop)
 
 
@@ -38,16 +38,16 @@ class _Step:
     Attributes:
         node: the statement.
         scope: the names that it sees.
-        locked: what is locked around it.
+        locked: variables of the LOCKs around it.
         call: the call in the branch that leads to it.
-        place: in the branch.
+        location: in the branch.
     """
 
     node: tree.Statement
     scope: Scope
     locked: frozenset[str]
     call: Span | None
-    place: _Location
+    location: _Location
 
 
 @attrs.frozen
@@ -60,7 +60,7 @@ class _Write:
         span: the statement, or the call in the branch that leads to it.
         value: the number, where that is all it depends on.
         locked: whether a LOCK of the variable is around it.
-        place: in its branch.
+        location: in its branch.
     """
 
     name: str
@@ -68,12 +68,12 @@ class _Write:
     span: Span
     value: float | None
     locked: bool
-    place: _Location
+    location: _Location
 
 
 @attrs.frozen
 class _Branch:
-    """What a branch writes, by name, and the events by which it comes behind others and others behind it."""
+    """The writes of a branch, by name, and the events that order it against other branches."""
 
     writes: dict[str, list[_Write]]
     signals: list[tuple[str, _Location]]
@@ -81,20 +81,20 @@ class _Branch:
 
     def leads_to(self, other: "_Branch") -> bool:
         """Whether it signals an event that another waits for."""
-        return any(_alike(branch, two) for branch, two in self._met(other))
+        return any(_may_be_equal(branch, two) for branch, two in self._signal_wait_pairs(other))
 
-    def settles(self, write: _Write, other: "_Branch", later: _Write) -> bool:
-        """Whether it signals behind a write what another waits for before its own."""
+    def orders(self, write: _Write, other: "_Branch", later: _Write) -> bool:
+        """Whether it signals after a write an event that another branch awaits before its own write."""
         return any(
-            _alike(branch, two) and write.place.may_precede(branch[1]) and two[1].may_precede(later.place)
-            for branch, two in self._met(other)
+            _may_be_equal(branch, two) and write.location.may_precede(branch[1]) and two[1].may_precede(later.location)
+            for branch, two in self._signal_wait_pairs(other)
         )
 
-    def _met(self, other: "_Branch") -> "Iterator[tuple[tuple[str, _Location], tuple[str, _Location]]]":
+    def _signal_wait_pairs(self, other: "_Branch") -> "Iterator[tuple[tuple[str, _Location], tuple[str, _Location]]]":
         return islice(product(self.signals, other.waits), _MAX_PAIRS)
 
 
-def _alike(branch: tuple[str, _Location], other: tuple[str, _Location]) -> bool:
+def _may_be_equal(branch: tuple[str, _Location], other: tuple[str, _Location]) -> bool:
     """Whether two events may be the same."""
     names = {branch[0], other[0]}
     any_element = any(is_any_element(name) for name in names) and len({array_name(name) for name in names}) == 1
@@ -109,27 +109,29 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
     findings = DiagnosticList()
     everywhere = scoped_bodies(program, symbols)
     for scope, statements in everywhere:
-        forks = [branch for branch in every(statements) if isinstance(branch, tree.Cobegin)]
-        inner = {id(branch) for fork in forks for branch in every(part.body for part in fork.branches)}
-        for fork in forks:
-            if len(fork.branches) <= _MAX_BRANCHES:
-                # Beside a COBEGIN that stands in a branch or a procedure others may be at work.
-                alone = id(fork) not in inner and scope.procedure is None
-                _branches(findings, fork, scope, symbols, () if alone else everywhere)
+        cobegins = [branch for branch in walk_statements(statements) if isinstance(branch, tree.Cobegin)]
+        inner = {
+            id(branch) for cobegin in cobegins for branch in walk_statements(part.body for part in cobegin.branches)
+        }
+        for cobegin in cobegins:
+            if len(cobegin.branches) <= _MAX_BRANCHES:
+                # A COBEGIN in a branch or a procedure may run concurrently with other statements.
+                alone = id(cobegin) not in inner and scope.procedure is None
+                _check_branches(findings, cobegin, scope, symbols, () if alone else everywhere)
     return findings
 
 
-def _branches(
+def _check_branches(
     findings: DiagnosticList,
-    fork: tree.Cobegin,
+    cobegin: tree.Cobegin,
     scope: Scope,
     symbols: Symbols,
     others: Sequence[tuple[Scope, tuple[tree.Statement, ...]]],
 ) -> None:
-    """Check the branches of one COBEGIN; ``others`` may be at work beside it."""
-    branches = [_branch(_walk((part.body,), scope, symbols), scope) for part in fork.branches]
+    """Check the branches of one COBEGIN; ``others`` may run concurrently."""
+    branches = [_branch(_walk((part.body,), scope, symbols), scope) for part in cobegin.branches]
     outside = [
-        _branch((step for step in _walk(body, own, symbols) if not _is_inside(step.node.span, fork.span)), own)
+        _branch((step for step in _walk(body, own, symbols) if not _is_inside(step.node.span, cobegin.span)), own)
         for own, body in others
     ]
     names = dict.fromkeys(name for branch in branches for name in branch.writes)
@@ -139,32 +141,34 @@ def _branches(
         if len(writers) < 2 or (len(values) == 1 and None not in values):
             continue
         for pair in combinations(writers, 2):
-            if (conflict := _unsettled(name, *pair, [*branches, *outside])) is not None:
-                _say(findings, *conflict)
+            if (conflict := _unordered_writes(name, *pair, [*branches, *outside])) is not None:
+                _report(findings, *conflict)
                 break
 
 
-def _unsettled(name: str, first: _Branch, other: _Branch, all_branches: list[_Branch]) -> tuple[_Write, _Write] | None:
-    """Return two writes of two branches of which nobody knows which comes last; None where there are none."""
+def _unordered_writes(
+    name: str, first: _Branch, other: _Branch, all_branches: list[_Branch]
+) -> tuple[_Write, _Write] | None:
+    """Return two writes of two branches without an order between them; None where there are none."""
     beside = [third for third in all_branches if third is not first and third is not other]
-    if _leads_round(first, other, beside) or _leads_round(other, first, beside):
+    if _is_ordered_through(first, other, beside) or _is_ordered_through(other, first, beside):
         return None
     pairs = product(*(sorted(branch.writes[name], key=lambda write: write.locked) for branch in (first, other)))
     for mine, its in islice(pairs, _MAX_PAIRS):
-        if not ((mine.locked and its.locked) or first.settles(mine, other, its) or other.settles(its, first, mine)):
+        if not ((mine.locked and its.locked) or first.orders(mine, other, its) or other.orders(its, first, mine)):
             return mine, its
     return None
 
 
-def _leads_round(start: _Branch, end: _Branch, beside: list[_Branch]) -> bool:
-    """Whether one branch leads to another through third ones, in whatever order."""
+def _is_ordered_through(start: _Branch, end: _Branch, beside: list[_Branch]) -> bool:
+    """Whether one branch leads to another through others, in any order."""
     reached = [third for third in beside if start.leads_to(third)]
     for third in reached:
         reached += [more for more in beside if more not in reached and third.leads_to(more)]
     return any(third.leads_to(end) for third in reached)
 
 
-def _say(findings: DiagnosticList, first: _Write, second: _Write) -> None:
+def _report(findings: DiagnosticList, first: _Write, second: _Write) -> None:
     name, here = second.text if first.locked else first.text, labels(first.span, "first branch")
     text = f"`{name}` is written in two branches of one COBEGIN without LOCK"
     note = "which of them writes last depends on how long each takes"
@@ -176,19 +180,19 @@ def _is_inside(span: Span, around: Span) -> bool:
     return around.start <= span.start and span.end <= around.end
 
 
-# ---- what a branch does --------------------------------------------------------------------------------------------
+# ---- what a branch does ----------------------------------------------------------------------------------------------
 
 
 def _branch(steps: Iterable[_Step], scope: Scope) -> _Branch:
-    """Return what the statements of a branch do to what it shares with others."""
+    """Return the writes and events of the statements of a branch."""
     branch = _Branch({}, [], [])
     for step in steps:
         if isinstance(step.node, tree.Signal | tree.Wait):
             name = written_name(step.node.event, step.scope)
-            # In a procedure an event may be one that the procedure was given.
+            # In a procedure an event may be a parameter.
             known = name is not None and "." not in name
             (branch.signals if isinstance(step.node, tree.Signal) else branch.waits).append(
-                (name if known and name is not None else _ANY, step.place)
+                (name if known and name is not None else _ANY, step.location)
             )
         for write in _writes(step, scope):
             branch.writes.setdefault(write.name, []).append(write)
@@ -196,7 +200,7 @@ def _branch(steps: Iterable[_Step], scope: Scope) -> _Branch:
 
 
 def _writes(step: _Step, scope: Scope) -> Iterator[_Write]:
-    """Give what a statement writes of the variables that its branch shares with others."""
+    """Yield the writes of a statement to shared variables."""
     node, own = step.node, step.scope
     targets: tuple[tree.Expression, ...] = ()
     value = None
@@ -212,17 +216,17 @@ def _writes(step: _Step, scope: Scope) -> Iterator[_Write]:
             continue
         head = target.name if isinstance(target, tree.Index) else target
         kind = own.type(head.key)
-        # In a procedure that is called only the variables of the program are those of everybody.
+        # In a called procedure only global variables are shared.
         if kind is None or kind.kind is VariableKind.EVENT or (own is not scope and own.is_local(head.key)):
             continue
         is_locked = bool(step.locked & {name, array_name(name)})
         span = node.head if isinstance(node, tree.For) else node.span
         text = head.text + (f"[{name.partition('[')[2]}" if isinstance(target, tree.Index) else "")
-        yield _Write(name, text, step.call or span, value, is_locked, step.place)
+        yield _Write(name, text, step.call or span, value, is_locked, step.location)
 
 
 def _walk(body: Sequence[tree.Statement], scope: Scope, symbols: Symbols) -> Iterator[_Step]:
-    """Give statements, all inside them, and all in the procedures that they call, each of those once."""
+    """Yield statements, all inside them, and all in the procedures that they call, each procedure once."""
     called: set[str] = set()
     order = 0
     waiting: list[tuple[tree.Statement, Scope, frozenset[str], Span | None, int | None]] = [
@@ -236,8 +240,8 @@ def _walk(body: Sequence[tree.Statement], scope: Scope, symbols: Symbols) -> Ite
             locked |= {name for target in node.targets if (name := written_name(target, own)) is not None}
         if loop is None and isinstance(node, tree.While | tree.Repeat | tree.For):
             loop = order
-        # A COBEGIN inside has branches of its own, which are looked at there.
-        waiting += [(inner, own, locked, call, loop) for inner in reversed(parts(node))]
+        # The branches of an inner COBEGIN are checked there.
+        waiting += [(inner, own, locked, call, loop) for inner in reversed(child_statements(node))]
         if isinstance(node, tree.Call) and node.name.key not in called:
             called.add(node.name.key)
             procedure = symbols.procedures.get(node.name.key)

@@ -1,8 +1,8 @@
-"""OPEN, GRASP, OPERATE and READ: which gripper holds what, and what sensors find."""
+"""OPEN, GRASP, OPERATE and READ: grippers, devices and sensors."""
 
 from armwright.errors import closest
 from armwright.program.flow_analysis.context import Steps, of_state
-from armwright.program.flow_analysis.definite_assignment import need, need_indices
+from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import set_pose
 from armwright.program.flow_analysis.state import LAST, FlowState
@@ -19,16 +19,16 @@ from armwright.program.syntax import tree
 
 def open_(state: FlowState, node: tree.Open) -> None:
     """Open the fingers of an arm."""
-    need(state, node.width)
+    require_value(state, node.width)
     if isinstance(node.arm, tree.ArmName):
-        state.mention(node.arm)
-        state.use(node.arm.key, node.span.to(node.arm.span))
+        state.note_arms(node.arm)
+        state.note_arm_use(node.arm.key, node.span.to(node.arm.span))
         state.table.open(node.arm.key, node.span)
 
 
 def grasp(state: FlowState, node: tree.Grasp) -> None:
-    """Close the fingers of an arm; say which when no arm is named."""
-    state.mention(node.arm)
+    """Close the fingers of an arm: the one that was used last where none is named."""
+    state.note_arms(node.arm)
     arm = node.arm.key if isinstance(node.arm, tree.ArmName) else state.last[LAST]
     if node.arm is not None and not isinstance(node.arm, tree.ArmName):
         return
@@ -41,16 +41,16 @@ def grasp(state: FlowState, node: tree.Grasp) -> None:
         return
     state.record(node, None if arm == UNKNOWN else arm)
     if arm == UNKNOWN:
-        state.lose_arms(grasps=True)
+        state.forget_arms(grasps=True)
         return
-    state.use(arm, node.span)
+    state.note_arm_use(arm, node.span)
     _closed_on_arrival(state, arm)
     state.table.close(arm, node.span)
 
 
 def _closed_on_arrival(state: FlowState, arm: str) -> None:
-    """Point at a gripper that came to its object without room for it between the fingers."""
-    hand = state.table.hands[arm]
+    """Note a gripper that arrives at its object with closed fingers."""
+    hand = state.table.grippers[arm]
     opened_late = hand.arrived_open is None and hand.opened is not None
     never_opened = hand.arrived_open is False and hand.opened is None
     if hand.arrival is None or hand.at is None or not (opened_late or never_opened):
@@ -60,33 +60,33 @@ def _closed_on_arrival(state: FlowState, arm: str) -> None:
     state.report("L301", text, hand.arrival, "it arrives here", secondary=here, advice=advice)
 
 
-# ---- tools and sensors ---------------------------------------------------------------------------------------------
+# ---- tools and sensors -----------------------------------------------------------------------------------------------
 
 
 def read_system(state: FlowState, node: tree.ReadSystem) -> None:
-    """Ask the sensors of an arm where it is."""
+    """Read the joint positions of an arm."""
     if isinstance(node.arm, tree.ArmName):
-        state.mention(node.arm)
-        state.use(node.arm.key, node.span)
-        # They may find the arm elsewhere, and with it what hangs on it.
+        state.note_arms(node.arm)
+        state.note_arm_use(node.arm.key, node.span)
+        # The arm may be elsewhere, and with it what it carries.
         state.table.displace(node.arm.key, mover=node.arm.key)
 
 
 def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
-    """Ask the camera for frames."""
+    """Read frames from the camera."""
     for target in node.targets:
         if isinstance(target, tree.Poison):
             for name in sorted(target.names):
                 if not is_arm(name):
                     state.table.forget(name)
             continue
-        need_indices(state, target)
+        require_indices(state, target)
         frame = state.frame(target)
         if frame is None or frame == WORLD:
             continue
         visions = state.cell.visions if state.cell else None
         own = "'" in frame or "[" in frame
-        if visions is not None and not own and frame not in visions and state.settle(frame):
+        if visions is not None and not own and frame not in visions and state.is_first_report(frame):
             near = closest(expression_text(target), visions)
             text = f"the camera of the cell has no answer for `{expression_text(target)}`"
             state.report("W601", text, target.span, "will not be found", advice=did_you_mean(near))

@@ -1,14 +1,14 @@
-"""What is known of one frame or one hand at a moment of a program."""
+"""Facts about one frame or one gripper at a point of a program."""
 
 import attrs
 
-from armwright.program.flow_analysis.lattice import same
+from armwright.program.flow_analysis.lattice import agreed_value
 from armwright.program.language.source import Span
 
-# Where a gripper stands, or what it holds, when nobody knows.
+# The frame at a gripper, or in it, where it is unknown.
 UNKNOWN = "?"
-# Names that wipe where all hands are and what their fingers do, and what they hold.
-HANDS, GRIPS = "(hands)", "(grips)"
+# Keys that invalidate the states of all grippers, and what they hold.
+GRIPPERS, GRIPS = "(hands)", "(grips)"
 
 
 @attrs.frozen
@@ -16,9 +16,9 @@ class Link:
     """One affixment.
 
     Attributes:
-        parent: the frame above; None when nobody knows whether there is one.
+        parent: the parent frame; None where it is unknown whether there is one.
         span: the AFFIX that made it; None where the cell did.
-        rigid: whether the frame above comes along when this one is given another pose.
+        rigid: whether the parent moves too when this frame is assigned a pose.
     """
 
     parent: str | None
@@ -28,7 +28,7 @@ class Link:
 
 @attrs.frozen
 class Assignment:
-    """One value given to a frame: in which order, where, and whether the frame stood somewhere before."""
+    """One assignment of a frame: its order, its statement, and whether the frame had a pose before."""
 
     order: int
     span: Span
@@ -37,30 +37,30 @@ class Assignment:
 
 @attrs.frozen
 class Divergence:
-    """What gives a variable its value on one path and not on the other.
+    """The statement that assigns a variable on one path and not on the other.
 
     Attributes:
         span: its head.
-        depth: in how many conditions it stands.
-        says: how it comes that there may be no value.
-        help: what to do.
+        depth: number of conditions around it.
+        message: why there may be no value.
+        advice: what to do.
     """
 
     span: Span
     depth: int
-    says: str
-    help: str
+    message: str
+    advice: str
 
 
 @attrs.frozen
 class GripperState:
-    """What is known of one hand, but for what it holds.
+    """Facts about one gripper, without what it holds.
 
     Attributes:
         open: whether the fingers are open; None at the start of a program.
-        doubtful: whether nobody knows what the program did to the fingers.
-        at: the frame at which the gripper stands.
-        arrival: the MOVE of the arm itself that brought it there.
+        doubtful: whether it is unknown what the program did to the fingers.
+        at: the frame at which the gripper is.
+        arrival: the MOVE of the arm itself that ended there.
         arrived_open: whether the fingers were open then.
         opened: the OPEN since then.
         left: the frame that the fingers release while it hung on the arm, and the OPEN that did it.
@@ -84,12 +84,12 @@ class Grip:
 
 
 ANY_LINK = Link(None)
-ANY_HAND = GripperState(doubtful=True, at=UNKNOWN)
+ANY_GRIPPER = GripperState(doubtful=True, at=UNKNOWN)
 ANY_GRIP = Grip(UNKNOWN)
 
 
-def joined_links(link: Link | None, other: Link | None) -> Link | None:
-    """Return what holds of an affixment where two paths meet."""
+def join_links(link: Link | None, other: Link | None) -> Link | None:
+    """Return the fact about an affixment where two paths merge."""
     if link == other:
         return link
     if link is None or other is None or (link.parent, link.rigid) != (other.parent, other.rigid):
@@ -97,19 +97,19 @@ def joined_links(link: Link | None, other: Link | None) -> Link | None:
     return link
 
 
-def joined_hands(link: GripperState, other: GripperState) -> GripperState:
-    """Return what holds of a gripper where two paths meet."""
+def join_grippers(link: GripperState, other: GripperState) -> GripperState:
+    """Return the fact about a gripper where two paths merge."""
     if link == other:
         return link
     return GripperState(
-        open=same(link.open, other.open),
+        open=agreed_value(link.open, other.open),
         doubtful=link.doubtful or other.doubtful or link.open != other.open,
         at=link.at if link.at == other.at else UNKNOWN,
     )
 
 
-def joined_grips(link: Grip | None, other: Grip | None) -> Grip | None:
-    """Return what holds of what a gripper holds where two paths meet."""
+def join_grips(link: Grip | None, other: Grip | None) -> Grip | None:
+    """Return the fact about the held frame where two paths merge."""
     if link is None or other is None or link.frame != other.frame:
         return link if link == other else ANY_GRIP
     return link

@@ -1,4 +1,4 @@
-"""The frame table of the checker: what hangs on what and since where, what has a value, what each hand is doing."""
+"""The frame tree of the analysis: parents, assigned values, and the state of each gripper."""
 
 from collections.abc import Iterator
 from operator import or_
@@ -7,96 +7,98 @@ import attrs
 
 from armwright.program.flow_analysis.facts import (
     ANY_GRIP,
-    ANY_HAND,
+    ANY_GRIPPER,
     ANY_LINK,
+    GRIPPERS,
     GRIPS,
-    HANDS,
     UNKNOWN,
     Assignment,
     Divergence,
     Grip,
     GripperState,
     Link,
-    joined_grips,
-    joined_hands,
-    joined_links,
+    join_grippers,
+    join_grips,
+    join_links,
 )
-from armwright.program.flow_analysis.lattice import Facts, FactTable, same
-from armwright.program.flow_analysis.poses import HERE, Pose, after, inverse
+from armwright.program.flow_analysis.lattice import Facts, FactTable, agreed_value
+from armwright.program.flow_analysis.poses import IDENTITY, Pose, compose, inverse
 from armwright.program.language.diagnostic import Label, labels
 from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import STATION, WORLD, KnownCell
 
-# Frames that hang on one another, up to which a pose is worked out.
+# Longest chain of parents along which a pose is computed.
 _MAX_CHAIN_LENGTH = 50
 
 
 class FrameState:
-    """Frames and hands, as far as one can know."""
+    """Frames and grippers, as far as they are known."""
 
     def __init__(self, cell: KnownCell | None, facts: Facts, *, rigid: bool = False) -> None:
-        """Start with what the cell says.
+        """Start with the frames of the cell.
 
         Args:
             cell: frames that have a value from the start; None when any may have.
-            facts: where to keep what is known.
-            rigid: whether any frame of the program may hang rigidly.
+            facts: the store of the facts.
+            rigid: whether the program affixes any frame rigidly.
         """
         self._facts, self._rigid = facts, rigid
         self._children: dict[str, int] = {}
-        self._count = self._carried = self._doubts = self._assignments = self._order = 0
+        self._count = self._carried = self._unknown_parents = self._assignments = self._order = 0
         self.links: FactTable[Link | None] = FactTable(
-            facts, default=None, unknown=ANY_LINK, joined=joined_links, watch=self._watch
+            facts, default=None, unknown=ANY_LINK, joined=join_links, watch=self._watch
         )
-        self.valued = FactTable(facts, default=False, unknown=True, joined=or_)
-        # Of what may have a value, whether it has one on every path here, or where the paths have parted.
-        self.sure: FactTable[Divergence | bool] = FactTable(
-            facts, default=False, unknown=True, joined=self._joined_sure
+        self.may_be_assigned = FactTable(facts, default=False, unknown=True, joined=or_)
+        # Of what may have a value, whether it is definitely assigned, or where the paths diverge.
+        self.definitely_assigned: FactTable[Divergence | bool] = FactTable(
+            facts, default=False, unknown=True, joined=self._join_assigned
         )
-        self.parting: Divergence | None = None
-        # Where frames stand, seen from what they hang on.
-        self._steps: FactTable[Pose | None] = FactTable(facts, default=None, unknown=None, joined=same)
-        self.assigned: FactTable[Assignment | None] = FactTable(facts, default=None, unknown=None, joined=same)
-        self.hands = FactTable(facts, default=GripperState(), unknown=ANY_HAND, joined=joined_hands, group=HANDS)
+        self.divergence: Divergence | None = None
+        # Poses of frames relative to their parents.
+        self._steps: FactTable[Pose | None] = FactTable(facts, default=None, unknown=None, joined=agreed_value)
+        self.assigned: FactTable[Assignment | None] = FactTable(facts, default=None, unknown=None, joined=agreed_value)
+        self.grippers = FactTable(
+            facts, default=GripperState(), unknown=ANY_GRIPPER, joined=join_grippers, group=GRIPPERS
+        )
         self.grips: FactTable[Grip | None] = FactTable(
-            facts, default=None, unknown=ANY_GRIP, joined=joined_grips, group=GRIPS
+            facts, default=None, unknown=ANY_GRIP, joined=join_grips, group=GRIPS
         )
         frames = dict(cell.frames) if cell else {}
         for name in (WORLD, STATION, *frames):
-            self.has(name)
+            self.mark_assigned(name)
         for name, parent in frames.items():
             if parent != WORLD:
-                self.links.put(name, Link(parent))
+                self.links.set(name, Link(parent))
 
-    # ---- looking ---------------------------------------------------------------------------------------------------
+    # ---- queries -----------------------------------------------------------------------------------------------------
 
     @property
     def is_empty(self) -> bool:
-        """Whether no frame has been given a value and none hangs on another."""
+        """Whether no frame has been assigned or affixed."""
         return not self._assignments and not self._count
 
-    def above(self, name: str) -> Iterator[str]:
-        """Walk up from the frame that ``name`` hangs on, as far as one can know."""
+    def ancestors(self, name: str) -> Iterator[str]:
+        """Yield the known ancestors of a frame, its parent first."""
         while (link := self.links[name]) is not None and link.parent is not None:
             name = link.parent
             yield name
 
-    def would_ring(self, child: str, parent: str) -> bool:
-        """Whether hanging ``child`` on ``parent`` certainly closes a ring."""
+    def would_close_cycle(self, child: str, parent: str) -> bool:
+        """Whether affixing ``child`` to ``parent`` certainly closes a cycle."""
         if is_any_element(child):
             return False
-        # What nothing hangs on can be hung anywhere: no long path up for the common case.
-        return child == parent or (self._children.get(child, 0) > 0 and child in self.above(parent))
+        # A frame without children can be affixed anywhere: the common case needs no walk to the root.
+        return child == parent or (self._children.get(child, 0) > 0 and child in self.ancestors(parent))
 
-    def carrier(self, name: str) -> str | None:
-        """Return the arm that a frame hangs on, directly or through others; None if there is none."""
-        # The path up may be long: it is not gone where it leads nowhere.
-        return next((above for above in self.above(name) if is_arm(above)), None) if self._carried else None
+    def carrying_arm(self, name: str) -> str | None:
+        """Return the arm among the ancestors of a frame; None if there is none."""
+        # The walk may be long, and is not made where no arm carries anything.
+        return next((above for above in self.ancestors(name) if is_arm(above)), None) if self._carried else None
 
-    def unknown(self, name: str) -> bool:
-        """Whether one cannot know what a frame hangs on."""
-        if not self._doubts and not self._facts.wipes:
+    def is_parent_unknown(self, name: str) -> bool:
+        """Whether the parent of a frame, or of an ancestor, is unknown."""
+        if not self._unknown_parents and not self._facts.invalidated:
             return is_any_element(name)
         while not is_any_element(name):
             link = self.links[name]
@@ -107,8 +109,8 @@ class FrameState:
             name = link.parent
         return True
 
-    def leader(self, name: str) -> str | None:
-        """Return the frame that is given another pose when ``name`` is; None when one cannot know."""
+    def rigid_root(self, name: str) -> str | None:
+        """Return the topmost frame that moves when ``name`` is assigned a pose; None where it is unknown."""
         while self._rigid:
             link = self.links[name]
             if link is None or not (link.rigid or link.parent is None):
@@ -118,22 +120,22 @@ class FrameState:
             name = link.parent
         return name
 
-    def holder(self, name: str) -> str | None:
-        """Return the arm whose hand closed on a frame; UNKNOWN when one may have, None when none has."""
+    def holding_arm(self, name: str) -> str | None:
+        """Return the arm whose gripper closed on a frame; UNKNOWN where one may have, None where none has."""
         grips = {arm: grip.frame for arm, grip in self.grips.items() if grip is not None}
         if UNKNOWN in grips.values() or self.grips[""] is not None:
             return UNKNOWN
         return next((arm for arm, frame in grips.items() if frame == name), None)
 
-    def where(self, name: str) -> Pose | None:
-        """Return where a frame stands in WORLD; None where that is not certain, or up a long path."""
-        pose: Pose | None = HERE
+    def world_pose(self, name: str) -> Pose | None:
+        """Return the pose of a frame in WORLD; None where it is not constant, or the chain is long."""
+        pose: Pose | None = IDENTITY
         for _ in range(_MAX_CHAIN_LENGTH):
             if name == WORLD or pose is None:
                 return pose
             if is_any_element(name) or is_arm(name) or (step := self._steps[name]) is None:
                 return None
-            pose, link = after(step, pose), self.links[name]
+            pose, link = compose(step, pose), self.links[name]
             if link is None:
                 return pose
             if link.parent is None:
@@ -141,108 +143,108 @@ class FrameState:
             name = link.parent
         return None
 
-    def step(self, child: str, parent: str) -> Pose | None:
-        """Return the step from one frame to another; None where that is not certain."""
-        there, here = self.where(child), self.where(parent)
-        return None if there is None or here is None else after(inverse(here), there)
+    def relative_pose(self, child: str, parent: str) -> Pose | None:
+        """Return the pose of one frame relative to another; None where it is not constant."""
+        there, here = self.world_pose(child), self.world_pose(parent)
+        return None if there is None or here is None else compose(inverse(here), there)
 
-    def affixed(self, name: str, text: str) -> tuple[Label, ...]:
-        """Return a label on the AFFIX that hung a frame where it hangs; none where there is no such statement."""
+    def affix_labels(self, name: str, text: str) -> tuple[Label, ...]:
+        """Return a label on the AFFIX that gave a frame its parent; none where there is no such statement."""
         link = self.links[name]
         return labels(link.span if link else None, text)
 
-    # ---- changing --------------------------------------------------------------------------------------------------
+    # ---- transfer functions ------------------------------------------------------------------------------------------
 
-    def has(self, name: str) -> None:
-        """Take note that a variable has a value, or that nobody knows."""
-        self.valued.put(name, True)
-        self.sure.put(name, True)
+    def mark_assigned(self, name: str) -> None:
+        """Record that a variable has a value, or that it is unknown whether it has."""
+        self.may_be_assigned.set(name, True)
+        self.definitely_assigned.set(name, True)
 
-    def lacks(self, name: str) -> None:
-        """Take note that a variable has no value yet."""
-        self.valued.put(name, False)
-        self.sure.put(name, False)
+    def mark_unassigned(self, name: str) -> None:
+        """Record that a variable has no value yet."""
+        self.may_be_assigned.set(name, False)
+        self.definitely_assigned.set(name, False)
 
-    def hang(
+    def affix(
         self, child: str, parent: str, span: Span | None, *, rigid: bool = False, step: Pose | None = None
     ) -> None:
-        """Hang a frame on another, at a step from it where that is certain."""
+        """Affix a frame to another, at a relative pose where that is constant."""
         if is_any_element(child):
             self.forget(child)
             return
-        self.links.put(child, ANY_LINK if is_any_element(parent) else Link(parent, span, rigid))
-        self._steps.put(child, step)
-        self.has(child)
-        if self._facts.shaky and not self._steady(child):
-            self.lose()
+        self.links.set(child, ANY_LINK if is_any_element(parent) else Link(parent, span, rigid))
+        self._steps.set(child, step)
+        self.mark_assigned(child)
+        if self._facts.uncertainties and not self._is_fixed(child):
+            self.forget_grippers()
 
-    def cut(self, child: str) -> None:
-        """Cut a frame loose."""
+    def unfix(self, child: str) -> None:
+        """Remove the parent of a frame; it keeps its pose."""
         if is_any_element(child):
             self.forget(child)
         elif self.links[child] is not None:
-            stands = self.where(child)
-            self.links.put(child, None)
-            self._steps.put(child, stands)
+            pose = self.world_pose(child)
+            self.links.set(child, None)
+            self._steps.set(child, pose)
 
-    def stand(self, name: str, pose: Pose | None) -> None:
-        """Take note of where a frame has been put, in WORLD; not where putting one may move others."""
+    def set_world_pose(self, name: str, pose: Pose | None) -> None:
+        """Record the pose of a frame in WORLD, unless assigning one may move others."""
         link = None if is_any_element(name) else self.links[name]
         if is_any_element(name) or pose is None or self._rigid or (link is not None and link.parent is None):
             return
-        above = HERE if link is None or link.parent is None else self.where(link.parent)
-        self._steps.put(name, None if above is None else after(inverse(above), pose))
+        above = IDENTITY if link is None or link.parent is None else self.world_pose(link.parent)
+        self._steps.set(name, None if above is None else compose(inverse(above), pose))
 
     def assign(self, name: str, span: Span) -> None:
-        """Give a frame a value, and thereby another pose."""
+        """Record the assignment of a pose to a frame."""
         self._assignments += 1
         self._order += 1
         if is_any_element(name):
             self.forget(name)
             return
-        self.assigned.put(name, Assignment(self._order, span, moved=self.valued[name]))
-        self._steps.put(name, None)
-        self.has(name)
-        leader = self.leader(name)
-        if leader is None:
-            self.lose()
+        self.assigned.set(name, Assignment(self._order, span, moved=self.may_be_assigned[name]))
+        self._steps.set(name, None)
+        self.mark_assigned(name)
+        root = self.rigid_root(name)
+        if root is None:
+            self.forget_grippers()
         else:
-            self.displace(leader)
+            self.displace(root)
 
     def displace(self, name: str, mover: str | None = None) -> None:
-        """Put a frame elsewhere; what hangs on it follows, and no hand stands at it or holds it any more.
+        """Move a frame with its descendants: no gripper is at them or holds them any more.
 
         Args:
-            name: the frame, or the arm that carries what hangs on it.
-            mover: the arm that did it, if one did: what it carries goes along with its own hand.
+            name: the frame, or the arm that carries it.
+            mover: the arm that moved it, if one did: what it carries moves with its gripper.
         """
-        for arm, hand in self.hands.items():
-            if arm != mover and (frame := self._left(hand.at, name)) != hand.at:
-                self.hands.put(arm, attrs.evolve(hand, at=frame, arrival=None))
+        for arm, gripper in self.grippers.items():
+            if arm != mover and (frame := self._frame_after_displacement(gripper.at, name)) != gripper.at:
+                self.grippers.set(arm, attrs.evolve(gripper, at=frame, arrival=None))
         for arm, grip in self.grips.items():
             if arm != mover and grip is not None:
-                self._hold(arm, grip, self._left(grip.frame, name))
+                self._set_grip(arm, grip, self._frame_after_displacement(grip.frame, name))
 
     def arrive(self, arm: str, frame: str | None, mover: Span | None) -> None:
-        """Move a gripper and all that it carries.
+        """Record that a gripper has moved, with all that its arm carries.
 
         Args:
             arm: the arm.
-            frame: the frame to which it has come, or that it has taken there; UNKNOWN when one cannot know.
+            frame: the frame at which it arrives, or which it has carried there; UNKNOWN where it is unknown.
             mover: the MOVE if it moved the arm itself.
         """
         self.displace(arm, mover=arm)
-        hand, grip = self.hands[arm], self.grips[arm]
+        gripper, grip = self.grippers[arm], self.grips[arm]
         if grip is not None and grip.frame not in (UNKNOWN, frame):
             gone = UNKNOWN if frame == UNKNOWN else None
-            self._hold(arm, grip, {True: grip.frame, False: gone, None: UNKNOWN}[self._on(grip.frame, arm)])
-        if mover and frame not in (None, UNKNOWN) and (along := self._on(frame, arm)) is not False:
-            # The goal has gone along: the gripper stands only at what it stood at before and has taken with it.
-            frame, mover = (self._taken(hand.at, arm) if along else UNKNOWN), None
-        elif frame not in (None, UNKNOWN) and not self._steady(frame):
+            self._set_grip(arm, grip, {True: grip.frame, False: gone, None: UNKNOWN}[self._is_on(grip.frame, arm)])
+        if mover and frame not in (None, UNKNOWN) and (along := self._is_on(frame, arm)) is not False:
+            # The goal has moved with the arm: the gripper is only at what it was at before and carries.
+            frame, mover = (self._frame_after_carrying(gripper.at, arm) if along else UNKNOWN), None
+        elif frame not in (None, UNKNOWN) and not self._is_fixed(frame):
             frame = UNKNOWN
-        arrival = None if hand.doubtful or frame == UNKNOWN else mover
-        self.hands.put(arm, attrs.evolve(hand, at=frame, arrival=arrival, arrived_open=hand.open, opened=None))
+        arrival = None if gripper.doubtful or frame == UNKNOWN else mover
+        self.grippers.set(arm, attrs.evolve(gripper, at=frame, arrival=arrival, arrived_open=gripper.open, opened=None))
 
     def open(self, arm: str, span: Span) -> None:
         """Open the fingers."""
@@ -251,111 +253,111 @@ class FrameState:
         released = (
             None if grasped is None or (link := self.links[grasped]) is None or link.parent != arm else (grasped, span)
         )
-        self.hands.put(arm, attrs.evolve(self.hands[arm], open=True, doubtful=False, opened=span, left=released))
-        self.grips.put(arm, None)
+        self.grippers.set(arm, attrs.evolve(self.grippers[arm], open=True, doubtful=False, opened=span, left=released))
+        self.grips.set(arm, None)
 
     def close(self, arm: str, span: Span) -> None:
         """Close the fingers."""
-        hand = self.hands[arm]
-        self.hands.put(arm, attrs.evolve(hand, open=False, doubtful=False, left=None))
-        self.grips.put(arm, Grip(hand.at, span) if hand.at else None)
+        gripper = self.grippers[arm]
+        self.grippers.set(arm, attrs.evolve(gripper, open=False, doubtful=False, left=None))
+        self.grips.set(arm, Grip(gripper.at, span) if gripper.at else None)
 
-    # ---- forgetting ------------------------------------------------------------------------------------------------
+    # ---- invalidation ------------------------------------------------------------------------------------------------
 
     def forget(self, name: str) -> None:
-        """Give up what is known of a frame, and of hands that may have had to do with it."""
+        """Invalidate the facts about a frame, and about grippers that may be at it."""
         if is_any_element(name):
-            self._facts.wipe(name)
+            self._facts.invalidate(name)
         else:
-            self.links.put(name, self.links.unknown)
-            self.has(name)
-            self.assigned.put(name, None)
-            self._steps.put(name, None)
-        self.lose()
+            self.links.set(name, self.links.unknown)
+            self.mark_assigned(name)
+            self.assigned.set(name, None)
+            self._steps.set(name, None)
+        self.forget_grippers()
 
-    def forget_hand(self, arm: str | None, *, grasps: bool) -> None:
-        """Give up what is known of a gripper.
+    def forget_gripper(self, arm: str | None, *, grasps: bool) -> None:
+        """Invalidate the facts about a gripper.
 
         Args:
             arm: the arm; None when it may be any.
             grasps: whether it may have closed its fingers on something.
         """
         if arm is not None:
-            self.hands.put(arm, self.hands.unknown)
-            self.grips.put(arm, self.grips.unknown if grasps else self.grips[arm])
+            self.grippers.set(arm, self.grippers.unknown)
+            self.grips.set(arm, self.grips.unknown if grasps else self.grips[arm])
         else:
-            for name in (HANDS, GRIPS) if grasps else (HANDS,):
-                self._facts.wipe(name)
-        self.lose()
+            for name in (GRIPPERS, GRIPS) if grasps else (GRIPPERS,):
+                self._facts.invalidate(name)
+        self.forget_grippers()
 
-    def shift(self, name: str) -> None:
-        """Take note that a frame may have been given another pose; what it hangs on stays known."""
+    def forget_pose(self, name: str) -> None:
+        """Invalidate the pose of a frame; its parent stays known."""
         if is_any_element(name):
-            self._facts.wipe(name)
+            self._facts.invalidate(name)
         else:
-            self.has(name)
-            self.assigned.put(name, None)
-            self._steps.put(name, None)
+            self.mark_assigned(name)
+            self.assigned.set(name, None)
+            self._steps.set(name, None)
 
-    def lose(self) -> None:
-        """Take note that any frame may have been moved: where hands stand and what they hold is unknown."""
-        for arm, hand in self.hands.items():
-            if hand.at not in (None, UNKNOWN):
-                self.hands.put(arm, attrs.evolve(hand, at=UNKNOWN, arrival=None))
+    def forget_grippers(self) -> None:
+        """Invalidate what every gripper is at and holds: any frame may have moved."""
+        for arm, gripper in self.grippers.items():
+            if gripper.at not in (None, UNKNOWN):
+                self.grippers.set(arm, attrs.evolve(gripper, at=UNKNOWN, arrival=None))
         for arm, grip in self.grips.items():
             if grip is not None:
-                self._hold(arm, grip, UNKNOWN)
+                self._set_grip(arm, grip, UNKNOWN)
 
-    def drop(self, name: str, *, array: bool = False) -> None:
-        """Take a frame, or an array of them, away: what hung on it keeps its pose."""
+    def remove(self, name: str, *, array: bool = False) -> None:
+        """Remove a frame, or an array of them; its children keep their poses."""
         if array or self._children.get(name, 0):
             for child, link in self.links.items():
                 parent = link.parent if link else None
                 if parent == name or (array and parent is not None and parent.startswith(f"{name}[")):
-                    self.cut(child)
+                    self.unfix(child)
 
-    # ---- inside ----------------------------------------------------------------------------------------------------
+    # ---- inside ------------------------------------------------------------------------------------------------------
 
-    def _joined_sure(self, first: Divergence | bool, other: Divergence | bool) -> Divergence | bool:  # noqa: FBT001 - two values
+    def _join_assigned(self, first: Divergence | bool, other: Divergence | bool) -> Divergence | bool:  # noqa: FBT001 - two values
         if first == other:
             return first
-        return next((each for each in (first, other) if isinstance(each, Divergence)), self.parting or True)
+        return next((each for each in (first, other) if isinstance(each, Divergence)), self.divergence or True)
 
-    def _hold(self, arm: str, grip: Grip, frame: str | None) -> None:
-        """Let a gripper hold something else than before, or nothing, or nobody knows what."""
+    def _set_grip(self, arm: str, grip: Grip, frame: str | None) -> None:
+        """Set what a gripper holds: a frame, nothing, or an unknown one."""
         if frame != grip.frame:
-            self.grips.put(arm, attrs.evolve(grip, frame=frame) if frame is not None else None)
+            self.grips.set(arm, attrs.evolve(grip, frame=frame) if frame is not None else None)
 
-    def _taken(self, frame: str | None, arm: str) -> str | None:
-        """Return where a gripper stands that stood at ``at`` and has taken along what hangs on it."""
+    def _frame_after_carrying(self, frame: str | None, arm: str) -> str | None:
+        """Return the frame at a gripper after its arm has carried its descendants away."""
         if frame is None or frame == UNKNOWN:
             return frame
-        return {True: frame, False: None, None: UNKNOWN}[self._on(frame, arm)]
+        return {True: frame, False: None, None: UNKNOWN}[self._is_on(frame, arm)]
 
-    def _left(self, grasped: str | None, moved: str) -> str | None:
-        """Return where a gripper stands, or what it holds, after ``moved`` was put elsewhere."""
+    def _frame_after_displacement(self, grasped: str | None, moved: str) -> str | None:
+        """Return the frame at a gripper, or in it, after ``moved`` was displaced."""
         if grasped is None or grasped == UNKNOWN:
             return grasped
-        return {True: None, False: grasped, None: UNKNOWN}[self._on(grasped, moved)]
+        return {True: None, False: grasped, None: UNKNOWN}[self._is_on(grasped, moved)]
 
-    def _on(self, name: str, above: str) -> bool | None:
-        """Whether a frame is another or hangs on it; None when one cannot know."""
-        if name == above or (self._children.get(above, 0) > 0 and above in self.above(name)):
+    def _is_on(self, name: str, above: str) -> bool | None:
+        """Whether a frame is another or its descendant; None where it is unknown."""
+        if name == above or (self._children.get(above, 0) > 0 and above in self.ancestors(name)):
             return True
-        return None if self.unknown(name) or is_any_element(above) else False
+        return None if self.is_parent_unknown(name) or is_any_element(above) else False
 
-    def _steady(self, name: str) -> bool:
-        """Whether nobody else moves a frame."""
+    def _is_fixed(self, name: str) -> bool:
+        """Whether no other process moves a frame."""
         facts = self._facts
-        if not facts.shaky:
+        if not facts.uncertainties:
             return True
-        if any(first.places for first in facts.shaky) or self.unknown(name):
+        if any(first.moves_frames for first in facts.uncertainties) or self.is_parent_unknown(name):
             return False
-        return not any(facts.is_shaky(first) for first in (name, *self.above(name)))
+        return not any(facts.is_uncertain(first) for first in (name, *self.ancestors(name)))
 
     def _watch(self, link: Link | None, change: int) -> None:
         if link is not None and link.parent is None:
-            self._doubts += change
+            self._unknown_parents += change
         elif link is not None and link.parent is not None:
             self._count += change
             self._carried += change * is_arm(link.parent)

@@ -1,8 +1,8 @@
-"""AFFIX, UNFIX and assignments: what has a value, and what hangs on what."""
+"""AFFIX, UNFIX and assignments: values of variables and parents of frames."""
 
 from armwright.program.flow_analysis import plausibility, poses
 from armwright.program.flow_analysis.context import Steps, of_state
-from armwright.program.flow_analysis.definite_assignment import need, need_indices
+from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label, labels
 from armwright.program.language.kinds import VariableKind
@@ -14,35 +14,35 @@ from armwright.program.syntax import tree
 
 
 def assign(state: FlowState, node: tree.Assign) -> None:
-    """Give a variable a value."""
-    need(state, node.value)
-    need_indices(state, node.target)
+    """Record the assignment of a variable."""
+    require_value(state, node.value)
+    require_indices(state, node.target)
     target = node.target
     frame = state.frame(target)
     if frame is not None:
-        plausibility.lengths(state, node.value)
-        stands = poses.certain(state, node.value)
+        plausibility.check_lengths(state, node.value)
+        pose = poses.constant_pose(state, node.value)
         set_pose(state, frame, target, node.span)
-        state.table.stand(frame, stands)
-        plausibility.placed(state, frame, node.value)
+        state.table.set_world_pose(frame, pose)
+        plausibility.check_placement(state, frame, node.value)
         return
     if (name := state.variable(target, VariableKind.SCALAR)) is not None:
-        state.give(name, state.number(node.value), node.span)
+        state.set_number(name, state.number(node.value), node.span)
     elif (name := state.variable(target, VariableKind.TRANS)) is not None:
-        plausibility.lengths(state, node.value)
-        step = poses.certain(state, node.value)
-        state.give(name, None, node.span)
+        plausibility.check_lengths(state, node.value)
+        step = poses.constant_pose(state, node.value)
+        state.set_number(name, None, node.span)
         if not is_any_element(name):
-            state.steps.put(name, step)
+            state.steps.set(name, step)
 
 
 def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) -> None:
-    """Give a frame another pose; say that nothing can, where it hangs rigidly on what no value moves."""
+    """Record the pose of a frame; report one that is rigidly affixed to an arm or WORLD."""
     if is_arm(frame) or frame == WORLD:
         return
-    leader = frame if is_any_element(frame) else state.table.leader(frame)
+    leader = frame if is_any_element(frame) else state.table.rigid_root(frame)
     if leader is not None and leader != frame and (is_arm(leader) or leader == WORLD):
-        name, here = expression_text(node), state.table.affixed(frame, "rigidly attached here")
+        name, here = expression_text(node), state.table.affix_labels(frame, "rigidly attached here")
         text = f"`{name}` is rigidly attached to {state.name(leader)}, which an assignment cannot move"
         advice = f"remove RIGIDLY, or write `UNFIX {name}` before this"
         state.report("E310", text, node.span, "cannot be assigned a pose", secondary=here, advice=advice)
@@ -54,41 +54,41 @@ def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) ->
 
 
 def affix(state: FlowState, node: tree.Affix) -> None:
-    """Hang a frame on another."""
-    state.mention(node.child, node.parent)
-    plausibility.lengths(state, node.at)
+    """Record an AFFIX."""
+    state.note_arms(node.child, node.parent)
+    plausibility.check_lengths(state, node.at)
     child, parent = state.frame(node.child), state.frame(node.parent)
     if node.at is None:
-        need(state, node.child)
+        require_value(state, node.child)
     else:
-        need_indices(state, node.child)
-        need(state, node.at)
-    need(state, node.parent)
+        require_indices(state, node.child)
+        require_value(state, node.at)
+    require_value(state, node.parent)
     if child is None or is_arm(child) or child == WORLD:
         return
     if parent is None:
         state.table.forget(child)
         return
-    if state.table.would_ring(child, parent):
-        _ring(state, node, child, parent)
+    if state.table.would_close_cycle(child, parent):
+        _report_cycle(state, node, child, parent)
         return
-    leaves(state, child, parent, node.span)
-    step = state.table.step(child, parent) if node.at is None else poses.certain(state, node.at)
+    warn_of_implicit_unfix(state, child, parent, node.span)
+    step = state.table.relative_pose(child, parent) if node.at is None else poses.constant_pose(state, node.at)
     if is_any_element(child):
         state.table.forget(child)
         return
     if node.at is None:
-        _late(state, node, child, parent)
-        plausibility.grasped(state, node, child, parent)
+        _note_late_affix(state, node, child, parent)
+        plausibility.check_grasp(state, node, child, parent)
     else:
         state.table.displace(child)
-    state.table.hang(child, parent, node.link, rigid=node.rigid, step=step)
+    state.table.affix(child, parent, node.link, rigid=node.rigid, step=step)
 
 
-def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
-    """Warn when a frame leaves the one it hangs on without UNFIX."""
+def warn_of_implicit_unfix(state: FlowState, child: str, parent: str, span: Span) -> None:
+    """Warn of a frame that gets another parent without UNFIX."""
     link = None if is_any_element(child) else state.table.links[child]
-    if link is None or link.parent is None or link.parent == parent or _may_be(state, parent, link.parent):
+    if link is None or link.parent is None or link.parent == parent or _may_alias(state, parent, link.parent):
         return
     name, old = state.name(child), state.name(link.parent)
     state.report(
@@ -102,18 +102,18 @@ def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
     )
 
 
-def _may_be(state: FlowState, name: str, other: str) -> bool:
-    """Whether two different names may be names of one frame: parameters of a call of which nothing is known."""
+def _may_alias(state: FlowState, name: str, other: str) -> bool:
+    """Whether two names may be aliases of one frame: parameters of an unknown call."""
     if is_any_element(name) or is_any_element(other):
         return True
-    alias = state.facts.may_be_another
+    alias = state.facts.may_alias
     return (alias(name) and not is_arm(name)) or (alias(other) and not is_arm(other))
 
 
-def _ring(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
+def _report_cycle(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
     name = state.name
     chain = []
-    for below in (parent, *state.table.above(parent)):
+    for below in (parent, *state.table.ancestors(parent)):
         if below == child:
             break
         link = state.table.links[below]
@@ -127,8 +127,8 @@ def _ring(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
     )
 
 
-def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
-    """Point at a parent that was moved after the child got its pose, but before it hung there."""
+def _note_late_affix(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
+    """Note a parent that moved after the child got its pose and before it was affixed."""
     above, below = state.table.assigned[parent], state.table.assigned[child]
     if above is None or below is None or not above.moved or above.order < below.order:
         return
@@ -142,9 +142,9 @@ def _late(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
 
 
 def unfix(state: FlowState, node: tree.Unfix) -> None:
-    """Cut a frame loose."""
-    state.mention(node.parent)
-    need_indices(state, node.child, node.parent)
+    """Remove the parent of a frame; it keeps its pose."""
+    state.note_arms(node.parent)
+    require_indices(state, node.child, node.parent)
     child, table = state.frame(node.child), state.table
     if child is None or is_arm(child) or child == WORLD:
         return
@@ -152,15 +152,15 @@ def unfix(state: FlowState, node: tree.Unfix) -> None:
     if parent is not None and not is_any_element(child):
         link = table.links[child]
         above = WORLD if link is None else link.parent
-        if above not in (None, parent) and not _may_be(state, parent, above or WORLD):
-            _not_affixed(state, node, child)
+        if above not in (None, parent) and not _may_alias(state, parent, above or WORLD):
+            _report_not_affixed(state, node, child)
             return
     if node.parent is None or parent == WORLD:
-        need(state, node.child)
-    table.cut(child)
+        require_value(state, node.child)
+    table.unfix(child)
 
 
-def _not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
+def _report_not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
     assert node.parent is not None  # noqa: S101 - it has a name in the frame table
     link, name = state.table.links[child], state.name(child)
     text = f"`{name}` is not affixed to `{expression_text(node.parent)}`"

@@ -1,4 +1,4 @@
-"""What is certain at one moment of a program: facts that can be forgotten, taken back, and joined where paths meet."""
+"""Facts at one point of a program: they can be invalidated, rolled back, and joined where paths merge."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import reduce
@@ -10,25 +10,25 @@ from armwright.program.language.names import array_name
 
 V = TypeVar("V")
 
-# What stands for every name there is.
+# The key that stands for all names.
 EVERYTHING = "*"
 
 
-def base(name: str) -> str:
+def any_element_name(name: str) -> str:
     """Return the array of an element, as a name for any of its elements: ``SLOT[]``; else the name itself."""
     return f"{array_name(name)}[]" if "[" in name else name
 
 
 @attrs.frozen(kw_only=True)
 class Uncertainty:
-    """What others change at any time, so that nothing can be known of it.
+    """What other processes may change at any time, so that no fact about it holds.
 
     Attributes:
         names: of variables and arms; ``SLOT[]`` for any element.
         arms: whether it may be any arm.
         everything: whether it may be anything.
-        excepted: names of which neither is true.
-        places: whether frames may be given other poses through what hangs on them rigidly.
+        excepted: names that are exempt from both.
+        moves_frames: whether frames may move with a child that is rigidly affixed to them.
         aliases: whether a name that is covered may be another name of something else.
     """
 
@@ -36,12 +36,12 @@ class Uncertainty:
     arms: bool = False
     everything: bool = False
     excepted: frozenset[str] = frozenset()
-    places: bool = False
+    moves_frames: bool = False
     aliases: bool = False
 
     def covers(self, name: str) -> bool:
-        """Whether nothing can be known of a name."""
-        if name in self.names or base(name) in self.names:
+        """Whether no fact about a name holds."""
+        if name in self.names or any_element_name(name) in self.names:
             return True
         any_name = self.everything or (self.arms and name.startswith("ARM_"))
         return any_name and array_name(name) not in self.excepted
@@ -49,83 +49,85 @@ class Uncertainty:
 
 @attrs.frozen
 class Outcome:
-    """How a path through a part of a program ended: what it changed, and which names it forgot when."""
+    """The facts at the end of a path: entries that it changed, and names that it invalidated, by version."""
 
     changed: Mapping[tuple["FactTable[Any]", str], Any]
-    wipes: Mapping[str, int]
+    invalidated: Mapping[str, int]
 
 
 class Facts:
-    """All books of one course, which are forgotten and put back together."""
+    """All tables of facts, with a log by which they are rolled back together."""
 
     def __init__(self) -> None:
         """Start without facts."""
-        self.tick = 0
-        self.wipes: dict[str, int] = {}
-        self.shaky: tuple[Uncertainty, ...] = ()
-        # What each entry was that has changed, for the way back.
+        self.version = 0
+        self.invalidated: dict[str, int] = {}
+        self.uncertainties: tuple[Uncertainty, ...] = ()
+        # The former value of each changed entry, for rolling back.
         self.changes: list[tuple[FactTable[Any] | None, str, Any]] = []
 
-    # ---- forgetting ------------------------------------------------------------------------------------------------
+    # ---- invalidation ------------------------------------------------------------------------------------------------
 
-    def wipe(self, name: str) -> None:
-        """Forget all that is known of a name: ``SLOT[]`` for every element, ``*`` for all there is."""
-        self.tick += 1
-        self.changes.append((None, name, self.wipes.get(name)))
-        self.wipes[name] = self.tick
+    def invalidate(self, name: str) -> None:
+        """Invalidate the facts about a name: ``SLOT[]`` for every element, ``*`` for all names."""
+        self.version += 1
+        self.changes.append((None, name, self.invalidated.get(name)))
+        self.invalidated[name] = self.version
 
-    def is_shaky(self, name: str) -> bool:
-        """Whether others may change something of a name at any time."""
-        return any(value.covers(name) for value in self.shaky)
+    def is_uncertain(self, name: str) -> bool:
+        """Whether other processes may change a name at any time."""
+        return any(value.covers(name) for value in self.uncertainties)
 
-    def may_be_another(self, name: str) -> bool:
+    def may_alias(self, name: str) -> bool:
         """Whether a name may be another name of something else."""
-        return any(value.aliases and value.covers(name) for value in self.shaky)
+        return any(value.aliases and value.covers(name) for value in self.uncertainties)
 
-    # ---- paths that part and meet -----------------------------------------------------------------------------------
+    # ---- branching and merging paths ---------------------------------------------------------------------------------
 
     def checkpoint(self) -> int:
-        """Return what to go back to later."""
+        """Return a mark to roll back to."""
         return len(self.changes)
 
     def outcome(self, mark: int) -> Outcome:
-        """Return what has been changed since a mark."""
-        keys = dict.fromkeys((book, key) for book, key, _ in self.changes[mark:] if book is not None)
-        return Outcome({(book, key): book[key] for book, key in keys}, dict(self.wipes))
+        """Return the changes since a mark."""
+        keys = dict.fromkeys((table, key) for table, key, _ in self.changes[mark:] if table is not None)
+        return Outcome({(table, key): table[key] for table, key in keys}, dict(self.invalidated))
 
-    def take_back(self, mark: int) -> None:
-        """Put everything back as it was at a mark."""
+    def roll_back(self, mark: int) -> None:
+        """Restore all facts of a mark."""
         while len(self.changes) > mark:
-            book, key, old = self.changes.pop()
-            if book is not None:
-                book.restore(key, old)
+            table, key, old = self.changes.pop()
+            if table is not None:
+                table.restore(key, old)
             elif old is None:
-                del self.wipes[key]
+                del self.invalidated[key]
             else:
-                self.wipes[key] = old
+                self.invalidated[key] = old
 
-    def join(self, outcomes: Sequence[Outcome], *, together: bool = False) -> None:
-        """Go on where paths meet that parted here.
+    def join(self, outcomes: Sequence[Outcome], *, concurrent: bool = False) -> None:
+        """Join the outcomes of paths that branched here.
 
         Args:
             outcomes: of the paths; at least one.
-            together: whether all of them were gone, side by side, and not one of them.
+            concurrent: whether all paths were taken, side by side, and not one of them.
         """
         joined: list[tuple[FactTable[Any], str, Any]] = []
-        for book, key in dict.fromkeys(entry for outcome in outcomes for entry in outcome.changed):
+        for table, key in dict.fromkeys(entry for outcome in outcomes for entry in outcome.changed):
             values = [
-                outcome.changed[book, key] if (book, key) in outcome.changed else book.under(key, outcome.wipes)
+                outcome.changed[table, key]
+                if (table, key) in outcome.changed
+                else table.value_after(key, outcome.invalidated)
                 for outcome in outcomes
-                if not together or (book, key) in outcome.changed
+                if not concurrent or (table, key) in outcome.changed
             ]
-            joined.append((book, key, reduce(book.joined, values)))
-        for name in dict.fromkeys(name for outcome in outcomes for name in outcome.wipes):
-            last = max(outcome.wipes.get(name, 0) for outcome in outcomes)
-            if last != self.wipes.get(name):
-                self.changes.append((None, name, self.wipes.get(name)))
-                self.wipes[name] = last
-        for book, key, value in joined:
-            book.put(key, value)
+            joined.append((table, key, reduce(table.joined, values)))
+        for name in dict.fromkeys(name for outcome in outcomes for name in outcome.invalidated):
+            last = max(outcome.invalidated.get(name, 0) for outcome in outcomes)
+            if last != self.invalidated.get(name):
+                self.changes.append((None, name, self.invalidated.get(name)))
+                self.invalidated[name] = last
+        for table, key, value in joined:
+            table.set(key, value)
 
 
 class FactTable(Generic[V]):
@@ -141,15 +143,15 @@ class FactTable(Generic[V]):
         group: str = "",
         watch: Callable[[V, int], None] | None = None,
     ) -> None:
-        """Open a book.
+        """Make an empty table.
 
         Args:
-            facts: all books.
-            default: what holds of names that nothing was written of.
-            unknown: what is written where one cannot know.
-            joined: gives what holds where two paths meet.
-            group: a name that, wiped, wipes the whole book.
-            watch: told with 1 of each value that is written and with -1 of each that is overwritten.
+            facts: all tables.
+            default: value of names without an entry.
+            unknown: value of invalidated names (the top of the lattice).
+            joined: the join of the values of two paths.
+            group: a key that invalidates the whole table.
+            watch: called with each value that is written and 1, and with each that is overwritten and -1.
         """
         self._facts, self._group, self._watch = facts, group, watch
         self.default, self.unknown, self.joined = default, unknown, joined
@@ -157,37 +159,41 @@ class FactTable(Generic[V]):
         self._entries: dict[str, tuple[V, int]] = {}
 
     def __getitem__(self, key: str) -> V:
-        """Return what holds of a name."""
-        wipes = self._facts.wipes
-        if wipes:
-            return self.under(key, wipes)
+        """Return the value of a name."""
+        invalidated = self._facts.invalidated
+        if invalidated:
+            return self.value_after(key, invalidated)
         return self._entries.get(key, self._none)[0]
 
-    def under(self, key: str, wipes: Mapping[str, int]) -> V:
-        """Return what holds of a name if these names have been forgotten."""
-        value, tick = self._entries.get(key, self._none)
+    def value_after(self, key: str, invalidated: Mapping[str, int]) -> V:
+        """Return the value of a name after these names have been invalidated."""
+        value, version = self._entries.get(key, self._none)
         array_name, bracket, _ = key.partition("[")
-        wiped = wipes.get(f"{array_name}[]" if bracket else key, 0)
-        if tick < wiped or tick < wipes.get(EVERYTHING, 0) or tick < wipes.get(self._group, 0):
+        invalidated_at = invalidated.get(f"{array_name}[]" if bracket else key, 0)
+        if (
+            version < invalidated_at
+            or version < invalidated.get(EVERYTHING, 0)
+            or version < invalidated.get(self._group, 0)
+        ):
             return self.unknown
         return value
 
     def items(self) -> Iterator[tuple[str, V]]:
-        """Give what was written, as it holds now."""
+        """Yield the entries with their present values."""
         for key in list(self._entries):
             yield key, self[key]
 
-    def put(self, key: str, value: V) -> None:
-        """Write what holds of a name from now on."""
+    def set(self, key: str, value: V) -> None:
+        """Set the value of a name."""
         facts = self._facts
-        if facts.shaky and facts.is_shaky(key):
+        if facts.uncertainties and facts.is_uncertain(key):
             value = self.unknown
         old = self._entries.get(key)
         facts.changes.append((self, key, old))
-        self._write(key, old, (value, facts.tick))
+        self._write(key, old, (value, facts.version))
 
     def restore(self, key: str, old: tuple[V, int] | None) -> None:
-        """Put an entry back."""
+        """Restore an entry."""
         self._write(key, self._entries.get(key), old)
 
     def _write(self, key: str, old: tuple[V, int] | None, new: tuple[V, int] | None) -> None:
@@ -202,6 +208,6 @@ class FactTable(Generic[V]):
             self._entries[key] = new
 
 
-def same(value: V | None, other: V | None) -> V | None:
+def agreed_value(value: V | None, other: V | None) -> V | None:
     """Return what both paths agree on; None where they differ."""
     return value if value == other else None

@@ -1,14 +1,14 @@
-"""PRINT: what is printed needs a value."""
+"""PRINT: its items need a value."""
 
 from armwright.program.flow_analysis.context import Steps, of_state
-from armwright.program.flow_analysis.definite_assignment import need
+from armwright.program.flow_analysis.definite_assignment import require_value
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.syntax import tree
 
 
 def print_(state: FlowState, node: tree.Print) -> None:
-    """Check what one PRINT needs."""
-    need(state, *(item for item in node.items if not isinstance(item, tree.String)))
+    """Require a value of the items of a PRINT."""
+    require_value(state, *(item for item in node.items if not isinstance(item, tree.String)))
 
 
 STEPS: Steps = {tree.Print: of_state(print_)}

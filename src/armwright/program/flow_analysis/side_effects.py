@@ -1,4 +1,4 @@
-"""What a part of a program may change, on any path through it: frames, values, arms.
+"""Side effects of a part of a program on any path through it: frames, values, arms.
 
 Names are those of the text: a parameter or variable of a procedure stands with its procedure, ``FETCH.PART``.
 """
@@ -14,23 +14,23 @@ from armwright.program.language.names import is_arm
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
 
-# A part that changes more than this is taken to change everything.
+# A part with more side effects than this is taken to change everything.
 _MAX_EFFECTS = 400
-# Any arm, nobody knows which.
+# An unknown arm.
 ANY_ARM = "*"
-# So often what procedures that call one another may change is looked at again.
+# Rounds of the fixed-point iteration over procedures that call one another.
 _MAX_ROUNDS = 10
 
 
 @attrs.frozen(kw_only=True)
 class SideEffects:
-    """What may be changed.
+    """Side effects.
 
     Attributes:
-        placed: frames that get another pose by a value, by AFFIX ... AT or from the camera.
-        hung: frames that AFFIX or UNFIX hangs elsewhere.
+        posed: frames that get a pose by assignment, by AFFIX ... AT or from the camera.
+        affixed: frames whose parent AFFIX or UNFIX changes.
         moved: frames that MOVE moves; an AFFIX may be implied.
-        values: numbers and steps.
+        values: numbers and TRANS variables.
         arms: used at all; ``*`` for an arm that is not named.
         grasps: whether a gripper may close on something.
         everything: whether it may be anything.
@@ -38,8 +38,8 @@ class SideEffects:
         retries: whether RETRY may run a TRY part around it again.
     """
 
-    placed: frozenset[str] = frozenset()
-    hung: frozenset[str] = frozenset()
+    posed: frozenset[str] = frozenset()
+    affixed: frozenset[str] = frozenset()
     moved: frozenset[str] = frozenset()
     values: frozenset[str] = frozenset()
     arms: frozenset[str] = frozenset()
@@ -49,7 +49,7 @@ class SideEffects:
     retries: bool = False
 
     def __or__(self, other: "SideEffects") -> "SideEffects":
-        """Return what either may change."""
+        """Return the union of two side effects."""
         if self is NOTHING or other is NOTHING:
             return other if self is NOTHING else self
         merged = {name: getattr(self, name) | getattr(other, name) for name in _FIELDS}
@@ -57,8 +57,8 @@ class SideEffects:
 
     @property
     def names(self) -> frozenset[str]:
-        """All that may be changed."""
-        return self.placed | self.hung | self.moved | self.values | self.arms - {ANY_ARM}
+        """All names that may be changed."""
+        return self.posed | self.affixed | self.moved | self.values | self.arms - {ANY_ARM}
 
 
 _FIELDS = tuple(attrs.fields_dict(SideEffects))
@@ -66,10 +66,13 @@ NOTHING = SideEffects()
 ANYTHING = SideEffects(arms=frozenset({ANY_ARM}), grasps=True, everything=True)
 
 
-def _limited(writes: SideEffects) -> SideEffects:
-    if writes.everything or sum(map(len, (writes.placed, writes.hung, writes.moved, writes.values))) > _MAX_EFFECTS:
-        return attrs.evolve(ANYTHING, halts=writes.halts, retries=writes.retries)
-    return writes
+def _limited(effects: SideEffects) -> SideEffects:
+    if (
+        effects.everything
+        or sum(map(len, (effects.posed, effects.affixed, effects.moved, effects.values))) > _MAX_EFFECTS
+    ):
+        return attrs.evolve(ANYTHING, halts=effects.halts, retries=effects.retries)
+    return effects
 
 
 def written_name(node: tree.Expression, scope: Scope) -> str | None:
@@ -77,20 +80,20 @@ def written_name(node: tree.Expression, scope: Scope) -> str | None:
     if isinstance(node, tree.ArmName):
         return node.key
     if isinstance(node, tree.Index):
-        inner = ",".join(f"{index.value:.12g}" for index in node.indices if isinstance(index, tree.Number))
+        child = ",".join(f"{index.value:.12g}" for index in node.indices if isinstance(index, tree.Number))
         literal = all(isinstance(index, tree.Number) for index in node.indices)
-        return f"{qualified(node.name.key, scope)}[{inner if literal else ''}]"
+        return f"{qualified(node.name.key, scope)}[{child if literal else ''}]"
     return qualified(node.key, scope) if isinstance(node, tree.Name) else None
 
 
 def qualified(key: str, scope: Scope) -> str:
-    """Return a name with its procedure in front, if it is one of its own."""
+    """Return a name with its procedure in front, if it is local to one."""
     procedure = scope.procedure
     return f"{procedure.node.name.key}.{key}" if procedure is not None and scope.is_local(key) else key
 
 
-class Writing:
-    """What each statement of a program may change, found out once."""
+class SideEffectAnalysis:
+    """The side effects of every statement of a program, computed once."""
 
     def __init__(self, program: tree.Program, symbols: Symbols) -> None:
         """Check the procedures."""
@@ -99,124 +102,130 @@ class Writing:
         self._procedures: dict[str, SideEffects] = {}
         bodies = (program.statements, *(node.body.statements for node in program.procedures))
         self.rigid = any(
-            isinstance(statement, tree.Affix) and statement.rigid for body in bodies for statement in every(body)
+            isinstance(statement, tree.Affix) and statement.rigid
+            for body in bodies
+            for statement in walk_statements(body)
         )
-        self._settle(program)
+        self._solve_procedures(program)
 
-    def of(self, statement: tree.Statement, scope: Scope) -> SideEffects:
-        """Return what a statement and all inside it may change."""
+    def effects_of(self, statement: tree.Statement, scope: Scope) -> SideEffects:
+        """Return the side effects of a statement and all inside it."""
         effects = self._known.get(id(statement))
         if effects is None:
-            effects = self._own(statement, scope)
-            for inner in parts(statement):
-                effects |= self.of(inner, scope)
+            effects = self._own_effects(statement, scope)
+            for child in child_statements(statement):
+                effects |= self.effects_of(child, scope)
             if isinstance(statement, tree.Try) and effects.retries:
-                effects = attrs.evolve(effects, retries=self.all(statement.body, scope).retries)
+                effects = attrs.evolve(effects, retries=self.effects_of_all(statement.body, scope).retries)
             self._known[id(statement)] = effects
         return effects
 
-    def all(self, statements: Iterable[tree.Statement], scope: Scope) -> SideEffects:
-        """Return what several statements may change."""
-        return union(self.of(statement, scope) for statement in statements)
+    def effects_of_all(self, statements: Iterable[tree.Statement], scope: Scope) -> SideEffects:
+        """Return the side effects of several statements."""
+        return union(self.effects_of(statement, scope) for statement in statements)
 
-    def called(self, call: tree.Call, scope: Scope) -> SideEffects:
-        """Return what a call may change."""
+    def effects_of_call(self, call: tree.Call, scope: Scope) -> SideEffects:
+        """Return the side effects of a call."""
         procedure = self._symbols.procedures.get(call.name.key)
         if procedure is None:
             return NOTHING
-        writes = self._procedures.get(call.name.key, NOTHING)
+        effects = self._procedures.get(call.name.key, NOTHING)
         arguments = dict(zip(procedure.parameters, call.arguments, strict=False))
-        return _seen_from_outside(writes, call.name.key, arguments, scope)
+        return _in_names_of_caller(effects, call.name.key, arguments, scope)
 
-    def _settle(self, program: tree.Program) -> None:
-        """Find out what procedures may change, through all that they call."""
+    def _solve_procedures(self, program: tree.Program) -> None:
+        """Compute the side effects of procedures, through all that they call, by fixed-point iteration."""
         calls: dict[str, list[tree.Call]] = {}
         for node in program.procedures:
             key = node.name.key
             procedure = self._symbols.procedures.get(key)
             if procedure is None or procedure.node is not node:
                 continue
-            scope, inner = self._symbols.scope(key), list(every(node.body.statements))
+            scope, child = self._symbols.scope(key), list(walk_statements(node.body.statements))
             calls[key] = [
                 statement
-                for statement in inner
+                for statement in child
                 if isinstance(statement, tree.Call) and statement.name.key in self._symbols.procedures
             ]
             self._procedures[key] = union(
-                self._own(statement, scope) for statement in inner if not isinstance(statement, tree.Call | tree.Retry)
+                self._own_effects(statement, scope)
+                for statement in child
+                if not isinstance(statement, tree.Call | tree.Retry)
             )
         order = _callees_first({key: [statement.name.key for statement in several] for key, several in calls.items()})
         for _ in range(_MAX_ROUNDS):
             news = {}
             for key in order:
                 scope, old = self._symbols.scope(key), self._procedures[key]
-                new = union((old, *(self.called(call, scope) for call in calls[key])))
+                new = union((old, *(self.effects_of_call(call, scope) for call in calls[key])))
                 if new != old:
                     news[key] = self._procedures[key] = new
             if not news:
                 return
         self._procedures.update(dict.fromkeys(news, ANYTHING))
 
-    def _own(self, statement: tree.Statement, scope: Scope) -> SideEffects:
-        """Return what one statement may change by itself, without those inside it."""
+    def _own_effects(self, statement: tree.Statement, scope: Scope) -> SideEffects:
+        """Return the side effects of one statement without those inside it."""
         if isinstance(statement, tree.Call):
-            return self.called(statement, scope)
-        own = _OWN.get(type(statement))
+            return self.effects_of_call(statement, scope)
+        own = _OWN_EFFECTS.get(type(statement))
         return NOTHING if own is None else own(scope, statement)
 
 
-def _assigned(scope: Scope, node: tree.Assign) -> SideEffects:
+def _effects_of_assign(scope: Scope, node: tree.Assign) -> SideEffects:
     names = _names(scope, node.target)
     head = node.target.name if isinstance(node.target, tree.Index) else node.target
     kind = scope.type(head.key) if isinstance(head, tree.Name) else None
     is_frame = kind is None or kind.kind is VariableKind.FRAME
-    return SideEffects(placed=names if is_frame else frozenset(), values=frozenset() if is_frame else names)
+    return SideEffects(posed=names if is_frame else frozenset(), values=frozenset() if is_frame else names)
 
 
-def _affixed(scope: Scope, node: tree.Affix) -> SideEffects:
-    hung = _names(scope, node.child)
-    return SideEffects(hung=hung, placed=hung if node.at is not None else frozenset(), arms=_arms(scope, node.parent))
+def _effects_of_affix(scope: Scope, node: tree.Affix) -> SideEffects:
+    affixed = _names(scope, node.child)
+    return SideEffects(
+        affixed=affixed, posed=affixed if node.at is not None else frozenset(), arms=_arms(scope, node.parent)
+    )
 
 
-def _unfixed(scope: Scope, node: tree.Unfix) -> SideEffects:
-    return SideEffects(hung=_names(scope, node.child), arms=_arms(scope, node.parent))
+def _effects_of_unfix(scope: Scope, node: tree.Unfix) -> SideEffects:
+    return SideEffects(affixed=_names(scope, node.child), arms=_arms(scope, node.parent))
 
 
-def _poisoned(scope: Scope, node: tree.Poison) -> SideEffects:
+def _effects_of_poison(scope: Scope, node: tree.Poison) -> SideEffects:
     names = _names(scope, node)
-    return SideEffects(placed=names, hung=names, values=names, arms=_arms(scope, node), grasps=True)
+    return SideEffects(posed=names, affixed=names, values=names, arms=_arms(scope, node), grasps=True)
 
 
-# What statements may change by themselves; those that are missing change nothing.
-_OWN: Mapping[type, Callable[..., SideEffects]] = {
-    tree.Assign: _assigned,
-    tree.Affix: _affixed,
-    tree.Unfix: _unfixed,
+# The side effects of statements without those inside; the others have none.
+_OWN_EFFECTS: Mapping[type, Callable[..., SideEffects]] = {
+    tree.Assign: _effects_of_assign,
+    tree.Affix: _effects_of_affix,
+    tree.Unfix: _effects_of_unfix,
     tree.Open: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
     tree.ReadSystem: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
     tree.Grasp: lambda scope, node: SideEffects(arms=_arms(scope, node.arm) or frozenset({ANY_ARM}), grasps=True),
     tree.ReadVisions: lambda scope, node: SideEffects(
-        placed=frozenset[str]().union(*(_names(scope, target) for target in node.targets))
+        posed=frozenset[str]().union(*(_names(scope, target) for target in node.targets))
     ),
     tree.Move: lambda scope, node: SideEffects(moved=_names(scope, node.moved), arms=_arms(scope, node.moved)),
     tree.For: lambda scope, node: SideEffects(values=_names(scope, node.variable)),
     tree.Halt: lambda _scope, _node: SideEffects(halts=True),
     tree.Retry: lambda _scope, _node: SideEffects(retries=True),
-    tree.Poison: _poisoned,
+    tree.Poison: _effects_of_poison,
 }
 
 
-def every(statements: Iterable[tree.Statement]) -> Iterator[tree.Statement]:
-    """Give statements and all inside them, in the order of the text."""
+def walk_statements(statements: Iterable[tree.Statement]) -> Iterator[tree.Statement]:
+    """Yield statements and all inside them, in the order of the text."""
     waiting = list(statements)[::-1]
     while waiting:
         now = waiting.pop()
         yield now
-        waiting += parts(now)[::-1]
+        waiting += child_statements(now)[::-1]
 
 
-# The statements directly inside a statement; those that are missing have none inside.
-_PARTS: Mapping[type, Callable[..., tuple[tree.Statement, ...]]] = {
+# The statements directly inside a statement; the others have none inside.
+_CHILDREN: Mapping[type, Callable[..., tuple[tree.Statement, ...]]] = {
     tree.Block: lambda node: node.statements,
     tree.If: lambda node: node.statements,
     tree.While: lambda node: (node.body,),
@@ -229,14 +238,14 @@ _PARTS: Mapping[type, Callable[..., tuple[tree.Statement, ...]]] = {
 }
 
 
-def parts(statement: tree.Statement) -> tuple[tree.Statement, ...]:
+def child_statements(statement: tree.Statement) -> tuple[tree.Statement, ...]:
     """Return the statements directly inside a statement, those of actions among them."""
-    inside = _PARTS.get(type(statement))
-    return () if inside is None else inside(statement)
+    children = _CHILDREN.get(type(statement))
+    return () if children is None else children(statement)
 
 
 def _names(scope: Scope, node: tree.Expression) -> frozenset[str]:
-    """Return the variable that a node names, or all of those in what was passed over; no arms."""
+    """Return the variable that a node names, or all names of skipped tokens; no arms."""
     if isinstance(node, tree.Poison):
         return frozenset(qualified(key, scope) for key in node.names if not is_arm(key))
     name = written_name(node, scope)
@@ -254,12 +263,12 @@ def _arms(scope: Scope, node: tree.Expression | None) -> frozenset[str]:
 
 
 def union(several: Iterable[SideEffects]) -> SideEffects:
-    """Return what any of several parts of a program may change."""
+    """Return the union of side effects."""
     return reduce(or_, several, NOTHING)
 
 
 def _callees_first(calls: Mapping[str, list[str]]) -> list[str]:
-    """Return procedures in an order in which those that are called come first, as far as that is possible."""
+    """Return procedures in an order in which callees come first, as far as recursion allows."""
     order: dict[str, None] = {}
     visited: set[str] = set()
     for first in calls:
@@ -277,39 +286,39 @@ def _callees_first(calls: Mapping[str, list[str]]) -> list[str]:
     return list(order)
 
 
-def _seen_from_outside(
-    writes: SideEffects, procedure: str, arguments: Mapping[str, tree.Expression], scope: Scope
+def _in_names_of_caller(
+    effects: SideEffects, procedure: str, arguments: Mapping[str, tree.Expression], scope: Scope
 ) -> SideEffects:
-    """Return what a procedure changes, in the names of its caller: its own variables are nobody else's."""
+    """Return the side effects of a procedure in the names of its caller; those on its locals are dropped."""
 
-    def outside(name: str, *, value: bool = False) -> str:
-        """Return a name as the caller says it; empty for what the caller does not see."""
+    def caller_name(name: str, *, value: bool = False) -> str:
+        """Return the name in the scope of the caller; empty for what it does not see."""
         head, bracket, indices = name.partition("[")
         owner, point, key = head.partition(".")
         if not point:
             return name
         argument = arguments.get(key) if owner == procedure else None
-        # Numbers and steps are given by value; an array is given itself.
+        # Numbers and TRANS are passed by value, arrays by reference.
         if argument is None or (value and not bracket) or (bracket and not isinstance(argument, tree.Name)):
             return ""
         passed = written_name(argument, scope)
         return f"{passed}{bracket}{indices}" if passed else ""
 
     def frames(names: frozenset[str]) -> frozenset[str]:
-        return frozenset(visited for name in names if (visited := outside(name)) and not is_arm(visited))
+        return frozenset(visited for name in names if (visited := caller_name(name)) and not is_arm(visited))
 
     def may_be_arm(name: str) -> bool:
         return name == ANY_ARM or is_arm(name) or _is_parameter(name, scope)
 
     return SideEffects(
-        placed=frames(writes.placed),
-        hung=frames(writes.hung),
-        moved=frames(writes.moved),
-        values=frozenset(visited for name in writes.values if (visited := outside(name, value=True))),
-        arms=frozenset(visited for name in writes.arms if (visited := outside(name)) and may_be_arm(visited)),
-        grasps=writes.grasps,
-        everything=writes.everything,
-        halts=writes.halts,
+        posed=frames(effects.posed),
+        affixed=frames(effects.affixed),
+        moved=frames(effects.moved),
+        values=frozenset(visited for name in effects.values if (visited := caller_name(name, value=True))),
+        arms=frozenset(visited for name in effects.arms if (visited := caller_name(name)) and may_be_arm(visited)),
+        grasps=effects.grasps,
+        everything=effects.everything,
+        halts=effects.halts,
     )
 
 

@@ -11,7 +11,7 @@ from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
 from armwright.errors import FileFormatError
 from armwright.program.api import Compilation, add_imported_frames, analyse_flow, compile as compile_program
-from armwright.program.flow_analysis.side_effects import every
+from armwright.program.flow_analysis.side_effects import walk_statements
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
@@ -86,7 +86,7 @@ class Analysis:
         """The statements that hints are given for, in the order of the text."""
         program = self.compiled.tree
         bodies = (*(procedure.body for procedure in program.procedures), *program.statements)
-        hinted = (node for node in every(bodies) if isinstance(node, tree.Move | tree.Call | tree.Grasp))
+        hinted = (node for node in walk_statements(bodies) if isinstance(node, tree.Move | tree.Call | tree.Grasp))
         return tuple(sorted(hinted, key=lambda node: node.span.start))
 
     @cached_property
