@@ -24,7 +24,7 @@ page. Known reasons for differences are in the [errata](errata.md).
 
 The robot language of the report is tested by programs: eight of them run with the trace, the stages and the frames \
 that the report specifies, and four wrong ones get the messages that it specifies \
-(`tests/program/test_corpus.py`, `test_interpret.py`, `test_corpus_runs.py`).
+(`tests/program/test_corpus.py`, `test_interpreter.py`, `test_corpus_runs.py`).
 """
 Row = Sequence[str]
 
