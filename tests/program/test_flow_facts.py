@@ -2,7 +2,7 @@
 
 import pytest
 
-from armwright.program.flow_analysis.lattice import Facts, FactTable, Uncertainty
+from armwright.program.flow_analysis.lattice import Facts, FactTable, Uncertainty, agreed_value
 
 
 def fact_table(facts: Facts) -> FactTable[int | None]:
