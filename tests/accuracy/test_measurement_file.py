@@ -459,7 +459,7 @@ def test_memory_of_a_row(kind: str, read: Read) -> None:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
 
-    assert peak / 6_000 < 400
+    assert peak / 6_000 < 500
 
 
 def test_too_many_parts(read: Read) -> None:

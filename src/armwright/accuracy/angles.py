@@ -24,11 +24,10 @@ def mean_angles(angles: Array, what: str = "angles") -> Array:
     """
     direction = np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))
     deviations = wrap_to_pi(angles - direction)
-    if deviations.size and np.abs(deviations).max() > _MAX_SCATTER:
-        widest = np.degrees(np.abs(deviations).max())
-        raise InvalidValueError(
-            f"{what}: they scatter by {widest:.0f} deg about their mean, which is defined only for angles within 90 deg"
-        )
+    widest = np.abs(deviations).max(initial=0.0)
+    if widest > _MAX_SCATTER:
+        scatter = f"they scatter by {np.degrees(widest):.0f} deg about their mean"
+        raise InvalidValueError(f"{what}: {scatter}, which is defined only for angles within 90 deg")
     return wrap_to_pi(direction + deviations.mean(axis=0))
 
 

@@ -103,9 +103,8 @@ def _measure_corner(legs: Legs, corner: int, run: Trace, band: float | None, nam
     along = along[: len(relative)]
     on = along >= 0
     if not on.any():
-        raise InvalidValueError(
-            f"{name} has no sample on the leg after the corner at {legs.stations[corner] * 1e3:.4g} mm of the path"
-        )
+        where = f"the leg after the corner at {legs.stations[corner] * 1e3:.4g} mm of the path"
+        raise InvalidValueError(f"{name} has no sample on {where}")
     offset = relative - along[:, None] * u2
     onward = u1 - (u1 @ u2) * u2
     size = np.linalg.norm(onward)

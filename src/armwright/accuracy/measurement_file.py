@@ -1,6 +1,6 @@
 """Tests out of tables: rows that belong together, what was commanded beside what was attained."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
@@ -18,16 +18,10 @@ from armwright.files.limits import limit, limit_message
 
 # Tests of which every row is one attained pose; of the others a cycle is a run of many rows.
 POSE_KINDS: frozenset[Kind] = frozenset(get_args(PoseKind))
-# Tests that need a commanded pose or path.
-_KINDS_WITH_COMMAND: frozenset[Kind] = frozenset(
-    {"pose", "distance", "drift", "path", "reorientation", "cornering", "velocity", "weaving"}
-)
+# Tests without a commanded pose or path.
+_KINDS_WITHOUT_COMMAND = {"multidirectional", "exchangeability", "compliance", "settling", "posing"}
 # The column that distinguishes the parts of a test, where it is not the name of the pose.
-_LABEL_COLUMNS: Mapping[Kind, str] = {
-    "multidirectional": "direction",
-    "compliance": "direction",
-    "exchangeability": "robot",
-}
+_LABEL_COLUMNS = {"multidirectional": "direction", "compliance": "direction", "exchangeability": "robot"}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -130,18 +124,28 @@ def read_measurements(
     files = [paths] if isinstance(paths, str | Path) else list(paths)
     if not files:
         raise InvalidValueError("measurements: expected at least one file, got none")
+    tables = read_tables(files, columns=columns, skip_incomplete=skip_incomplete)
+    tests = _rows_by_test(row for table in tables for row in table.rows())
+    return tuple(_pose_test(rows) if rows[0].test in POSE_KINDS else _path_test(rows) for rows in tests)
+
+
+def _rows_by_test(rows: Iterable[Row]) -> list[list[Row]]:
+    """Return the rows of each test.
+
+    Raises:
+        FileFormatError: there are more tests, and poses, instants and runs in them, than a laboratory measures: each is
+            an object.
+    """
     groups: dict[tuple[str, ...], list[Row]] = {}
     parts, most = set[tuple[Any, ...]](), limit("entries")
-    for table in read_tables(files, columns=columns, skip_incomplete=skip_incomplete):
-        for row in table.rows():
-            # A distance takes two poses.
-            group = (row.test, "" if row.test == "distance" else row.name, row.word("condition"))
-            groups.setdefault(group, []).append(row)
-            # A laboratory measures fewer poses, instants and runs: each is an object.
-            parts.add((group, _part_key(row) if row.test in POSE_KINDS else row.cycle))
-            if len(parts) > most:
-                raise row.error("test", f"too many tests, and poses and runs in them: {limit_message('entries')}")
-    return tuple(_pose_test(rows) if rows[0].test in POSE_KINDS else _path_test(rows) for rows in groups.values())
+    for row in rows:
+        # A distance takes two poses.
+        group = (row.test, "" if row.test == "distance" else row.name, row.word("condition"))
+        groups.setdefault(group, []).append(row)
+        parts.add((group, _part_key(row) if row.test in POSE_KINDS else row.cycle))
+        if len(parts) > most:
+            raise row.error("test", f"too many tests, and poses and runs in them: {limit_message('entries')}")
+    return [*groups.values()]
 
 
 def _pose_test(rows: list[Row]) -> PoseTest:
@@ -172,8 +176,8 @@ def _attained_parts(rows: Sequence[Row], part_key: Callable[[Row], Any]) -> dict
     Raises:
         FileFormatError: there are none, or some are in a plane and some in space, or have other angles.
     """
-    first, *others = rows
-    for row in others:
+    first = rows[0]
+    for row in rows:
         if (len(row.position), row.angle_names) != (len(first.position), first.angle_names):
             message = f"{first.path}:{first.line} has other coordinates or angles of the same {first.test} test"
             raise row.error("x", message)
@@ -188,8 +192,8 @@ def _attained_parts(rows: Sequence[Row], part_key: Callable[[Row], Any]) -> dict
 
 def _part_key(row: Row) -> tuple[str, float | None]:
     """Return the part of its test to which a row belongs: a direction, a robot or a pose, and for drift a time."""
-    label = row.word(_LABEL_COLUMNS[row.test]) if row.test in _LABEL_COLUMNS else row.name
-    return label, row.number("t") if row.test == "drift" else None
+    column = _LABEL_COLUMNS.get(row.test)
+    return row.word(column) if column else row.name, row.number("t") if row.test == "drift" else None
 
 
 def _refuse_repeated_cycles(rows: Sequence[Row]) -> None:
@@ -208,7 +212,7 @@ def _refuse_repeated_cycles(rows: Sequence[Row]) -> None:
 def _cloud(rows: list[Row], commanded: dict[str, Row]) -> Cloud:
     first = rows[0]
     goal = commanded.get(first.name)
-    if goal is None and first.test in _KINDS_WITH_COMMAND:
+    if goal is None and first.test not in _KINDS_WITHOUT_COMMAND:
         raise first.error("cycle", f"{first.name} has no commanded pose: expected a row with cycle commanded")
     positions, angles = _stack_rows(rows, "position"), _stack_rows(rows, "angles")
     if goal is not None:
@@ -246,7 +250,7 @@ def _pair_cycles(rows: list[Row], clouds: tuple[Cloud, ...], names: list[str]) -
 def _path_test(rows: list[Row]) -> PathTest:
     first, runs = rows[0], _attained_parts(rows, lambda row: row.cycle)
     path = [row for row in rows if row.cycle is None]
-    if not path and first.test in _KINDS_WITH_COMMAND:
+    if not path and first.test not in _KINDS_WITHOUT_COMMAND:
         raise first.error("cycle", f"{first.name} has no commanded path: expected rows with cycle commanded")
     if path and first.test == "settling":
         raise path[0].error("cycle", "a settling test must not have a commanded row: its pose is the end of the run")

@@ -144,15 +144,12 @@ def _find_arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, fl
     relative = run.positions - attained_position(run)
     distances = np.linalg.norm(relative, axis=1)
     outside = np.flatnonzero(distances > band)
+    name, distance = f"settling: run {cycle + 1}", f"{band * 1e3:g} mm"
     if not len(outside) or outside[0] != 0:
-        raise InvalidValueError(
-            f"settling: run {cycle + 1} begins within {band * 1e3:g} mm of its end; start the record before the arrival"
-        )
+        raise InvalidValueError(f"{name} begins within {distance} of its end; start the record before the arrival")
     if t[outside[-1]] >= t[-1] - REST_SHARE * (t[-1] - t[0]):
-        raise InvalidValueError(
-            f"settling: run {cycle + 1} is still more than {band * 1e3:g} mm away in the last tenth of its record; "
-            "record longer, or use a wider band"
-        )
+        remedy = "record longer, or use a wider band"
+        raise InvalidValueError(f"{name} is still more than {distance} away in the last tenth of its record; {remedy}")
     entries = _entry_times(t, relative, band)
     entered = float(np.nanmin(entries))
     swings = float(distances[t >= entered].max())
