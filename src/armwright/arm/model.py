@@ -360,7 +360,7 @@ class Arm:
         """Number of joints."""
         return len(self.joints)
 
-    def called(self, joint: int) -> str:
+    def joint_label(self, joint: int) -> str:
         """Return how messages call a joint, from 0: by its number, and its name where it has one."""
         name = self.joints[joint].name
         return f"joint {joint + 1} ('{name}')" if name else f"joint {joint + 1}"

@@ -92,8 +92,8 @@ def degrees_by_mistake(arm: Arm, q: Array) -> str:
     i = int(suspects[0])
     value = float(q.reshape(-1, arm.n)[rows[:, i].argmax(), i])
     return (
-        f"{arm.called(i)} of '{arm.name}' is at {value:g} rad, {abs(value) / _REVOLUTION:.1f} revolutions. If degrees "
-        f"are meant, {value:g} degrees are {math.radians(value):.6g} rad"
+        f"{arm.joint_label(i)} of '{arm.name}' is at {value:g} rad, {abs(value) / _REVOLUTION:.1f} revolutions. If "
+        f"degrees are meant, {value:g} degrees are {math.radians(value):.6g} rad"
     )
 
 

@@ -100,7 +100,7 @@ def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:
 def _motor(arm: Arm, i: int, motor: Motor, joint: Joint) -> dict[str, float]:
     if not motor.gear_ratio > 0:
         raise InvalidValueError(
-            f"arm '{arm.name}': {arm.called(i - 1)} has the gear ratio {motor.gear_ratio:g}; "
+            f"arm '{arm.name}': {arm.joint_label(i - 1)} has the gear ratio {motor.gear_ratio:g}; "
             "an arm file needs one above 0"
         )
     inertia, viscous, dry = ("kgm2", "Nms", "Nm") if joint.revolute else ("kg", "Ns_per_m", "N")

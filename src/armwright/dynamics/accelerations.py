@@ -138,8 +138,9 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
         if not np.all(np.asarray(pivots[i].inertia) > NEGLIGIBLE * np.asarray(pivots[i].size)):
             what, amount = ("about", "moment of inertia") if arm.joints[i].revolute else ("along", "mass")
             raise UnsupportedArmError(
-                f"arm '{arm.name}': the acceleration of {arm.called(i)} is undefined: what it moves has no inertia "
-                f"{what} its axis while the distal joints are free. Give its link a {amount} or its motor an inertia."
+                f"arm '{arm.name}': the acceleration of {arm.joint_label(i)} is undefined: what it moves has no "
+                f"inertia {what} its axis while the distal joints are free. Give its link a {amount} or its motor an "
+                "inertia."
             )
 
 

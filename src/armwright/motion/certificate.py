@@ -70,7 +70,9 @@ class Certificate:
     @property
     def summary(self) -> str:
         """What it says, in one line."""
-        uses = "".join(f", {part:.0%} of the {name} of {self.arm.called(joint)}" for name, joint, part in self._uses)
+        uses = "".join(
+            f", {part:.0%} of the {name} of {self.arm.joint_label(joint)}" for name, joint, part in self._uses
+        )
         return (
             f"certificate {self._verdict}: within {self.deviation * 1e3:.3f} of "
             f"{self.deviation_tolerance * 1e3:g} mm, {self.rotation * 1e3:.3f} of "
@@ -131,7 +133,7 @@ class Certificate:
             f"{position_text(self.worst_position)}; {self.knots} knots, {self.samples} samples"
         )
         lines = [within, sampled]
-        if uses := [f"{self.arm.called(joint)} uses {part:.0%} of its {name}" for name, joint, part in self._uses]:
+        if uses := [f"{self.arm.joint_label(joint)} uses {part:.0%} of its {name}" for name, joint, part in self._uses]:
             lines.append("; ".join(uses))
         if self.because is not None:
             lines.append(slower(self.arm, self.factor, self.because, " than the tool speed requires"))
@@ -150,7 +152,7 @@ def stretched_peaks(speed: Array, acceleration: Array, effort: Array, stretch: f
 def slower(arm: Arm, factor: float, because: BindingLimit, than: str = "") -> str:
     """Say how many times slower a motion is, and for which limit of which joint, from 0."""
     limit, joint = because
-    return f"{factor:.2f} times slower{than}, limited by the {limit} of {arm.called(joint)}"
+    return f"{factor:.2f} times slower{than}, limited by the {limit} of {arm.joint_label(joint)}"
 
 
 def slowing(arm: Arm, trajectory: Trajectory) -> tuple[float, BindingLimit | None]:

@@ -174,7 +174,7 @@ def _crawl(requested: StraightPath, line: CertifiedMotion) -> PathError:
     worst = int(line.trajectory.segment_peaks(order)[:, because[1]].argmax())
     arm = line.certificate.arm
     s = _nearest(requested, forward(arm, line.trajectory(line.trajectory.times[worst])))
-    joint = arm.called(because[1])
+    joint = arm.joint_label(because[1])
     reason = f"for the {because[0]} of {joint} the line would have to be run {factor:.0f} times slower"
     message = f"near {position_text(requested.at(0, np.array([s]))[0, :3, 3])} {reason}"
     return PathError("singular", 0, s, message, joint=because[1] + 1, reason=reason)

@@ -179,8 +179,8 @@ def check_lasting(arm: Arm, lasting: Array, most: float, at: Array, location: Ca
         unit = arm.joints[joint].units.effort
         raise IncapableArmError(
             f"{location(float(at[k]))} gravity and Coulomb friction alone require {abs(lasting[k, joint]):.4g} {unit} "
-            f"of {arm.called(joint)}, {arm.joints[joint].limits.effort:.4g} {unit} are allowed: a slower motion is "
-            "infeasible too"
+            f"of {arm.joint_label(joint)}, {arm.joints[joint].limits.effort:.4g} {unit} are allowed: a slower motion "
+            "is infeasible too"
         )
 
 
@@ -281,4 +281,4 @@ def _largest_part(arm: Arm, shares: _Shares, limits: Array) -> tuple[float, tupl
         u, binding = min(float(below[worst]), u * (1 - _ROUNDING)), (int(k[worst]), int(j[worst]))
         if u < _CRAWL:
             message = f"would have to move {1 / u:.3g} times slower to keep its effort limit"
-            raise IncapableArmError(f"{arm.called(binding[1])} {message}")
+            raise IncapableArmError(f"{arm.joint_label(binding[1])} {message}")

@@ -42,11 +42,11 @@ def two_ends(q_start: ArrayLike, q_goal: ArrayLike) -> tuple[Array, Array]:
         ShapeError: they are not (n,), both of them.
         InvalidValueError: a number is NaN or infinite.
     """
-    start = one_way(q_start, "q_start")
+    start = joint_vector(q_start, "q_start")
     return start, one_per_joint(q_goal, len(start), "q_goal")
 
 
-def one_way(value: ArrayLike, what: str = "way") -> Array:
+def joint_vector(value: ArrayLike, what: str = "way") -> Array:
     """Return one number per joint (n,), at least one.
 
     Raises:

@@ -118,7 +118,7 @@ def cause_of(solution: InverseSolution) -> Cause:
 def too_fast(arm: Arm, joint: int, ratio: float) -> str:
     """Say that a joint, from 1, would have to move so many times as fast as its limit."""
     how = "at once" if ratio > _AT_ONCE else f"{ratio:.0f} times as fast as its limit"
-    return f"{arm.called(joint - 1)} would have to move {how}"
+    return f"{arm.joint_label(joint - 1)} would have to move {how}"
 
 
 def singular(arm: Arm, q: Array, times: Array, ratios: Array) -> Obstruction:

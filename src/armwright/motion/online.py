@@ -180,11 +180,11 @@ def _check_goal(task: _Task) -> None:
         raise InvalidValueError(f"q_goal: {fault}")
     for j in np.flatnonzero(np.abs(task.qd_goal) > speed * (1 + _AT_LIMIT)).tolist():
         beyond = _beyond_limit(arm, j, "s", task.qd_goal[j], speed[j])
-        raise InvalidValueError(f"qd_goal: the velocity of {arm.called(j)} would be {beyond}")
+        raise InvalidValueError(f"qd_goal: the velocity of {arm.joint_label(j)} would be {beyond}")
     for j in np.flatnonzero(~np.isfinite(arm.limits.acceleration)).tolist():
         raise InvalidValueError(
-            f"arm '{arm.name}': {arm.called(j)} has no limit of acceleration, so the duration of the motion to a new "
-            "goal is undefined"
+            f"arm '{arm.name}': {arm.joint_label(j)} has no limit of acceleration, so the duration of the motion to a "
+            "new goal is undefined"
         )
 
 
@@ -201,7 +201,7 @@ def _jerk_limits(task: _Task, limits: ArrayLike | None, *, brake: bool) -> Array
         for j in np.flatnonzero(jerk * _SHORTEST_RISE > acceleration).tolist():
             largest = f"{acceleration[j] / _SHORTEST_RISE:.3g} {arm.joints[j].units.position}/s³"
             raise InvalidValueError(
-                f"jerk: {arm.called(j)} would reach its full acceleration in less than a microsecond; expected "
+                f"jerk: {arm.joint_label(j)} would reach its full acceleration in less than a microsecond; expected "
                 f"at most {largest}, got {jerk[j]:.3g}"
             )
     # While an acceleration dies away at a constant jerk the speed still grows by a²/(2 jerk).
@@ -222,11 +222,11 @@ def _check_state(task: _Task, jerk: Array, least: Array) -> None:
     for does, per, rates, most in (("accelerates by", "s²", task.qdd, acceleration), ("moves at", "s", task.qd, speed)):
         for j in np.flatnonzero(np.abs(rates) > most * (1 + _AT_LIMIT)).tolist():
             beyond = _beyond_limit(arm, j, per, rates[j], most[j])
-            raise OnlineError(f"{arm.called(j)} of '{arm.name}' {does} {beyond}{allowed}")
+            raise OnlineError(f"{arm.joint_label(j)} of '{arm.name}' {does} {beyond}{allowed}")
     for j in np.flatnonzero(least > jerk * (1 + _AT_LIMIT)).tolist():
         top, unit = task.qd[j] + task.qdd[j] * abs(task.qdd[j]) / (2 * jerk[j]), arm.joints[j].units.position
         raise OnlineError(
-            f"{arm.called(j)} of '{arm.name}' would come to {top:.6g} {unit}/s while its acceleration of "
+            f"{arm.joint_label(j)} of '{arm.name}' would come to {top:.6g} {unit}/s while its acceleration of "
             f"{task.qdd[j]:.6g} {unit}/s² dies away, its limit is {speed[j]:.6g} {unit}/s: a jerk of {least[j]:.3g} "
             f"{unit}/s³ instead of {jerk[j]:.3g} keeps it{allowed}"
         )

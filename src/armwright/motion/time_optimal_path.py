@@ -76,7 +76,7 @@ class TimeOptimal:
         stops = f", with {self.stops} stops on the path" if self.stops else ""
         text = f"{self.trajectory.duration:.3f} s{before}{stops}"
         for binding in self.bindings:
-            text += f"\n{binding.share:.0%} of the time: {binding.limit} of {self.arm.called(binding.joint)}"
+            text += f"\n{binding.share:.0%} of the time: {binding.limit} of {self.arm.joint_label(binding.joint)}"
         return text
 
 
@@ -179,8 +179,8 @@ def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
     limited = np.any([np.isfinite(getattr(arm.limits, name)) for name in counting if name != "speed"], axis=0)
     for j in np.flatnonzero(~limited & (np.ptp(path.extremes(0), axis=0) > 0)):
         raise IncapableArmError(
-            f"arm '{arm.name}': {arm.called(int(j))} moves and has no limit of {' or '.join(counting[1:])}, so the "
-            "fastest motion is undefined"
+            f"arm '{arm.name}': {arm.joint_label(int(j))} moves and has no limit of {' or '.join(counting[1:])}, so "
+            "the fastest motion is undefined"
         )
 
 

@@ -136,7 +136,7 @@ def too_far(task: Task, tracking: Tracking) -> Obstruction:
     joint, near = int(jump.argmax()) + 1, nearest_singularity(arm, q)
     reason = (
         f"the tool cannot be kept within {task.tolerance.position * 1e3:.3g} mm of its path: the arm is singular "
-        f"there ({near}), {arm.called(joint - 1)} would have to move infinitely fast"
+        f"there ({near}), {arm.joint_label(joint - 1)} would have to move infinitely fast"
     )
     return Obstruction("singular", time, joint, reason)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats, integer, not_negative, positive, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
-from armwright.motion.knots import one_way, segments_at
+from armwright.motion.knots import joint_vector, segments_at
 from armwright.motion.polynomials import derivative, extremes, peaks, shifted
 from armwright.notebook import html_table
 
@@ -234,7 +234,7 @@ def hold(q: ArrayLike, duration: float) -> Trajectory:
         InvalidValueError: a number is NaN or infinite, or the duration below 0.
     """
     duration = not_negative(duration, "duration", "s")
-    return Trajectory(times=(0.0, duration), coefficients=one_way(q, "q")[None, None, :])
+    return Trajectory(times=(0.0, duration), coefficients=joint_vector(q, "q")[None, None, :])
 
 
 def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:

@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import InvalidValueError
-from armwright.motion.knots import NOWHERE, check_duration, limit_per_joint, one_way, two_ends
+from armwright.motion.knots import NOWHERE, check_duration, joint_vector, limit_per_joint, two_ends
 from armwright.motion.trajectory import Trajectory, hold
 
 # A duration that falls short of the shortest by this part of it is the shortest.
@@ -91,7 +91,7 @@ def shortest_trapezoid(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike
         ShapeError: the limits do not fit the path.
         InvalidValueError: a number is NaN, or a limit not above 0 or missing.
     """
-    limits = _limits(one_way(way), speed, acceleration)
+    limits = _limits(joint_vector(way), speed, acceleration)
     return 0.0 if limits is None else _shortest(limits)
 
 

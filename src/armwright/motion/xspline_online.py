@@ -20,7 +20,7 @@ import numpy as np
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, integer, one_per_joint, positive
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.motion.cubic_polynomials import hermite
-from armwright.motion.knots import one_way, rate_or_rest
+from armwright.motion.knots import joint_vector, rate_or_rest
 from armwright.motion.xspline_path import rate_of_knot
 from armwright.tracing.emit import Guarded, emit
 from armwright.tracing.kernel import Kernel
@@ -44,7 +44,7 @@ def begin(first: ArrayLike, second: ArrayLike, step: float, rate: ArrayLike | No
         ShapeError: the knots or the rate are not (n,).
         InvalidValueError: a number is NaN or infinite, or the step not above 0.
     """
-    q0 = one_way(first, "first")
+    q0 = joint_vector(first, "first")
     q1 = one_per_joint(second, len(q0), "second")
     return np.concatenate([q0, q1, rate_or_rest(rate, len(q0), "rate"), [positive(step, "step", "s")]])
 

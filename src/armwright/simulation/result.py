@@ -172,7 +172,7 @@ class Simulation:
         for i, joint in enumerate(self.arm.joints):
             values = (self.q[0, i], self.q[-1, i], self.qd[-1, i])
             texts = (f"{x / joint.units.scale:z.3f}" for x in values)
-            rows.append((self.arm.called(i), joint.units.display, *texts))
+            rows.append((self.arm.joint_label(i), joint.units.display, *texts))
         heads = ("joint", "unit", "start", "end", "speed at the end, per s")
         yield ResultTable(title="", heads=heads, rows=rows, numbers=(2, 3, 4))
         energies = ((name.replace("_", " "), f"{value:z.6g}") for name, value in self._energies().items())
@@ -182,7 +182,7 @@ class Simulation:
         yield ResultTable(
             title="",
             heads=("s", "joint", "before", "after"),
-            rows=((f"{e.t:.4f}", self.arm.called(e.joint), e.before.words, e.after.words) for e in events),
+            rows=((f"{e.t:.4f}", self.arm.joint_label(e.joint), e.before.words, e.after.words) for e in events),
             numbers=(0,),
             remark=f"... and {more} more changes" if more else "",
         )

@@ -138,8 +138,8 @@ def _check(plant: Plant, q: Array, qd: Array) -> None:
         unit = units.display
         position, lower, upper = (float(x[i]) / units.scale for x in (q, plant.lower, plant.upper))
         raise InvalidValueError(
-            f"{arm.called(int(i))} starts at {position:g} {unit}, outside its stops at {lower:g} and {upper:g} {unit}; "
-            "start between them, or simulate without stops"
+            f"{arm.joint_label(int(i))} starts at {position:g} {unit}, outside its stops at {lower:g} and {upper:g} "
+            f"{unit}; start between them, or simulate without stops"
         )
     for brake in plant.brakes:
         if not 0 <= brake.joint < arm.n:

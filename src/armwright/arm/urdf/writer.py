@@ -67,7 +67,7 @@ def lost_in_urdf(arm: Arm) -> list[str]:
 
 def _lost_of_joint(arm: Arm, index: int) -> Iterator[str]:
     """Say what of one joint, from 0, and its link is lost."""
-    label, joint, motor, link = arm.called(index), arm.joints[index], arm.motors[index], arm.links[index]
+    label, joint, motor, link = arm.joint_label(index), arm.joints[index], arm.motors[index], arm.links[index]
     units = joint.units
     if motor.inertia:
         yield f"{label}: the inertia of the drive, {motor.inertia:g} {units.inertia}, is not in the file"

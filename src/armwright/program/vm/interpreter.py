@@ -222,7 +222,7 @@ def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:
     return Diagnostic(
         code="W401",
         severity=Severity.WARNING,
-        message=f"{arm.called(joint)} of {stage.arm} would need {needed:.1f} {unit}, "
+        message=f"{arm.joint_label(joint)} of {stage.arm} would need {needed:.1f} {unit}, "
         f"{(needed / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
         span=stage.span,
         label=f"at {stage.t0 + stage.peak_time[joint]:.3f} s, in {stage.stage.kind} to {stage.goal_names[-1]}",

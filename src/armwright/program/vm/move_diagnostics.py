@@ -29,7 +29,7 @@ _METHODS = {"via": "by a via pose", "damped": "by damped least squares"}
 def obstacle_message(obstacle: Obstacle, goal: str, name: str, arm: Arm) -> str:
     """Return the message of an error: the obstacle of an arm, of that name, on its path to a frame."""
     texts = _GOAL_MESSAGES if obstacle.certain else _PATH_MESSAGES
-    joint = "a joint" if obstacle.joint is None else arm.called(obstacle.joint - 1)
+    joint = "a joint" if obstacle.joint is None else arm.joint_label(obstacle.joint - 1)
     return texts[obstacle.cause].format(goal=goal, arm=name, joint=joint)
 
 
