@@ -108,7 +108,7 @@ def test_friction_is_a_parameter(five_bar: Linkage, task: FeatureSweep) -> None:
     assert 0.02e-3 < abs(rows["y1_intercept"][1] - rows["y1_intercept"][0]) < 0.15e-3
 
 
-def test_said_beforehand(task: FeatureSweep) -> None:
+def test_outputs_are_those_announced(task: FeatureSweep) -> None:
     """What a task returns is what it says it will, with units, and its settings are plain enough for JSON."""
     both = attrs.evolve(task, paths=("y1", "x2"))
     rows = evaluate(both, ARM_A[None])
@@ -151,7 +151,7 @@ def bits_of(rows: dict[str, Any]) -> dict[str, bytes]:
     return {name: pickle.dumps(np.asarray(values).tolist()) for name, values in rows.items()}
 
 
-def test_same_bits(task: FeatureSweep, tmp_path: Path) -> None:
+def test_same_bits_whoever_simulates(task: FeatureSweep, tmp_path: Path) -> None:
     """One process, two, a Dask cluster, and blocks of other lengths make the same bits."""
     pytest.importorskip("xarray")
     distributed = pytest.importorskip("distributed")

@@ -45,7 +45,7 @@ def test_mutated_programs(name: str, at: int, how: str, with_cell: bool) -> None
 
 @pytest.mark.parametrize("name", ["p01", "p02", "p04", "p05", "p06", "p07", "p08"])
 @pytest.mark.drawn(0.4)
-def test_no_cascades(name: str) -> None:
+def test_one_slip_gives_few_messages(name: str) -> None:
     """One slip of one token gives at most five messages, and in nine cases of ten at most two."""
     counts = []
     for how in ("drop", "double", "swap"):
@@ -144,6 +144,6 @@ def _seconds(count: int) -> float:
         "; END . BEGIN ",
     ],
 )
-def test_deep_junk(junk: str) -> None:
+def test_deeply_nested_junk(junk: str) -> None:
     """No depth of nesting and no repetition exhausts the parser."""
     assert translate(Source("t.rlo", junk * 3000)).code is None

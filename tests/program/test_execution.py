@@ -50,7 +50,7 @@ def say(expression: str, units: str = "") -> str:
         ("INV(a) * b", "(1,0,0, 0,1,0, 0,0,1, 0.1,0.25,0.05)"),
     ],
 )
-def test_values(expression: str, value: str) -> None:
+def test_values_of_expressions(expression: str, value: str) -> None:
     """Operators bind as in Pascal's school book, and places multiply like matrices."""
     assert say(expression) == value
 
@@ -65,7 +65,7 @@ def test_values(expression: str, value: str) -> None:
         ("UNITS MM, RAD ;", "ROTZ(0)", "(1,0,0, 0,1,0, 0,0,1, 0,0,0)"),
     ],
 )
-def test_units(units: str, expression: str, value: str) -> None:
+def test_values_in_units(units: str, expression: str, value: str) -> None:
     """Numbers with a unit count in the unit of the program, and distances come back in it."""
     text = f"{units} BEGIN PRINT({expression}) END."
 
@@ -91,12 +91,12 @@ def test_and_looks_no_further_than_it_must() -> None:
         ("1 TO m + 2", ["1", "2"]),
     ],
 )
-def test_for(head: str, passes: list[str]) -> None:
+def test_for_loops(head: str, passes: list[str]) -> None:
     """FOR counts without drift: a tenth added three times is three tenths."""
     assert printed(run(PLACES + f"FOR n = {head} DO PRINT(n) END.")) == passes
 
 
-def test_bounds_count_as_they_were() -> None:
+def test_for_bounds_are_evaluated_once() -> None:
     """A bound that the loop changes does not change the loop."""
     assert printed(run(PLACES + "m = 2 ; FOR n = 1 TO m DO BEGIN m = 9 ; PRINT(n) END END.")) == ["1", "2"]
 

@@ -100,7 +100,7 @@ def test_certain_errors_are_errors_of_runs(seed: int) -> None:
             return
 
 
-def test_never_reached(sample: Sample) -> None:
+def test_unreachable_statements(sample: Sample) -> None:
     """Of a statement that no way leads to no run ever begins one, whatever way it takes."""
     told = 0
     for rng in sample.cases(200):
@@ -200,7 +200,7 @@ def steps(text: str, monkeypatch: pytest.MonkeyPatch) -> int:
 
 
 @pytest.mark.parametrize("head", ["WHILE n > 0 DO", "FOR n = 1 TO 9 DO", "REPEAT", "TRY", "IF n > 0 THEN", "COBEGIN"])
-def test_nesting_costs_no_powers(head: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nesting_takes_no_exponential_time(head: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever stands inside one another, forty deep, each statement is followed a few times and not 2**40 times."""
     before, after = {
         "REPEAT": ("REPEAT ", " UNTIL n > 0"),
@@ -212,7 +212,7 @@ def test_nesting_costs_no_powers(head: str, monkeypatch: pytest.MonkeyPatch) -> 
     assert 40 < deep < 40 * 20
 
 
-def test_calls_cost_no_powers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_calls_take_no_exponential_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Thirty procedures that each call the next one twice are not followed 2**30 times."""
     procedures = "".join(
         f"PROCEDURE p{i}(f : FRAME) ; BEGIN f = ARM_1 ; p{i + 1}(f) ; p{i + 1}(f) END ;\n" for i in range(30)

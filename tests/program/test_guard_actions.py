@@ -130,7 +130,7 @@ def test_halt_in_a_procedure_that_an_action_calls(action: str) -> None:
     expect(called, ARM_1=called.tree.world("G"))
 
 
-def test_halt_in_the_same_procedure_outside_of_actions() -> None:
+def test_halt_in_a_procedure_that_no_action_calls() -> None:
     """A procedure that no action calls ends the program by HALT."""
     recording = run(f"{HALTING}deep(2) ; PRINT(n) END.")
 

@@ -70,7 +70,7 @@ def test_numbers(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", [".5", "5.", "1e", "1.2.3", "12abc", "1_000", "1e999"])
-def test_no_numbers(text: str) -> None:
+def test_malformed_numbers(text: str) -> None:
     """What only looks like a number is one token, reported once."""
     (token,) = tokens_of(text)
 
@@ -80,7 +80,7 @@ def test_no_numbers(text: str) -> None:
 
 @pytest.mark.parametrize("standard", Standard)
 @pytest.mark.parametrize(("text", "digits"), [("120mm", "120"), ("2.5E3Cm", "2.5E3"), ("1e5m", "1e5"), ("3s", "3")])
-def test_unit(text: str, digits: str, standard: Standard) -> None:
+def test_unit_is_part_of_its_number(text: str, digits: str, standard: Standard) -> None:
     """A unit that touches its number is part of the token, also for RLO-83, which has none to allow it."""
     (token,) = tokens_of(text, standard)
 
@@ -89,7 +89,7 @@ def test_unit(text: str, digits: str, standard: Standard) -> None:
 
 
 @pytest.mark.parametrize("text", ["5mmm", "5metres", "1.5.2mm", "1e999mm", ".5mm"])
-def test_no_units(text: str) -> None:
+def test_malformed_units(text: str) -> None:
     """What only looks like a number with a unit is one token, reported once."""
     (token,) = tokens_of(text)
 
@@ -114,7 +114,7 @@ def test_names_of_the_report() -> None:
 
 
 @pytest.mark.parametrize("text", ['""', '"seated"', '"a; { b } // c"', '"größe；"', '"\t"'])
-def test_texts(text: str) -> None:
+def test_strings(text: str) -> None:
     """Between two marks anything is a text, exactly as written."""
     (token,) = tokens_of(text)
 
@@ -122,7 +122,7 @@ def test_texts(text: str) -> None:
     assert codes_of(text) == []
 
 
-def test_text_not_closed() -> None:
+def test_string_that_is_not_closed() -> None:
     """A text ends with its line at the latest; what was meant to stand behind it still counts."""
     text = 'PRINT("done) ;\nHALT'
 
@@ -154,7 +154,7 @@ def test_comments_leave_nothing() -> None:
     ("text", "meant"),
     [("；", ";"), ("，", ","), ("（", "("), ("）", ")"), ("：", ":"), ("＝", "="), ("−", "-"), ("。", ".")],
 )
-def test_look_alikes(text: str, meant: str) -> None:
+def test_characters_that_look_like_signs(text: str, meant: str) -> None:
     """A mark of another keyboard counts as the one it looks like, and is reported with the change that cures it."""
     found = scanned(text)
 
@@ -162,7 +162,7 @@ def test_look_alikes(text: str, meant: str) -> None:
     assert [(one.code, one.fixes[0].replacement) for one in found.diagnostics] == [("E101", meant)]
 
 
-def test_look_alikes_once() -> None:
+def test_wrong_sign_is_reported_once() -> None:
     """The same wrong mark is reported once, with all its places to change."""
     (odd,) = scanned("a；b；c；").diagnostics
 
@@ -181,7 +181,7 @@ def test_tokens_lie_in_the_text(text: str, standard: Standard) -> None:
     assert all(before.end <= after.start for before, after in pairwise(found.comments))
 
 
-def test_word_in_place() -> None:
+def test_tokens_show_their_text() -> None:
     """A token shows its text as written."""
     text = "VAR größe, ＡＢ : FRAME"
 

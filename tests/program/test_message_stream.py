@@ -24,7 +24,7 @@ TOO_LONG = "the header of a message is too large: the limit is 8,192 bytes"
     ],
     ids=["a huge number", "a byte too many", "a number of a page", "a line without an end", "many lines"],
 )
-def test_too_large(header: bytes, said: str) -> None:
+def test_message_beyond_the_limit(header: bytes, said: str) -> None:
     """A message or a header that claims to be larger than the limit is refused before it is read."""
     incoming = MessageStream(io.BytesIO(header))
     while incoming.readline():
@@ -39,7 +39,7 @@ def test_too_large(header: bytes, said: str) -> None:
 
 
 @pytest.mark.parametrize("command", ["lsp", "debug"])
-def test_the_commands_end(command: str) -> None:
+def test_commands_end_on_a_message_beyond_the_limit(command: str) -> None:
     """The commands say what was too large and end, without a traceback."""
     done = subprocess.run(
         [sys.executable, "-m", "armwright", command],

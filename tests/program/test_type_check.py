@@ -86,7 +86,7 @@ def checked(text: str) -> tuple[Symbols, list[Diagnostic]]:
         ("e", ExpressionType.EVENT),
     ],
 )
-def test_kinds(text: str, expected: ExpressionType) -> None:
+def test_types_of_expressions(text: str, expected: ExpressionType) -> None:
     """A place is moved by a step to a place, steps follow one another, and two places are a step apart."""
     assert judged(text) == (expected, [])
 
@@ -122,7 +122,7 @@ def test_kinds(text: str, expected: ExpressionType) -> None:
         ("sl0t[1,1]", "E202", "`sl0t` is not declared", "did you mean `SLOT`?"),
     ],
 )
-def test_no_kind(text: str, code: str, message: str, help_: str) -> None:
+def test_expressions_without_a_type(text: str, code: str, message: str, help_: str) -> None:
     """What has no meaning is named, with what was probably meant."""
     _, (found,) = judged(text)
 
@@ -131,7 +131,7 @@ def test_no_kind(text: str, code: str, message: str, help_: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["a < b", "f * nothing = nothing", "-nothing < 1", "slot[nothing,1] * nothing"])
-def test_unknown_is_silent(text: str) -> None:
+def test_no_errors_follow_an_undeclared_name(text: str) -> None:
     """Of what was reported as unknown nothing more is said."""
     _, found = judged(text)
 
@@ -153,7 +153,7 @@ def test_unknown_is_silent(text: str) -> None:
         "f * (t * u)",
     ],
 )
-def test_written(text: str) -> None:
+def test_text_of_an_expression(text: str) -> None:
     """Advice repeats an expression as one would write it."""
     assert expression_text(expression(text)) == text
 
@@ -165,7 +165,7 @@ def test_long_expressions_are_not_repeated() -> None:
     assert found[0].message == "a MOVE must go to a FRAME, but this is a TRANS"
 
 
-def test_scopes() -> None:
+def test_names_of_a_procedure_hide_those_of_the_program() -> None:
     """A procedure's own names hide those of the program; whatever it lacks is looked up there."""
     symbols, found = checked(
         "VAR f, g : FRAME ; PROCEDURE work(f : TRANS) ; VAR n : SCALAR ; "
@@ -192,7 +192,7 @@ def test_units_of_a_program() -> None:
     assert (units.length, units.angle) == ("MM", "RAD")
 
 
-def test_many_unknown_names() -> None:
+def test_many_undeclared_names() -> None:
     """Thousands of names that nobody declared are all reported, without looking for each among all others."""
     unknown = " ".join(f"x{number} = 1 ;" for number in range(3000))
     known = " ".join(f"VAR y{number} : SCALAR ;" for number in range(3000))
