@@ -14,6 +14,7 @@ from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.repl.frame_view import arm_lines, frame_table_lines, zyx_angles
 from armwright.program.repl.session import InputResult, Session
+from armwright.program.repl.undo_report import SILENT_EFFECTS
 from armwright.program.semantics.cell_symbols import ImportedFrames
 from armwright.program.vm.interpreter import Limits, interpret
 from armwright.program.vm.machine import Machine
@@ -47,6 +48,11 @@ def places(machine: Machine) -> dict[str, list[float] | None]:
         name: machine.state.tree.world(name).ravel().tolist() if machine.has_pose(name) else None
         for name in machine.state.tree
     }
+
+
+def trace(answer: InputResult) -> list[str]:
+    """Return the lines of the trace of an input."""
+    return [effect.text for effect in answer.effects if effect.kind not in (*SILENT_EFFECTS, "PRINT")]
 
 
 def everything(talk: Session) -> tuple[object, ...]:
@@ -115,8 +121,8 @@ def test_an_arm_stands_where_the_last_statement_left_it() -> None:
     then = talk.state.machine.now
     second = talk.enter("MOVE ARM_1 TO b STRAIGHTLY")
 
-    assert first.trace_lines == ("ARM_1 MOVE: PTP a @100",)
-    assert second.trace_lines == ("ARM_1 MOVE: LINE b @100",)
+    assert trace(first) == ["ARM_1 MOVE: PTP a @100"]
+    assert trace(second) == ["ARM_1 MOVE: LINE b @100"]
     assert second.effects[0].t0 == then
     np.testing.assert_allclose(talk.state.machine.state.tree.world("ARM_1"), down(0.5, -0.1, 0.15), atol=EXACT)
 
@@ -184,7 +190,7 @@ def test_branches_side_by_side() -> None:
 
     assert not answer.is_wrong
     np.testing.assert_allclose(talk.state.machine.state.tree.world("PART"), down(0.70, -0.20, 0.05), atol=EXACT)
-    assert talk.enter("OPEN ARM_2").trace_lines == ("ARM_2 OPEN",)
+    assert trace(talk.enter("OPEN ARM_2")) == ["ARM_2 OPEN"]
 
 
 # ---- what is not complete ------------------------------------------------------------------------------------------
@@ -341,7 +347,7 @@ def test_statements_before_an_error_stay() -> None:
 
     answer = talk.enter("n = 1 ; OPEN ARM_1 ; MOVE ARM_1 TO c ; n = 2 ; n = 3")
 
-    assert answer.trace_lines == ("ARM_1 OPEN",)
+    assert trace(answer) == ["ARM_1 OPEN"]
     assert answer.remarks == ("not executed: the 2 statements after it",)
     assert talk.enter("n").printed_lines == ("1",)
 
@@ -610,7 +616,7 @@ def test_an_import_brings_arms() -> None:
     assert codes(talk.enter("OPEN ARM_1")) == ["E302"]
     assert codes(talk.enter('IMPORT "cel.json"')) == ["E228"]
     assert not talk.enter('IMPORT "cell.json"').is_wrong
-    assert talk.enter("OPEN ARM_1").trace_lines == ("ARM_1 OPEN",)
+    assert trace(talk.enter("OPEN ARM_1")) == ["ARM_1 OPEN"]
     assert talk.enter("station").printed_lines == ("(1,0,0, 0,1,0, 0,0,1, 0.45,0,0)",)
     assert talk.enter('IMPORT "cell.json"').remarks == ("`cell.json` is imported already",)
     talk.undo(2)

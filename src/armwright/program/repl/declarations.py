@@ -147,12 +147,11 @@ def _replace_units(
     Raises:
         NotNowError: numbers have been read in the old ones.
     """
-    current = {unit.key for unit in _unit_names(headers)}
+    current = {unit.key for header in headers if isinstance(header, tree.Units) for unit in header.units}
+    # Where no unit of a dimension is declared, the metre and the degree are the units.
+    current |= {"M", "DEG"} - {key for key in ("M", "DEG") if dimension(key) in set(map(dimension, current))}
     changes = [unit for unit in new.units if unit.key in UNITS and unit.key not in current]
     has_numbers = statements or any(isinstance(header, tree.Procedure) for header in headers)
-    standard = {"M", "DEG"}
-    dimensions = {dimension(key) for key in current}
-    changes = [change for change in changes if change.key not in standard or dimension(change.key) in dimensions]
     if has_numbers and changes:
         raise RedefinitionError(
             Diagnostic(
@@ -172,7 +171,3 @@ def _replace_units(
         else:
             remaining.append(header)
     return tuple(remaining)
-
-
-def _unit_names(headers: Sequence[tree.Header]) -> list[tree.Name]:
-    return [unit for header in headers if isinstance(header, tree.Units) for unit in header.units]

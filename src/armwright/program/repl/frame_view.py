@@ -27,7 +27,7 @@ def frame_table_lines(session: Session) -> list[str]:
             rows.append([shown, "no value yet"])
             continue
         X = machine.state.tree.world(name)
-        position = [_number_text(value, _DIGITS[units.length]) for value in X[:3, 3] / units.metres]
+        position = [f"{value:z.{_DIGITS[units.length]}f}" for value in X[:3, 3] / units.metres]
         rows.append([shown, *position, "", *map(_degrees_text, zyx_angles(X[:3, :3]).tolist()), ""])
     return _align_columns(rows)
 
@@ -49,7 +49,7 @@ def arm_lines(session: Session) -> list[str]:
     for name, arm in machine.cell.arms.items():
         q = machine.hardware.configuration(name, machine.now)
         shown = [
-            f"{_degrees_text(value)} deg" if joint.revolute else f"{_number_text(value * 1e3, 2)} mm"
+            f"{_degrees_text(value)} deg" if joint.revolute else f"{value * 1e3:z.2f} mm"
             for joint, value in zip(arm.arm.joints, q.tolist(), strict=True)
         ]
         hand = machine.state.hands[name]
@@ -68,25 +68,18 @@ def visible_names(session: Session) -> list[str]:
 
 
 def _degrees_text(angle: float) -> str:
-    shown = _number_text(math.degrees(angle), 2)
-    return "180.00" if shown == "-180.00" else shown
-
-
-def _number_text(value: float, digits: int) -> str:
-    # What rounds to 0 has no sign.
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+    text = f"{math.degrees(angle):z.2f}"
+    return "180.00" if text == "-180.00" else text
 
 
 def _align_columns(rows: Sequence[Sequence[str]]) -> list[str]:
-    complete = [row for row in rows if len(row) == len(rows[0])]
-    widths = [max(len(row[column]) for row in complete) for column in range(len(rows[0]))]
-    widths[0] = max(len(row[0]) for row in rows)
+    """Return rows as lines, the first column to the left and numbers to the right; a row may have words instead."""
+    complete = [row[1:] for row in rows if len(row) == len(rows[0])]
+    widths = [max(map(len, column)) for column in zip(*complete, strict=True)]
+    name_width = max(len(row[0]) for row in rows)
     lines = []
-    for row in rows:
-        first, *others = row
-        if len(row) < len(rows[0]):
-            lines.append(f"{first:<{widths[0]}}  {others[0]}")
-            continue
-        cells = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
-        lines.append("  ".join((f"{first:<{widths[0]}}", *cells)).rstrip())
+    for name, *cells in rows:
+        padding = widths if len(cells) == len(widths) else [0]
+        aligned = (f"{cell:>{width}}" for cell, width in zip(cells, padding, strict=True))
+        lines.append("  ".join((f"{name:<{name_width}}", *aligned)).rstrip())
     return lines

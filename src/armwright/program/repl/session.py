@@ -33,7 +33,7 @@ from armwright.program.repl.snapshots import (
     rename_variables,
     run_statement,
 )
-from armwright.program.repl.undo_report import SILENT_EFFECTS, undone_lines
+from armwright.program.repl.undo_report import undone_lines
 from armwright.program.semantics import check
 from armwright.program.semantics.cell_symbols import ReadImport, known_cell
 from armwright.program.semantics.symbols import Symbols
@@ -109,11 +109,6 @@ class InputResult:
     def printed_lines(self) -> tuple[str, ...]:
         """The lines that were printed."""
         return tuple(str(effect.data["printed"]) for effect in self.effects if effect.kind == "PRINT")
-
-    @property
-    def trace_lines(self) -> tuple[str, ...]:
-        """The lines of the trace, printed ones aside."""
-        return tuple(effect.text for effect in self.effects if effect.kind not in (*SILENT_EFFECTS, "PRINT"))
 
 
 @attrs.frozen(eq=False)
@@ -372,6 +367,4 @@ def _end_span(source: Source) -> Span:
 
 
 def _skipped_text(count: int) -> list[str]:
-    if not count:
-        return []
-    return [f"not executed: the {count} statements after it" if count > 1 else "not executed: the statement after it"]
+    return [f"not executed: the {f'{count} statements' if count > 1 else 'statement'} after it"] if count else []

@@ -28,7 +28,8 @@ def program_text(
         import_path: how the program shall name a file that the session has imported.
     """
     rows = [f"// {' '.join(remark.split())}"] if remark else []
-    rows += _units_lines(headers)
+    units = [unit.text for header in headers if isinstance(header, tree.Units) for unit in header.units]
+    rows += [f"UNITS {', '.join(units)} ;"] if units else []
     rows += [f'IMPORT "{import_path(header.path.value)}" ;' for header in headers if isinstance(header, tree.Import)]
     variables = [header for header in headers if isinstance(header, tree.Declaration)]
     rows += [
@@ -37,11 +38,6 @@ def program_text(
     rows += [f"{source_text(source, header)} ;" for header in headers if isinstance(header, tree.Procedure)]
     rows += ["BEGIN", *(f"{source_text(source, statement)} ;" for statement in statements), "END.", ""]
     return formatted(Source(source.name, "\n".join(rows)), std=std)
-
-
-def _units_lines(headers: Sequence[tree.Header]) -> list[str]:
-    units = [unit.text for header in headers if isinstance(header, tree.Units) for unit in header.units]
-    return [f"UNITS {', '.join(units)} ;"] if units else []
 
 
 def declaration_text(node: tree.Declaration) -> str:
