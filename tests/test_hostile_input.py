@@ -72,19 +72,23 @@ SAME: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("what", WRONG)
 @pytest.mark.parametrize("door", DOORS)
-def test_what_are_no_joint_positions(door: str, what: str) -> None:
+def test_what_are_no_joint_positions(door: str) -> None:
     """What is no array of six numbers is refused, and the message begins with the argument and ends with what came."""
-    value, kind, said = WRONG[what]
-    if what == "an iterator":
-        value = iter(Q)
+    begins, answers = door.partition(": ")[2] + ":", {}
+    for what, (value, kind, said) in WRONG.items():
+        try:
+            DOORS[door](iter(Q) if what == "an iterator" else value)
+        except kind as error:
+            if str(error).startswith(begins) and said in str(error):
+                continue
+            answers[what] = str(error)
+        except Exception as error:  # noqa: BLE001 - another one than expected
+            answers[what] = repr(error)
+        else:
+            answers[what] = "taken for joint positions"
 
-    with pytest.raises(kind) as caught:
-        DOORS[door](value)
-
-    assert str(caught.value).startswith(door.partition(": ")[2] + ":")
-    assert said in str(caught.value)
+    assert answers == {}
 
 
 @pytest.mark.parametrize("door", DOORS)
@@ -98,18 +102,17 @@ def test_one_number_for_all(door: str) -> None:
         call(0.5)
 
 
-@pytest.mark.parametrize("how", SAME)
 @pytest.mark.parametrize("door", DOORS)
 @pytest.mark.drawn(0.4)
-def test_the_same_numbers_differently(door: str, how: str) -> None:
+def test_the_same_numbers_differently(door: str) -> None:
     """How numbers are stored makes no difference, to the last bit, and what was handed in stays as it was."""
-    value = SAME[how]
-    before = np.array(value, dtype=np.float64)
+    expected = DOORS[door]([i / 8 for i in range(6)])
+    for how, value in SAME.items():
+        before = np.array(value, dtype=np.float64)
 
-    found = DOORS[door](value)
+        np.testing.assert_array_equal(DOORS[door](value), expected, err_msg=how)
 
-    np.testing.assert_array_equal(found, DOORS[door]([i / 8 for i in range(6)]))
-    np.testing.assert_array_equal(np.array(value, dtype=np.float64), before)
+        np.testing.assert_array_equal(np.array(value, dtype=np.float64), before, err_msg=how)
 
 
 @pytest.mark.parametrize("door", DOORS)
@@ -140,7 +143,7 @@ def test_leading_axes(door: str) -> None:
 @pytest.mark.parametrize("door", ONE)
 def test_one_configuration_only(door: str) -> None:
     """Where one configuration is asked for, two are refused."""
-    with pytest.raises(ShapeError, match=r"expected .*\(6,\), got \(2, 6\)"):
+    with pytest.raises(ShapeError, match=r"expected .*(\(6,\), got|got shape) \(2, 6\)"):
         ONE[door]([Q, Q])
 
 
