@@ -1,7 +1,6 @@
 """What a running program consists of: processes, the procedures they are in, the motions they make."""
 
 import enum
-from collections.abc import Callable
 from typing import Any, Literal, TypeAlias
 
 import attrs
@@ -86,23 +85,8 @@ class Activation:
 
     def create_nested(self, kind: Literal["condition", "action"], **fields: Any) -> "Activation":
         """Return the activation of a condition or an action, which has the names of this one."""
-        return Activation(
-            kind=kind,
-            bindings=self.bindings,
-            temporaries=self.temporaries,
-            temporary_spans=self.temporary_spans,
-            **fields,
-        )
-
-    def copy(self, copy_names: Callable[[dict[str, Any]], dict[str, Any]]) -> "Activation":
-        """Return a copy; ``copy_names`` copies names, and the same names once."""
-        return attrs.evolve(
-            self,
-            bindings=copy_names(self.bindings),
-            temporaries=copy_names(self.temporaries),
-            temporary_spans=copy_names(self.temporary_spans),
-            try_blocks=list(self.try_blocks),
-        )
+        names, temporaries, spans = self.bindings, self.temporaries, self.temporary_spans
+        return Activation(kind=kind, bindings=names, temporaries=temporaries, temporary_spans=spans, **fields)
 
 
 @attrs.define
@@ -189,18 +173,8 @@ class Motion:
     @property
     def event_data(self) -> dict[str, object]:
         """Further facts for the events."""
-        ended = {} if self.early_end is None else {self.early_end.value: True}
-        return {
-            "moved": self.moved,
-            "goal": self.goal,
-            "speed": self.speed,
-            "implied_affix": self.implied_affix,
-            **ended,
-        }
-
-    def copy(self) -> "Motion":
-        """Return a copy; what never changes is shared."""
-        return attrs.evolve(self, stages=list(self.stages), guards=[attrs.evolve(guard) for guard in self.guards])
+        data = {"moved": self.moved, "goal": self.goal, "speed": self.speed, "implied_affix": self.implied_affix}
+        return data if self.early_end is None else {**data, self.early_end.value: True}
 
 
 @attrs.frozen
@@ -303,19 +277,6 @@ class Process:
         if motion is None or any(activation.kind == "action" for activation in self.stack[motion.stack_depth :]):
             return None
         return motion
-
-    def copy(self, copy_names: Callable[[dict[str, Any]], dict[str, Any]]) -> "Process":
-        """Return a copy that still has the parent and the branches of this one.
-
-        Args:
-            copy_names: copies names, and the same names once.
-        """
-        return attrs.evolve(
-            self,
-            stack=[activation.copy(copy_names) for activation in self.stack],
-            motion=None if self.motion is None else self.motion.copy(),
-            locks=list(self.locks),
-        )
 
     def descends_from(self, other: "Process") -> bool:
         """Whether another process began this one, directly or through others, or is this one."""

@@ -1,5 +1,6 @@
 """The state of a running program: clock, frames, values, processes, and what it has left so far."""
 
+import copy
 from typing import Any
 
 import attrs
@@ -10,7 +11,7 @@ from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
-from armwright.program.vm.process import Process
+from armwright.program.vm.process import Activation, Guard, Motion, Process
 from armwright.program.vm.recording import Effect, RunStage, ToolWrenches, TrajectorySegment
 
 
@@ -105,35 +106,31 @@ class MachineState:
 
         What never changes is shared: frame trees, trajectories, effects, spans, poses.
         """
-        names: dict[int, dict[str, Any]] = {}
-        copies: dict[int, Process] = {}
+        copied: MachineState = _copy(self, {})
+        return copied
 
-        def copy_names(bindings: dict[str, Any]) -> dict[str, Any]:
-            """An action has the names of the activation that it interrupts: both have the same copy."""
-            return names.setdefault(id(bindings), dict(bindings))
 
-        def copy_process(process: Process) -> Process:
-            """Processes know one another, so the copy of each is made once."""
-            if id(process) not in copies:
-                copied = copies[id(process)] = process.copy(copy_names)
-                copied.parent = None if process.parent is None else copy_process(process.parent)
-                copied.branches = [copy_process(branch) for branch in process.branches]
-            return copies[id(process)]
+# What changes while a program runs.
+_MUTABLE = (MachineState, Process, Activation, Motion, Guard, Hand, list, dict)
 
-        return attrs.evolve(
-            self,
-            types=dict(self.types),
-            hands={name: attrs.evolve(hand) for name, hand in self.hands.items()},
-            segments={name: list(segments) for name, segments in self.segments.items()},
-            tool_wrenches={name: list(wrenches) for name, wrenches in self.tool_wrenches.items()},
-            trees=list(self.trees),
-            program=copy_process(self.program),
-            processes=[copy_process(process) for process in self.processes],
-            values=dict(self.values),
-            events=dict(self.events),
-            locks={name: copy_process(process) for name, process in self.locks.items()},
-            owners={arm: [copy_process(process) for process in owners] for arm, owners in self.owners.items()},
-            pose_origins=dict(self.pose_origins),
-            effects=list(self.effects),
-            stages=list(self.stages),
-        )
+
+def _copy(value: Any, copies: dict[int, Any]) -> Any:
+    """Return a copy of what changes, with copies of its parts; of what is met twice there is one copy.
+
+    Args:
+        value: of one of the types that change; the items of a container are all of one type.
+        copies: made so far, by the identity of what they are copies of.
+    """
+    if id(value) in copies:
+        return copies[id(value)]
+    copied = copies[id(value)] = copy.copy(value)
+    if isinstance(value, dict | list):
+        for key in value if isinstance(value, dict) else range(len(value)):
+            if not isinstance(value[key], _MUTABLE):
+                break
+            copied[key] = _copy(value[key], copies)
+    else:
+        for field in attrs.fields(type(value)):
+            if isinstance(part := getattr(value, field.name), _MUTABLE):
+                setattr(copied, field.name, _copy(part, copies))
+    return copied
