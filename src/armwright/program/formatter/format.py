@@ -47,7 +47,7 @@ def formatted(source: Source, *, std: Standard = Standard.RLO_2, numbers: int | 
         source: the program. Line ends of any kind become line feeds.
         std: its language.
         numbers: how far the numbers of lines are apart; without it, lines have no numbers.
-        width: how long a line may be [characters], if there is a pose where it can be broken.
+        width: how long a line may be [characters], if it can be broken somewhere.
 
     Raises:
         UnformattableError: the syntax is wrong; the text states what is wrong first.

@@ -1,7 +1,6 @@
-"""How a program is laid out: a walk over its tree states which words begin a row, and how far each is indented."""
+"""Layout of a program: a walk over its tree determines which words begin a row, and how far each is indented."""
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import attrs
 
@@ -10,31 +9,31 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import TokenKind
 
 # Blanks per level, in front of what goes on from the line above, and of the clauses of a MOVE.
-LEVEL, GOES_ON, CLAUSE = 2, 4, 5
-_DECLARED = 4
+INDENT, CONTINUATION, CLAUSE = 2, 4, 5
+_DECLARATION = 4
 
-# What has rows of its own, and so no pose within a row.
+# Statements that take rows of their own, and so cannot stand within a row.
 _LARGE = (tree.Block, tree.If, tree.While, tree.For, tree.Repeat, tree.Cobegin, tree.Try, tree.Lock, tree.Move)
 _NOTHING_BEFORE = frozenset((",", ")", "]", "."))
 
 
 @attrs.define(eq=False)
 class Row:
-    """What stands in one line, if it is not too long.
+    """Pieces that stand in one line, if it is not too long.
 
     Attributes:
         column: how far it is indented.
-        goes_on: how much further, if it takes several lines, the others are.
+        continuation: how much further, if it takes several lines, the others are.
         comment_column: how far comments in front of it are indented.
-        pieces: what it says.
-        comments: what stands in front of it.
+        pieces: in order.
+        comments: those in front of it.
         breaks: how many lines end between those and it.
         clauses: which of its pieces begin the clauses of a MOVE; none where a clause is the row.
         is_open: whether a clause of its MOVE takes rows of its own, so that each clause begins a line.
     """
 
     column: int
-    goes_on: int
+    continuation: int
     comment_column: int
     pieces: list[Piece] = attrs.field(factory=list)
     comments: list[Comment] = attrs.field(factory=list)
@@ -43,7 +42,7 @@ class Row:
     is_open: bool = False
 
     def add(self, piece: Piece) -> None:
-        """Put a piece behind the others, with the comments in front of it."""
+        """Append a piece with the comments in front of it."""
         if not self.pieces:
             self.comments, self.breaks = piece.comments, piece.breaks
         elif piece.comments:
@@ -90,35 +89,24 @@ class _Layout:
     """One walk over a tree.
 
     Attributes:
-        rows: by the pose of the first word of each.
-        clauses: by the pose of the first word of each clause of a MOVE, whether it is the first.
+        rows: by the offset of the first word of each.
+        clauses: by the offset of the first word of each clause of a MOVE, whether it is the first.
     """
 
     def __init__(self, pieces: Sequence[Piece], width: int) -> None:
         self.rows: dict[int, Row] = {}
         self.clauses: dict[int, bool] = {}
         self._pieces, self._width = pieces, width
-        self._at = {piece.start: index for index, piece in enumerate(pieces)}
-        self._visits: dict[type, Callable[[Any, int], None]] = {
-            tree.Block: self._block,
-            tree.If: self._if,
-            tree.While: lambda node, column: self._nested(node.body, column),
-            tree.For: lambda node, column: self._nested(node.body, column),
-            tree.Lock: lambda node, column: self._nested(node.body, column),
-            tree.Repeat: self._repeat,
-            tree.Cobegin: self._cobegin,
-            tree.Try: self._try,
-            tree.Move: self._move,
-        }
+        self._index = {piece.start: index for index, piece in enumerate(pieces)}
 
-    def _row(self, start: int, column: int, *, inner: int = 0, goes_on: int = GOES_ON) -> Row:
-        """Begin a row at a word; comments in front of it are indented by ``inner`` more."""
-        row = self.rows[start] = Row(column, goes_on, column + inner)
+    def _row(self, start: int, column: int, *, comment_indent: int = 0, continuation: int = CONTINUATION) -> Row:
+        """Begin a row at a word; comments in front of it are indented by ``comment_indent`` more."""
+        row = self.rows[start] = Row(column, continuation, column + comment_indent)
         return row
 
     def _before(self, start: int) -> Piece:
-        """Return the piece in front of the one at a pose."""
-        return self._pieces[self._at[start] - 1]
+        """Return the piece in front of the one that starts at an offset."""
+        return self._pieces[self._index[start] - 1]
 
     def program(self, node: tree.Program) -> None:
         """Lay a whole program out."""
@@ -134,17 +122,17 @@ class _Layout:
                 self._block(header.body, 0)
         end, _, last = self._pieces[-3:]
         self._row(self._before(node.statements[0].span.start if node.statements else end.start).start, 0)
-        self._statements(node.statements, LEVEL)
-        self._row(end.start, 0, inner=LEVEL)
+        self._statements(node.statements, INDENT)
+        self._row(end.start, 0, comment_indent=INDENT)
         self._row(last.start, 0)
 
     def _declaration(self, node: tree.Declaration) -> None:
         start = node.span.start
-        before = self._before(start) if self._at[start] else None
-        if before is not None and before.word == "VAR":
-            self._row(before.start, 0, goes_on=_DECLARED + LEVEL)
+        before = self._before(start)
+        if before.word == "VAR":
+            self._row(before.start, 0, continuation=_DECLARATION + INDENT)
         else:
-            self._row(start, _DECLARED, goes_on=LEVEL)
+            self._row(start, _DECLARATION, continuation=INDENT)
 
     # ---- statements
 
@@ -153,46 +141,50 @@ class _Layout:
             self._statement(node, column)
 
     def _statement(self, node: tree.Statement, column: int) -> None:
-        self._row(node.span.start, column, goes_on=CLAUSE if isinstance(node, tree.Move) else GOES_ON)
-        if (visit := self._visits.get(type(node))) is not None:
-            visit(node, column)
+        self._row(node.span.start, column, continuation=CLAUSE if isinstance(node, tree.Move) else CONTINUATION)
+        match node:
+            case tree.Move():
+                self._move(node, column)
+            case tree.If():
+                self._if(node, column)
+            case tree.While(body=body) | tree.For(body=body) | tree.Lock(body=body):
+                self._nested(body, column)
+            case tree.Block():
+                self._block(node, column)
+            case tree.Repeat():
+                self._statements(node.body, column + INDENT)
+                self._row(node.tail.start, column, comment_indent=INDENT)
+            case tree.Cobegin():
+                for branch in node.branches:
+                    self._row(branch.span.start, column + INDENT)
+                    self._block(branch.body, column + INDENT)
+                self._row(node.end.start, column, comment_indent=INDENT)
+            case tree.Try():
+                self._statements((*node.body, *node.recovery), column + INDENT)
+                for word in (node.recover, node.end):
+                    self._row(word.start, column, comment_indent=INDENT)
 
     def _nested(self, node: tree.Statement, column: int) -> None:
         """Lay out the statement behind THEN, ELSE or DO."""
-        self._statement(node, column if isinstance(node, tree.Block) else column + LEVEL)
+        self._statement(node, column if isinstance(node, tree.Block) else column + INDENT)
 
     def _block(self, node: tree.Block, column: int) -> None:
-        self._statements(node.statements, column + LEVEL)
-        self._row(node.end.start, column, inner=LEVEL)
-
-    def _repeat(self, node: tree.Repeat, column: int) -> None:
-        self._statements(node.body, column + LEVEL)
-        self._row(node.tail.start, column, inner=LEVEL)
-
-    def _try(self, node: tree.Try, column: int) -> None:
-        self._statements((*node.body, *node.recovery), column + LEVEL)
-        for word in (node.recover, node.end):
-            self._row(word.start, column, inner=LEVEL)
-
-    def _cobegin(self, node: tree.Cobegin, column: int) -> None:
-        for branch in node.branches:
-            self._row(branch.span.start, column + LEVEL)
-            self._block(branch.body, column + LEVEL)
-        self._row(node.end.start, column, inner=LEVEL)
+        self._statements(node.statements, column + INDENT)
+        self._row(node.end.start, column, comment_indent=INDENT)
 
     def _if(self, node: tree.If, column: int) -> None:
         links, last = node.else_if_chain
-        further = column + LEVEL
+        further = column + INDENT
         for link in links:
             if link is not node:
-                self._row(self._before(link.span.start).start, column, inner=LEVEL)
-                if any(comment.is_hard for comment in self._pieces[self._at[link.span.start]].comments):
+                self._row(self._before(link.span.start).start, column, comment_indent=INDENT)
+                if any(comment.ends_line for comment in self._pieces[self._index[link.span.start]].comments):
                     # It cannot stand in the line of its ELSE; but a long chain does not walk off to the right.
                     column = further
                     self._row(link.span.start, column)
             self._nested(link.then, column)
         if last is not None:
-            self._row(self._before(last.span.start).start, column, inner=LEVEL)
+            self._row(self._before(last.span.start).start, column, comment_indent=INDENT)
             self._nested(last, column)
 
     # ---- motions
@@ -206,7 +198,7 @@ class _Layout:
             start = clause.span.start
             self.clauses[start] = clause is node.clauses[0]
             if opened:
-                row = self._row(start, column, goes_on=LEVEL)
+                row = self._row(start, column, continuation=INDENT)
             block = clause.action if isinstance(clause, tree.On) else None
             if isinstance(block, tree.Block) and not self._is_small(start, block, column):
                 opened = row.is_open = True
@@ -214,11 +206,9 @@ class _Layout:
                 self._block(block, column)
 
     def _is_small(self, start: int, block: tree.Block, column: int) -> bool:
-        """Whether a clause that begins at a pose and ends with a block fits into a row, and holds nothing large."""
-        pieces = self._pieces[self._at[start] : self._at[block.end.start] + 1]
-        if any(isinstance(statement, _LARGE) for statement in block.statements) or any(
-            piece.comments for piece in pieces[1:]
-        ):
-            return False
+        """Whether a clause that begins at an offset and ends with a block fits into a row, and holds nothing large."""
+        pieces = self._pieces[self._index[start] : self._index[block.end.start] + 1]
+        is_large = any(isinstance(statement, _LARGE) for statement in block.statements)
+        has_comments = any(piece.comments for piece in pieces[1:])
         # Behind the block comes a comma or a semicolon.
-        return column + length(pieces) + LEVEL <= self._width
+        return not is_large and not has_comments and column + length(pieces) + INDENT <= self._width

@@ -1,9 +1,9 @@
-"""From rows to lines: comments in their poses, and rows that are too long broken where it hurts least."""
+"""From rows to lines: comments beside or between them, and rows that are too long broken where it hurts least."""
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from armwright.program.formatter.layout import CLAUSE, LEVEL, Row, length
+from armwright.program.formatter.layout import CLAUSE, INDENT, Row, length
 from armwright.program.formatter.pieces import Comment, Piece
 
 # In front of a comment behind a statement.
@@ -15,7 +15,7 @@ def lines_of(rows: Iterable[Row], width: int) -> list[str]:
 
     Args:
         rows: in order, the last being its end.
-        width: how long a line may be, if there is a pose where it can end; comments may stand out.
+        width: how long a line may be, if it can be broken; comments may stand out.
     """
     page = _Page(width)
     for row in rows:
@@ -40,15 +40,13 @@ class _Page:
         if row.breaks > 1 and lines:
             lines.append("")
         pieces = row.pieces
-        text = "".join([f" {piece.text}" if piece.blank else piece.text for piece in pieces])
-        if pieces[0].blank:
-            text = text[1:]
-        if not row.is_open and row.column + len(text) <= self._width and not any(piece.is_hard for piece in pieces):
+        text = "".join([f" {piece.text}" if piece.blank else piece.text for piece in pieces]).removeprefix(" ")
+        if not row.is_open and row.column + len(text) <= self._width and not any(piece.ends_line for piece in pieces):
             lines.append(" " * row.column + text)
         elif row.clauses:
             self._clauses(row)
         else:
-            self._fill(pieces, row.column, row.column + row.goes_on)
+            self._fill(pieces, row.column, row.column + row.continuation)
 
     def _comments(self, comments: Sequence[Comment], column: int) -> None:
         """Put comments behind the last line, as long as they stand in it, and then below."""
@@ -73,24 +71,25 @@ class _Page:
         pieces, starts = row.pieces, row.clauses
         column = row.column + CLAUSE
         head, end = pieces[: starts[0]], starts[1] if len(starts) > 1 else len(pieces)
-        first = row.column + length(_visible(pieces[:end])) <= self._width and not any(piece.is_hard for piece in head)
+        # A comment that ends a line may stand out.
+        visible = pieces[: end - pieces[end - 1].ends_line]
+        first = row.column + length(visible) <= self._width and not any(piece.ends_line for piece in head)
         self._fill(pieces[:end] if first else head, row.column, column)
-        bounds = [*starts, len(pieces)][first:]
-        for start, stop in pairwise(bounds):
-            self._fill(pieces[start:stop], column, column + LEVEL)
+        for start, stop in pairwise([*starts, len(pieces)][first:]):
+            self._fill(pieces[start:stop], column, column + INDENT)
 
-    def _fill(self, pieces: Sequence[Piece], column: int, goes_on: int) -> None:
+    def _fill(self, pieces: Sequence[Piece], column: int, continuation: int) -> None:
         """Write pieces into as many lines as it takes.
 
         Args:
             pieces: in order.
             column: where the first line begins.
-            goes_on: where the others do, outside of parentheses; inside, they begin where those do.
+            continuation: where the others do, outside of parentheses; inside, they begin where those do.
         """
         brackets: list[int] = []
         start, column_ = 0, column
         while start < len(pieces):
-            stop = self._stop(pieces, start, column_)
+            stop = self._line_end(pieces, start, column_)
             line = " " * column_
             more: list[str] = []
             for index in range(start, stop):
@@ -108,28 +107,22 @@ class _Page:
                     brackets.pop()
             self.lines += [line, *more]
             start = stop
-            column_ = brackets[-1] if brackets and brackets[-1] <= self._width * 2 // 3 else goes_on
+            column_ = brackets[-1] if brackets and brackets[-1] <= self._width * 2 // 3 else continuation
 
-    def _stop(self, pieces: Sequence[Piece], start: int, column: int) -> int:
+    def _line_end(self, pieces: Sequence[Piece], start: int, column: int) -> int:
         """Return where the line that starts with a piece should end."""
         best, lowest = 0, 0
         for index in range(start, len(pieces)):
             piece = pieces[index]
             if index > start:
-                hard = pieces[index - 1].is_hard
                 fits = column <= self._width
-                if hard and (fits or not best):
+                if pieces[index - 1].ends_line and (fits or not best):
                     return index
-                if piece.cut is not None:
+                if piece.penalty is not None:
                     if not fits:
                         return best or index
-                    if not best or piece.cut <= lowest:
-                        best, lowest = index, piece.cut
-            if not piece.is_hard:
+                    if not best or piece.penalty <= lowest:
+                        best, lowest = index, piece.penalty
+            if not piece.ends_line:
                 column += len(piece.text) + (piece.blank and index > start)
         return len(pieces) if column <= self._width or not best else best
-
-
-def _visible(pieces: Sequence[Piece]) -> Sequence[Piece]:
-    """Return pieces without the last, if that is a comment that ends a line."""
-    return pieces[:-1] if pieces[-1].is_hard else pieces

@@ -1,8 +1,8 @@
-"""What a formatted program is made of: its words and signs, how each is spelt, and the comments between them."""
+"""The pieces of a formatted program: its tokens, how each is spelt, and the comments between them."""
 
-import re
+from collections import deque
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 import attrs
 
@@ -14,11 +14,11 @@ from armwright.program.syntax.lexer import ScannedText, Token, TokenKind
 
 _NAME, _KEYWORD, _ARM, _SYMBOL = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.SYMBOL
 # Behind these an empty statement needs no `;`.
-_NEEDLESS_BEHIND = frozenset((";", "BEGIN", "TRY", "RECOVER", "REPEAT"))
+_NEEDLESS_AFTER = frozenset((";", "BEGIN", "TRY", "RECOVER", "REPEAT"))
 # What stays with the word in front of it, so that no line may end between the two.
 _CLOSING = frozenset((";", ",", ")", "]", "."))
-_LINE_END = re.compile(r"\n")
-_TAB = 8
+# White space within a line.
+_BLANKS = " \t\f\v"
 
 
 @attrs.frozen
@@ -27,38 +27,38 @@ class Comment:
 
     Attributes:
         text: its first line.
-        more: its further lines, each with how much further right it begins than the first.
-        breaks: how many lines end between what is in front of it and itself.
+        rest: its further lines, each with how much further right it begins than the first.
+        breaks: how many lines end between the token or comment before it and itself.
     """
 
     text: str
-    more: tuple[tuple[int, str], ...]
+    rest: tuple[tuple[int, str], ...]
     breaks: int
 
     @property
-    def is_hard(self) -> bool:
+    def ends_line(self) -> bool:
         """Whether nothing may follow it in its last line."""
-        return bool(self.more) or self.text.startswith("//")
+        return bool(self.rest) or self.text.startswith("//")
 
     def lines(self, column: int) -> list[str]:
         """Return its lines where the first stands at a column; only the further ones are indented."""
-        return [self.text, *(" " * max(0, column + right) + text if text else "" for right, text in self.more)]
+        return [self.text, *(" " * max(0, column + right) + text if text else "" for right, text in self.rest)]
 
 
-# Not frozen: a long program has a hundred thousand of them, and blanks are found out after the words.
+# Not frozen: a long program has a hundred thousand of them, and their white space is determined after their texts.
 @attrs.define(eq=False)
 class Piece:
-    """A word or sign, or a comment within a statement.
+    """A token, or a comment within a statement.
 
     Attributes:
         text: as it shall be written.
-        word: the text of a keyword or sign; empty for names, numbers, texts and comments.
+        word: the text of a keyword or symbol; empty for names, numbers, strings and comments.
         kind: of the token; None for a comment.
-        start: its pose in the text as it was.
-        breaks: how many lines end between what is in front of it and itself.
-        comments: what stands in front of it.
-        blank: whether a blank comes in front of it.
-        cut: whether a line may end in front of it: the lower the better; None where it must not.
+        start: its offset in the text of the program.
+        breaks: how many lines end between the token or comment before it and itself.
+        comments: those before it.
+        blank: whether a blank is written before it.
+        penalty: whether a line may be broken before it: the lower the better; None where it must not.
         comment: the comment that this is.
     """
 
@@ -69,13 +69,13 @@ class Piece:
     breaks: int
     comments: list[Comment]
     blank: bool = True
-    cut: int | None = None
+    penalty: int | None = None
     comment: Comment | None = None
 
     @property
-    def is_hard(self) -> bool:
+    def ends_line(self) -> bool:
         """Whether nothing may follow it in its line."""
-        return self.comment is not None and self.comment.is_hard
+        return self.comment is not None and self.comment.ends_line
 
 
 def pieces_of(text: str, scanned: ScannedText, program: tree.Program) -> list[Piece]:
@@ -86,91 +86,55 @@ def pieces_of(text: str, scanned: ScannedText, program: tree.Program) -> list[Pi
         scanned: its tokens and comments.
         program: its tree, for the names that are declared.
     """
-    pieces_: list[Piece] = []
-    gaps = _Gaps(text, scanned.comments)
-    dropped: list[Comment] = []
-    most = 0
+    pieces: list[Piece] = []
+    # The comments before a `;` that is left out, and the line ends there.
+    left: list[Comment] = []
+    left_breaks = 0
     word = ";"
-    for token, spelt in zip(scanned.tokens, _spellings(scanned.tokens, program), strict=True):
-        start = token.start
-        if gaps.is_plain(start):
-            comments: list[Comment] = []
-            breaks = text.count("\n", gaps.at, start)
-        else:
-            comments, breaks = gaps.read(start)
-        gaps.at = token.end
-        kind = token.kind
-        if dropped or most:
-            comments, breaks = _joined(dropped, most, comments, breaks)
-            dropped, most = [], 0
-        if token.key == ";" and word in _NEEDLESS_BEHIND:
-            dropped, most = comments, breaks
+    tokens, gaps = scanned.tokens, _gaps(text, scanned)
+    for token, spelling, (comments, line_ends) in zip(tokens, _spellings(tokens, program), gaps, strict=True):
+        breaks = line_ends if comments else max(left_breaks, line_ends)
+        if comments and left_breaks:
+            comments[0] = attrs.evolve(comments[0], breaks=max(left_breaks, comments[0].breaks))
+        comments[:0] = left
+        left, left_breaks = [], 0
+        if token.key == ";" and word in _NEEDLESS_AFTER:
+            left, left_breaks = comments, breaks
             continue
-        word = token.key if kind is _KEYWORD or kind is _SYMBOL else ""
-        pieces_.append(Piece(spelt, word, kind, start, breaks, comments))
-    _behind_signs(pieces_)
-    return pieces_
+        word = token.key if token.kind is _KEYWORD or token.kind is _SYMBOL else ""
+        pieces.append(Piece(spelling, word, token.kind, token.start, breaks, comments))
+    _move_comments(pieces)
+    return pieces
 
 
-def _joined(first: list[Comment], breaks: int, second: list[Comment], later: int) -> tuple[list[Comment], int]:
-    """Join two gaps between pieces, the piece between them being left out."""
-    if not second:
-        return first, max(breaks, later)
-    piece = attrs.evolve(second[0], breaks=max(breaks, second[0].breaks))
-    return [*first, piece, *second[1:]], later
-
-
-def _behind_signs(pieces: Sequence[Piece]) -> None:
-    """Put comments that end a line behind a sign that must not begin one."""
+def _move_comments(pieces: Sequence[Piece]) -> None:
+    """Move comments that end a line behind a symbol that must not begin one."""
     for piece, following in pairwise(pieces):
         if piece.comments and piece.word in _CLOSING:
-            first = next(
-                (index for index, comment in enumerate(piece.comments) if comment.is_hard), len(piece.comments)
-            )
-            following.comments[:0] = piece.comments[first:]
-            del piece.comments[first:]
+            count = len([*takewhile(lambda comment: not comment.ends_line, piece.comments)])
+            following.comments[:0] = piece.comments[count:]
+            del piece.comments[count:]
 
 
-class _Gaps:
-    """Reads what stands between tokens."""
-
-    def __init__(self, text: str, comments: Sequence[Span]) -> None:
-        self.at = 0
-        self._text = text
-        self._comments = comments
-        self._next = 0
-        self._far = len(text) + 1
-
-    def is_plain(self, stop: int) -> bool:
-        """Whether no comment stands between here and a pose."""
-        return self._next >= len(self._comments) or self._comments[self._next].start >= stop
-
-    def read(self, stop: int) -> tuple[list[Comment], int]:
-        """Return the comments up to a pose, and how many lines end behind the last."""
-        pieces_ = []
-        while not self.is_plain(stop):
-            span = self._comments[self._next]
-            pieces_.append(self._comment(span))
-            self._next += 1
-            self.at = span.end
-        return pieces_, self._text.count("\n", self.at, stop)
-
-    def _comment(self, span: Span) -> Comment:
-        text = self._text
-        breaks = text.count("\n", self.at, span.start)
-        first, *more = _LINE_END.split(text[span.start : span.end])
-        if not more:
-            return Comment(first.rstrip(" \t\f\v"), (), breaks)
-        front = text[text.rfind("\n", 0, span.start) + 1 : span.start]
-        column = len(front.expandtabs(_TAB))
-        return Comment(first.rstrip(" \t\f\v"), tuple(_placed(line, column) for line in more), breaks)
+def _gaps(text: str, scanned: ScannedText) -> Iterator[tuple[list[Comment], int]]:
+    """Give the comments between each token and the one before it, and how many lines end behind the last of them."""
+    end, waiting = 0, deque(scanned.comments)
+    for token in scanned.tokens:
+        comments: list[Comment] = []
+        while waiting and waiting[0].start < token.start:
+            span = waiting.popleft()
+            comments.append(_comment(text, span, text.count("\n", end, span.start)))
+            end = span.end
+        yield comments, text.count("\n", end, token.start)
+        end = token.end
 
 
-def _placed(line: str, column: int) -> tuple[int, str]:
-    """Return how far right of a column a line begins, and what it says."""
-    text = line.strip(" \t\f\v")
-    lead = line[: len(line) - len(line.lstrip(" \t\f\v"))]
-    return len(lead.expandtabs(_TAB)) - column, text
+def _comment(text: str, span: Span, breaks: int) -> Comment:
+    first, *rest = text[span.start : span.end].split("\n")
+    column = len(text[text.rfind("\n", 0, span.start) + 1 : span.start].expandtabs())
+    indents = [len(line.expandtabs()) - len(line.expandtabs().lstrip(_BLANKS)) - column for line in rest]
+    stripped = [line.strip(_BLANKS) for line in rest]
+    return Comment(first.rstrip(_BLANKS), tuple(zip(indents, stripped, strict=True)), breaks)
 
 
 def _spellings(tokens: Sequence[Token], program: tree.Program) -> Iterator[str]:
@@ -199,7 +163,7 @@ def _spellings(tokens: Sequence[Token], program: tree.Program) -> Iterator[str]:
 
 
 class _Names:
-    """How the names of a program are declared; asked for token after token."""
+    """How the names of a program are spelt where they are declared; to be asked for token after token."""
 
     def __init__(self, program: tree.Program) -> None:
         self._procedures: dict[str, str] = {}
@@ -210,9 +174,9 @@ class _Names:
             name = procedure.name
             self._procedures.setdefault(name.key, name.text)
             own = (*procedure.parameters, *procedure.declarations)
-            self._declared |= {name.span.start, *(piece.span.start for piece in _declared_in(own))}
+            self._declared |= {name.span.start, *(name.span.start for name in _declared_in(own))}
             self._own.append((procedure.span, _as_declared(own)))
-        self._own.sort(key=lambda piece: piece[0].start, reverse=True)
+        self._own.reverse()
 
     def spelling(self, token: Token, follows: str) -> str:
         """Return a name as it is declared, or as it is written where it is not."""

@@ -14,19 +14,19 @@ _NOTHING_BEFORE = frozenset((",", ")", "]", "."))
 _OPENING, _CLOSING = frozenset(("(", "[")), frozenset((")", "]"))
 _BRACKETS = _OPENING | _CLOSING
 # What lists in parentheses stand behind, beside names.
-_LISTS = frozenset(("PRINT", "VIA", "LOCK"))
+_LIST_WORDS = frozenset(("PRINT", "VIA", "LOCK"))
 # Before these words a line may end, before operations too, but rather not.
 _PARTS = frozenset(("TO", "AT", "FROM", "STEP", "WITH", "VIA", "DIRECTLY", "STRAIGHTLY", "ON", "RIGIDLY", "NONRIGIDLY"))
-_WORSE = {
+_OPERATOR_PENALTIES = {
     **dict.fromkeys(("AND", "OR"), 1),
     **dict.fromkeys(("<", "<=", "<>", ">=", ">"), 3),
     **dict.fromkeys(("+", "-"), 4),
     **dict.fromkeys(("*", "/"), 5),
 }
-_DEEPER = 10
-_IN_A_GROUP = 2
+_NESTING_PENALTY = 10
+_GROUP_PENALTY = 2
 # A matrix: twelve numbers, in groups of three.
-_COMMAS_OF_A_MATRIX = 11
+_MATRIX_COMMAS = 11
 
 
 @attrs.define
@@ -35,7 +35,7 @@ class _Bracket:
 
     is_index: bool
     is_list: bool
-    behind_commas: list[Piece]
+    items: list[Piece]
 
 
 def set_blanks(pieces: Sequence[Piece]) -> None:
@@ -43,61 +43,61 @@ def set_blanks(pieces: Sequence[Piece]) -> None:
 
     Arithmetic stands close together inside of parentheses, and the numbers of a matrix in groups of three.
     """
-    open_: list[_Bracket] = []
+    brackets: list[_Bracket] = []
     before = earlier = Piece("", ";", None, 0, 0, [])
-    joining = unary = False
+    is_behind_operator = is_behind_minus = False
     for piece in pieces:
         word, last = piece.word, before.word
         is_operand = before.kind in _OPERANDS or last in _CLOSING
-        is_sign = word in _ARITHMETIC
+        is_operator = word in _ARITHMETIC
         if last == ",":
-            _behind_comma(piece, open_)
-        elif word in _NOTHING_BEFORE or last in _OPENING or unary:
+            _behind_comma(piece, brackets)
+        elif word in _NOTHING_BEFORE or last in _OPENING or is_behind_minus:
             piece.blank = False
         elif word in _OPENING:
-            piece.blank = not _belongs(piece, before, earlier) and not (joining and open_)
-        elif joining and open_:
+            piece.blank = not _is_attached(piece, before, earlier) and not (is_behind_operator and brackets)
+        elif is_behind_operator and brackets:
             # Of two signs the second is that of a number; the two are kept apart.
-            piece.blank = is_sign
-            before.blank = before.blank or is_sign
-        elif is_sign and is_operand:
-            piece.blank = not open_
-        if is_operand and word in _WORSE:
-            piece.cut = _DEEPER * len(open_) + _WORSE[word]
-        elif word in _PARTS and not open_:
-            piece.cut = 0
-        unary = word == "-" and not is_operand
-        joining = is_sign and is_operand
+            piece.blank = is_operator
+            before.blank = before.blank or is_operator
+        elif is_operator and is_operand:
+            piece.blank = not brackets
+        if is_operand and word in _OPERATOR_PENALTIES:
+            piece.penalty = _NESTING_PENALTY * len(brackets) + _OPERATOR_PENALTIES[word]
+        elif word in _PARTS and not brackets:
+            piece.penalty = 0
+        is_behind_minus = word == "-" and not is_operand
+        is_behind_operator = is_operator and is_operand
         if word in _BRACKETS:
-            _bracket(piece, before, open_)
+            _bracket(piece, before, brackets)
         earlier, before = before, piece
 
 
-def _belongs(bracket: Piece, before: Piece, earlier: Piece) -> bool:
+def _is_attached(bracket: Piece, before: Piece, earlier: Piece) -> bool:
     """Whether a bracket stands close to the word in front of it, as in calls and elements of arrays."""
     if bracket.word == "[":
         return before.word != "ARRAY"
     return before.word == "PRINT" or (before.kind is _NAME and earlier.word != "READ")
 
 
-def _behind_comma(piece: Piece, open_: list[_Bracket]) -> None:
-    piece.cut = _DEEPER * len(open_)
-    if open_:
-        open_[-1].behind_commas.append(piece)
-        if open_[-1].is_index:
-            piece.blank, piece.cut = False, piece.cut + _IN_A_GROUP
+def _behind_comma(piece: Piece, brackets: list[_Bracket]) -> None:
+    piece.penalty = _NESTING_PENALTY * len(brackets)
+    if brackets:
+        brackets[-1].items.append(piece)
+        if brackets[-1].is_index:
+            piece.blank, piece.penalty = False, piece.penalty + _GROUP_PENALTY
 
 
-def _bracket(piece: Piece, before: Piece, open_: list[_Bracket]) -> None:
+def _bracket(piece: Piece, before: Piece, brackets: list[_Bracket]) -> None:
     """Open or close a bracket; group the numbers of a matrix."""
     if piece.word in _OPENING:
-        is_list = piece.word == "[" or before.kind is _NAME or before.word in _LISTS
-        open_.append(_Bracket(piece.word == "[", is_list, []))
+        is_list = piece.word == "[" or before.kind is _NAME or before.word in _LIST_WORDS
+        brackets.append(_Bracket(piece.word == "[", is_list, []))
         return
-    bracket = open_.pop()
-    if bracket.is_list or len(bracket.behind_commas) != _COMMAS_OF_A_MATRIX:
+    bracket = brackets.pop()
+    if bracket.is_list or len(bracket.items) != _MATRIX_COMMAS:
         return
-    for index, number in enumerate(bracket.behind_commas, 1):
+    for index, number in enumerate(bracket.items, 1):
         if index % 3:
             number.blank = False
-            number.cut = (number.cut or 0) + _IN_A_GROUP
+            number.penalty = (number.penalty or 0) + _GROUP_PENALTY
