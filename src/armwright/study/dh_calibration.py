@@ -173,6 +173,7 @@ def thesis_fit(data: BoardMeasurement) -> Array:
     return errors
 
 
+@cache
 def full_fit(attitudes: tuple[str, ...]) -> Calibration:
     """Return a calibration of all errors that are identifiable by boards in these orientations."""
     data = [measure_board(attitude) for attitude in attitudes]
