@@ -11,7 +11,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
 from armwright.kinematics.jacobians import jacobian
-from armwright.kinematics.singularity_analysis import determinant_factors, factor_names
+from armwright.kinematics.singularity_analysis import determinant_factors
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
@@ -116,7 +116,8 @@ def _right_angle(arm: Arm, rng: np.random.Generator) -> EdgeSet:
 def _singular(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
     """Sets at and beside each zero of each factor of the determinant."""
     sets, geometry = [], closed_form_geometry(arm)
-    for k, (factor, joint) in enumerate(zip(factor_names(geometry), (1, 2, 4), strict=True)):
+    names = ("shoulder", "slide" if geometry.family == "stanford" else "elbow", "wrist")
+    for k, (factor, joint) in enumerate(zip(names, (1, 2, 4), strict=True)):
         exact = np.array([_zero(arm, geometry, rng, k, joint) for _ in range(_FEW)])
         for decade in DECADES:
             shift = decade * np.eye(arm.n)[joint]
