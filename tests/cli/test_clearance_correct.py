@@ -125,7 +125,7 @@ MISTAKES = [
     (("correct", "five-bar", "--clearance", "J2=x"), "expected a pin and its clearance in mm"),
     (("correct", "five-bar", "--clearance", "J2=0"), "clearances: contact needs them above 0, got 0 mm"),
     (("correct", "five-bar", "--path", "y1", "--knots", "1"), "knots: expected 2 to 1000, got 1"),
-    (("correct", "five-bar", "--friction-velocity", "center"), "no sliding speed 'center'. Did you mean 'centre'?"),
+    (("correct", "five-bar", "--friction-velocity", "center"), "'center' is not one of 'surface', 'centre'"),
     (("correct", "five-bar", "--rounds", "-1"), "rounds: expected 0 to 100, got -1"),
     (("correct", "five-bar", "--rounds", str(10**30)), "rounds: expected 0 to 100, got 1000"),
     (("correct", "five-bar", "--estimate", "nowhere.json"), "nowhere.json: no such file"),

@@ -98,7 +98,6 @@ def test_quiet() -> None:
         (["five-bar", "--path", "Y2"], "no path 'Y2'. Did you mean 'y2'?"),
         (["five-bar", "--path", "y1", "--clearance", "j3=0.2"], "no pin 'j3'. Did you mean 'J3'?"),
         (["five-bar", "--path", "y1", "--law", "flors"], "no law of impact 'flors'. Did you mean 'flores'?"),
-        (["five-bar", "--path", "y1", "--friction-velocity", "center"], "Did you mean 'centre'?"),
         (["five-bar", "--path", "y1", "--clearance-mm", "0"], "contact needs them above 0, got 0 mm"),
         (["five-bar", "--path", "y1", "--clearance", "J2=-1"], "pin J2: clearance: expected 0 or more"),
         (["five-bar", "--path", "y1", "--step", "1e-3"], "is too long for contacts"),

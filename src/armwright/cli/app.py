@@ -7,6 +7,7 @@ from collections.abc import Collection
 from typing import Annotated
 
 import typer
+from typer import Option
 
 from armwright.cli.command_list import register
 from armwright.cli.commands import COMPLETE, NAME, App
@@ -53,7 +54,7 @@ def _raise_limits(texts: list[str]) -> list[str]:
 def root(
     _limits: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--raise",
             help="Raise a limit on the size of inputs, as in table_rows=10000000 (docs/limits.md lists the limits).",
             metavar="NAME=NUMBER",
@@ -63,7 +64,7 @@ def root(
     ] = None,
     _show: Annotated[
         Shell | None,
-        typer.Option(
+        Option(
             "--show-completion",
             help="Print the script with which bash, zsh, fish or powershell completes commands, options and names.",
             metavar="SHELL",
@@ -73,7 +74,7 @@ def root(
     ] = None,
     _install: Annotated[
         Shell | None,
-        typer.Option(
+        Option(
             "--install-completion",
             help="Install that script in the start-up files of the shell.",
             metavar="SHELL",
@@ -82,7 +83,7 @@ def root(
         ),
     ] = None,
     _version: Annotated[
-        bool, typer.Option("--version", help="Print the version and stop.", callback=_version, is_eager=True)
+        bool, Option("--version", help="Print the version and stop.", callback=_version, is_eager=True)
     ] = False,
 ) -> None:
     """A workbench for robot manipulators: model an arm, move it, program it, inspect the result.

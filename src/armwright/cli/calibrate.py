@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from armwright.cli.failures import outcome
 from armwright.cli.numbers import units_of
@@ -18,22 +18,20 @@ from armwright.errors import DoubtfulError
 
 def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    measured: Annotated[Path, typer.Argument(help="CSV of joint positions and measured points (docs/calibration.md).")],
+    measured: Annotated[Path, Argument(help="CSV of joint positions and measured points (docs/calibration.md).")],
     units: Units = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,
-    folds: Annotated[int, typer.Option(help="Folds of the cross-validation over joint configurations.")] = 5,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the division into folds.")] = 0,
+    folds: Annotated[int, Option(help="Folds of the cross-validation over joint configurations.")] = 5,
+    seed: Annotated[int, Option(min=0, help="Seed of the division into folds.")] = 0,
     beyond: Annotated[
         bool,
-        typer.Option(
-            "--beyond", help="Also try joint compliance, transmission error and a learned model of the residuals."
-        ),
+        Option("--beyond", help="Also try joint compliance, transmission error and a learned model of the residuals."),
     ] = False,
     noise_um: Annotated[
         float | None,
-        typer.Option(help="Standard deviation of a measured coordinate; larger residuals are then reported."),
+        Option(help="Standard deviation of a measured coordinate; larger residuals are then reported."),
     ] = None,
     output: OutputFolder = None,
     as_json: Json = False,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import typer
+from typer import Argument, Option
 
 from armwright.cli.options import Json
 from armwright.cli.output import print_json
@@ -27,16 +28,16 @@ Stage: TypeAlias = Literal["code", "tree", "tokens"]
 
 def check(  # noqa: PLR0917 - Typer reads one parameter per option
     programs: Annotated[
-        list[Path], typer.Argument(help="Programs in RLO, or folders; all files *.rlo of a folder are checked.")
+        list[Path], Argument(help="Programs in RLO, or folders; all files *.rlo of a folder are checked.")
     ],
     cell: CheckedCell = None,
     emit: Annotated[
-        Stage | None, typer.Option(help="Stage of the compilation to print; diagnostics then go to the error output.")
+        Stage | None, Option(help="Stage of the compilation to print; diagnostics then go to the error output.")
     ] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     output_format: Annotated[
-        Literal["text", "json", "sarif"], typer.Option("--format", help="How to print diagnostics.")
+        Literal["text", "json", "sarif"], Option("--format", help="How to print diagnostics.")
     ] = "text",
     as_json: Json = False,
 ) -> None:

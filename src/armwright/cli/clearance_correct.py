@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
@@ -19,21 +19,17 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     path: Annotated[
         str,
-        typer.Option(
-            help="Path to correct: pick-and-place, or a test path x1 to x10, y1 to y14.", autocompletion=paths
-        ),
+        Option(help="Path to correct: pick-and-place, or a test path x1 to x10, y1 to y14.", autocompletion=paths),
     ] = "pick-and-place",
     clearance: Annotated[
         list[str] | None,
-        typer.Option(help="Estimated radial clearance of a pin in mm, as in J2=0.34; may be repeated."),
+        Option(help="Estimated radial clearance of a pin in mm, as in J2=0.34; may be repeated."),
     ] = None,
     estimate: Annotated[
-        Path | None, typer.Option(help="Output of `clearance estimate --json`: its mean error is corrected.")
+        Path | None, Option(help="Output of `clearance estimate --json`: its mean error is corrected.")
     ] = None,
-    knots: Annotated[
-        int, typer.Option(help="Number of points at which an entire path is corrected, at most 1000.")
-    ] = 20,
-    rounds: Annotated[int, typer.Option(help="Number of iterations of the correction, at most 100.")] = 3,
+    knots: Annotated[int, Option(help="Number of points at which an entire path is corrected, at most 1000.")] = 20,
+    rounds: Annotated[int, Option(help="Number of iterations of the correction, at most 100.")] = 3,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     output: OutputFolder = None,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from armwright.cli.linkages import LinkageName
 from armwright.cli.options import Json, usage_error
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
-    measured: Annotated[Path, typer.Argument(help="CSV of the tip at rest, or on paths (docs/clearance.md).")],
+    measured: Annotated[Path, Argument(help="CSV of the tip at rest, or on paths (docs/clearance.md).")],
     sweep: Annotated[
-        Path | None, typer.Option(help="Folder of `clearance sweep` with the same paths; for measurements on paths.")
+        Path | None, Option(help="Folder of `clearance sweep` with the same paths; for measurements on paths.")
     ] = None,
     noise_um: Annotated[
         float | None,
-        typer.Option(help="Standard deviation of a measured coordinate; by default that of repeated readings."),
+        Option(help="Standard deviation of a measured coordinate; by default that of repeated readings."),
     ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,

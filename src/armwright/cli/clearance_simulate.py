@@ -1,16 +1,16 @@
 """``armwright clearance simulate``: simulate a linkage with joint clearance along a path."""
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
+from typer import Option
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
-from armwright.cli.shell_completion import paths, setting
+from armwright.cli.shell_completion import listed_in, paths
 from armwright.errors import counted
 
 if TYPE_CHECKING:
@@ -27,55 +27,43 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     path: Annotated[
         str | None,
-        typer.Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
+        Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
     ] = None,
-    speed_rpm: Annotated[float | None, typer.Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
-    revolutions: Annotated[float, typer.Option(help="Number of revolutions of the drive.")] = 3.0,
+    speed_rpm: Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
+    revolutions: Annotated[float, Option(help="Number of revolutions of the drive.")] = 3.0,
     clearance: Annotated[
-        list[str] | None, typer.Option(help="Radial clearance of a pin in mm, as in J2=0.5; may be repeated.")
+        list[str] | None, Option(help="Radial clearance of a pin in mm, as in J2=0.5; may be repeated.")
     ] = None,
     clearance_mm: Annotated[
-        float | None, typer.Option(help="Radial clearance of all pins in mm; the default is that of the linkage.")
+        float | None, Option(help="Radial clearance of all pins in mm; the default is that of the linkage.")
     ] = None,
     friction: Annotated[
-        float | None, typer.Option(help="Coefficient of friction; the default is that of the linkage.")
+        float | None, Option(help="Coefficient of friction; the default is that of the linkage.")
     ] = None,
-    friction_law: Annotated[
-        str, typer.Option(help="Law of friction: linear, tanh or lugre.", autocompletion=setting("FRICTION_LAWS"))
-    ] = "linear",
+    friction_law: Annotated[Literal["linear", "tanh", "lugre"], Option(help="Law of friction.")] = "linear",
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     law: Annotated[
         str,
-        typer.Option(
+        Option(
             help="Contact law: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...",
-            autocompletion=setting("IMPACT_LAWS"),
+            autocompletion=listed_in("armwright.clearance.contact", "IMPACT_LAWS"),
         ),
     ] = "lankarani-nikravesh",
-    integrator: Annotated[
-        str, typer.Option(help="Integrator: rk4 or semi-implicit.", autocompletion=setting("INTEGRATORS"))
-    ] = "rk4",
-    step: Annotated[float, typer.Option(help="Step of the integrator, in s.")] = 1e-5,
+    integrator: Annotated[Literal["rk4", "semi-implicit"], Option(help="Integrator.")] = "rk4",
+    step: Annotated[float, Option(help="Step of the integrator, in s.")] = 1e-5,
     locate: Annotated[
         bool,
-        typer.Option("--locate", help="Locate the contact events: divide a step where a journal reaches its bearing."),
+        Option("--locate", help="Locate the contact events: divide a step where a journal reaches its bearing."),
     ] = False,
-    sample: Annotated[
-        float | None, typer.Option(help="Time between samples, in s; the default is 1e-4 or less.")
-    ] = None,
+    sample: Annotated[float | None, Option(help="Time between samples, in s; the default is 1e-4 or less.")] = None,
     control: Annotated[
-        str,
-        typer.Option(
-            help="Control of the drives: effort (open loop) or pd+ff (feedback with feedforward).",
-            autocompletion=setting("CONTROLS"),
-        ),
+        Literal["effort", "pd+ff"],
+        Option(help="Control of the drives: effort (open loop) or pd+ff (feedback with feedforward)."),
     ] = "effort",
     start: Annotated[
-        str,
-        typer.Option(
-            help="Initial state: rest on elastic bearings, rest on rigid ones, or centred.",
-            autocompletion=setting("STARTS"),
-        ),
+        Literal["rest", "rigid", "centred"],
+        Option(help="Initial state: rest on elastic bearings, rest on rigid ones, or centred."),
     ] = "rest",
     output: OutputFolder = None,
     as_json: Json = False,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
+from typer import Option
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
 from armwright.cli.options import Json, Quiet
@@ -17,39 +17,33 @@ if TYPE_CHECKING:
 
 def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the sweep; it must hold nothing else.")],
-    paths: Annotated[str, typer.Option(help="Test paths, separated by commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
+    output: Annotated[Path, Option("-o", "--output", help="Folder of the sweep; it must hold nothing else.")],
+    paths: Annotated[str, Option(help="Test paths, separated by commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
     design: Annotated[
         Literal["factorial", "lhs", "sobol"],
-        typer.Option(help="Design of the experiment: factorial, lhs (Latin hypercube) or sobol."),
+        Option(help="Design of the experiment: factorial, lhs (Latin hypercube) or sobol."),
     ] = "sobol",
-    from_mm: Annotated[float, typer.Option(help="Smallest radial clearance in mm.")] = 0.1,
-    to_mm: Annotated[float, typer.Option(help="Largest radial clearance in mm.")] = 0.5,
+    from_mm: Annotated[float, Option(help="Smallest radial clearance in mm.")] = 0.1,
+    to_mm: Annotated[float, Option(help="Largest radial clearance in mm.")] = 0.5,
     levels: Annotated[
-        int, typer.Option(help="Levels of each clearance of a factorial design; 9 levels are the thesis' 729 runs.")
+        int, Option(help="Levels of each clearance of a factorial design; 9 levels are the thesis' 729 runs.")
     ] = 9,
-    runs: Annotated[
-        int, typer.Option("-n", "--runs", help="Number of linkages for lhs and sobol (a power of two).")
-    ] = 128,
+    runs: Annotated[int, Option("-n", "--runs", help="Number of linkages for lhs and sobol (a power of two).")] = 128,
     to_friction: Annotated[
-        float | None, typer.Option(help="Vary the coefficient of friction too, from 0 to this value.")
+        float | None, Option(help="Vary the coefficient of friction too, from 0 to this value.")
     ] = None,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
-    step: Annotated[float, typer.Option(help="Step of the integrator, in s.")] = 1e-5,
+    step: Annotated[float, Option(help="Step of the integrator, in s.")] = 1e-5,
     replicates: Annotated[
         int,
-        typer.Option(
+        Option(
             help="Replicates of each linkage with clearances a nanometre apart, 0 to 15: their spread measures chaos."
         ),
     ] = 3,
-    seed: Annotated[int, typer.Option(help="Seed of lhs and sobol.")] = 0,
-    workers: Annotated[
-        int | None, typer.Option(help="Number of processes; the default is the number of cores.")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler, as in tcp://10.0.0.1:8786.")
-    ] = None,
+    seed: Annotated[int, Option(help="Seed of lhs and sobol.")] = 0,
+    workers: Annotated[int | None, Option(help="Number of processes; the default is the number of cores.")] = None,
+    scheduler: Annotated[str | None, Option(help="Address of a Dask scheduler, as in tcp://10.0.0.1:8786.")] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:

@@ -3,20 +3,20 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from armwright.cli.programs import CellFile, Std, Strict, load_program, print_diagnostics
 from armwright.program.language.words import Standard
 
 
 def code(  # noqa: PLR0917 - Typer reads one parameter per option
-    program: Annotated[Path, typer.Argument(help="Program in RLO, or intermediate code (.rlc).")],
+    program: Annotated[Path, Argument(help="Program in RLO, or intermediate code (.rlc).")],
     cell: CellFile = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="File for the complete code (.rlc), which can be edited and run."),
+        Option("-o", "--output", help="File for the complete code (.rlc), which can be edited and run."),
     ] = None,
-    full: Annotated[bool, typer.Option("--full", help="Print the complete code, not only a listing.")] = False,
+    full: Annotated[bool, Option("--full", help="Print the complete code, not only a listing.")] = False,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
 ) -> None:

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from armwright.cli.options import ArmName, Json, usage_error
 from armwright.cli.output import print_json
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    output: Annotated[Path, typer.Option("-o", "--output", help="File to write: .urdf, or .toml for an arm file.")],
-    base: Annotated[str | None, typer.Option(help="Base link of a URDF file.")] = None,
-    tip: Annotated[str | None, typer.Option(help="Tool link of a URDF file.")] = None,
+    output: Annotated[Path, Option("-o", "--output", help="File to write: .urdf, or .toml for an arm file.")],
+    base: Annotated[str | None, Option(help="Base link of a URDF file.")] = None,
+    tip: Annotated[str | None, Option(help="Tool link of a URDF file.")] = None,
     lock: Annotated[
         str | None,
-        typer.Option(help="Joints of a URDF file to lock, at 0 or a position in degrees or mm, as in J1,J2=30."),
+        Option(help="Joints of a URDF file to lock, at 0 or a position in degrees or mm, as in J1,J2=30."),
     ] = None,
     as_json: Json = False,
 ) -> None:

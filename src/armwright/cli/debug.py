@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument
 
 from armwright.cli.options import usage_error
 from armwright.cli.programs import CellFile, Std, Strict
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def debug(
     program: Annotated[
-        Path | None, typer.Argument(help="The program; without it, an editor is served over standard input and output.")
+        Path | None, Argument(help="The program; without it, an editor is served over standard input and output.")
     ] = None,
     cell: CellFile = None,
     std: Std = Standard.RLO_2,

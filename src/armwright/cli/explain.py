@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument
 
 from armwright.cli.options import Json
 from armwright.cli.output import print_json
@@ -28,7 +28,7 @@ _BLANK = "\N{NO-BREAK SPACE}"
 def explain(
     code: Annotated[
         str | None,
-        typer.Argument(
+        Argument(
             help="Code of a diagnostic, as in E206; without it all codes are listed.",
             autocompletion=listed_in("armwright.program.diagnostics.index", "codes"),
         ),

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Option
 
 from armwright.cli.options import Json
 from armwright.cli.programs import CheckedCell, ProgramFiles, Std
@@ -20,7 +20,7 @@ def fix(
     programs: ProgramFiles,
     cell: CheckedCell = None,
     diff: Annotated[
-        bool, typer.Option("--diff", "--dry-run", help="Write nothing; print the changes and the remaining errors.")
+        bool, Option("--diff", "--dry-run", help="Write nothing; print the changes and the remaining errors.")
     ] = False,
     std: Std = Standard.RLO_2,
     as_json: Json = False,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from typer import Option
 
 from armwright.cli.options import Json
 from armwright.cli.programs import ProgramFiles, Std
@@ -14,14 +14,14 @@ from armwright.program.language.words import Standard
 def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
     programs: ProgramFiles,
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; end with exit status 5 if a program would change.")
+        bool, Option("--check", help="Write nothing; end with exit status 5 if a program would change.")
     ] = False,
-    diff: Annotated[bool, typer.Option("--diff", help="Write nothing; print the changes.")] = False,
+    diff: Annotated[bool, Option("--diff", help="Write nothing; print the changes.")] = False,
     stdout: Annotated[
-        bool, typer.Option("--stdout", help="Print the formatted programs and leave their files unchanged.")
+        bool, Option("--stdout", help="Print the formatted programs and leave their files unchanged.")
     ] = False,
     numbers: Annotated[
-        int | None, typer.Option(min=1, help="Step of the line numbers; without it lines are not numbered.")
+        int | None, Option(min=1, help="Step of the line numbers; without it lines are not numbered.")
     ] = None,
     std: Std = Standard.RLO_2,
     as_json: Json = False,

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
+from typer import Option
 
 from armwright.cli.options import ArmName, Configuration, Json, Rows, usage_error
 from armwright.cli.output import print_json_rows
@@ -49,7 +49,7 @@ def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
     csv: Rows = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
-    frame: Annotated[Literal["base", "tool"], typer.Option(help="Frame of the rows: base or tool.")] = "base",
+    frame: Annotated[Literal["base", "tool"], Option(help="Frame of the rows: base or tool.")] = "base",
     as_json: Json = False,
 ) -> None:
     """Print the Jacobian of the tool point: three linear rows, then three angular, in SI units and radians.

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Option
 
 from armwright.cli.options import ArmName, Json, usage_error
 from armwright.cli.output import print_json
@@ -15,13 +16,13 @@ if TYPE_CHECKING:
 
 def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    xyz: Annotated[str | None, typer.Option(help="Position of the tool in mm, as in 400,100,200.")] = None,
+    xyz: Annotated[str | None, Option(help="Position of the tool in mm, as in 400,100,200.")] = None,
     rpy: Annotated[
-        str | None, typer.Option(help="Roll, pitch, yaw about fixed x, y, z in degrees; the default is 0,0,0.")
+        str | None, Option(help="Roll, pitch, yaw about fixed x, y, z in degrees; the default is 0,0,0.")
     ] = None,
-    noap: Annotated[str | None, typer.Option(help="Pose as twelve numbers, columns n, o, a, p, in m.")] = None,
+    noap: Annotated[str | None, Option(help="Pose as twelve numbers, columns n, o, a, p, in m.")] = None,
     near: Annotated[
-        str | None, typer.Option(help="Joint positions in degrees and mm; the nearest solution is printed first.")
+        str | None, Option(help="Joint positions in degrees and mm; the nearest solution is printed first.")
     ] = None,
     as_json: Json = False,
 ) -> None:

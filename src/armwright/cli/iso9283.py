@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from armwright.cli.failures import outcome
 from armwright.cli.numbers import Named, named_numbers
@@ -22,22 +22,20 @@ if TYPE_CHECKING:
 
 
 def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
-    files: Annotated[
-        list[Path], typer.Argument(help="Measurements as CSV (docs/iso9283.md), in one or several files.")
-    ],
+    files: Annotated[list[Path], Argument(help="Measurements as CSV (docs/iso9283.md), in one or several files.")],
     output: OutputFolder = None,
     few: Annotated[
-        bool, typer.Option("--few", help="Accept fewer cycles than the standard requires; the results are marked.")
+        bool, Option("--few", help="Accept fewer cycles than the standard requires; the results are marked.")
     ] = False,
     band_mm: Annotated[
         float | None,
-        typer.Option(help="Radius in mm within which a pose counts as attained; the default is RP of the same pose."),
+        Option(help="Radius in mm within which a pose counts as attained; the default is RP of the same pose."),
     ] = None,
     corners_mm: Annotated[
-        float, typer.Option(help="Distance in mm from a corner within which AT and RT are not evaluated.")
+        float, Option(help="Distance in mm from a corner within which AT and RT are not evaluated.")
     ] = 0.0,
     limit: Annotated[
-        list[str] | None, typer.Option(help="Limit of a characteristic, as in RP=0.05mm; may be repeated.")
+        list[str] | None, Option(help="Limit of a characteristic, as in RP=0.05mm; may be repeated.")
     ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_json
@@ -13,15 +13,15 @@ def kernel(
     arm: ArmName,
     quantity: Annotated[
         str,
-        typer.Argument(
+        Argument(
             help="Quantity: forward, jacobian, inverse_branches, inverse_dynamics, forward_dynamics ...",
             autocompletion=listed_in("armwright.compiled.quantities", "quantity_names"),
         ),
     ],
-    count: Annotated[bool, typer.Option("--count", help="Print the operation count only.")] = False,
+    count: Annotated[bool, Option("--count", help="Print the operation count only.")] = False,
     single: Annotated[
         bool,
-        typer.Option("--single", help="Print the function for a single configuration instead of an array of them."),
+        Option("--single", help="Print the function for a single configuration instead of an array of them."),
     ] = False,
     as_json: Json = False,
 ) -> None:

@@ -1,34 +1,31 @@
 """Options, clearances and simulation settings that the commands for linkages share."""
 
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
-import typer
+from typer import Argument, Option
 
 from armwright.cli.numbers import named_numbers
-from armwright.cli.shell_completion import listed_in, setting
+from armwright.cli.shell_completion import listed_in
 from armwright.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from armwright.clearance.contact import FrictionLaw
+    from armwright.clearance.equations import SlipSpeed
     from armwright.clearance.linkage import Linkage
     from armwright.clearance.settings import Settings
 
 LinkageName: TypeAlias = Annotated[
     str,
-    typer.Argument(
+    Argument(
         help="Name in the catalogue, or path of a TOML file (docs/clearance.md).",
         autocompletion=listed_in("armwright.clearance.reader", "linkage_names", or_file=True),
     ),
 ]
 FrictionVelocity: TypeAlias = Annotated[
-    str,
-    typer.Option(
-        help="Sliding velocity: of the surface, or of the journal's centre as in the thesis.",
-        autocompletion=setting("SLIP_SPEEDS"),
-    ),
+    Literal["surface", "centre"],
+    Option(help="Sliding velocity: of the surface, or of the journal's centre as in the thesis."),
 ]
-Threshold: TypeAlias = Annotated[
-    float, typer.Option(help="Sliding speed in mm/s below which friction is reduced towards 0.")
-]
+Threshold: TypeAlias = Annotated[float, Option(help="Sliding speed in mm/s below which friction is reduced towards 0.")]
 
 
 def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float | None = None) -> "Linkage":
@@ -57,7 +54,9 @@ def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float
     return linkage
 
 
-def settings_of(velocity: str, threshold_mm_s: float, *, law: str = "linear", **others: Any) -> "Settings":
+def settings_of(
+    velocity: "SlipSpeed", threshold_mm_s: float, *, law: "FrictionLaw" = "linear", **others: Any
+) -> "Settings":
     """Return the settings of a simulation.
 
     Args:
@@ -72,5 +71,5 @@ def settings_of(velocity: str, threshold_mm_s: float, *, law: str = "linear", **
     from armwright.clearance.equations import FrictionModel
     from armwright.clearance.settings import Settings
 
-    friction = FrictionModel(law=law, velocity=velocity)  # type: ignore[arg-type]
+    friction = FrictionModel(law=law, velocity=velocity)
     return Settings(threshold=threshold_mm_s * 1e-3, friction=friction, **others)

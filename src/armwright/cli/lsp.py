@@ -2,15 +2,13 @@
 
 from typing import Annotated
 
-import typer
+from typer import Option
 
 
 def lsp(
     _stdio: Annotated[
         bool,
-        typer.Option(
-            "--stdio", help="Communicate over standard input and output, which is the only transport.", hidden=True
-        ),
+        Option("--stdio", help="Communicate over standard input and output, which is the only transport.", hidden=True),
     ] = True,
 ) -> None:
     """Serve an editor by the Language Server Protocol, over standard input and output.

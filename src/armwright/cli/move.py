@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
+from typer import Argument, Option
 
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, OutputFolder, QuietButWarnings, usage_error
@@ -24,37 +24,37 @@ _PERIOD_MS, _DEVIATION_MM = (0.01, 1000.0), (1e-4, 100.0)
 def move(  # noqa: PLR0917 - Typer reads one parameter per option
     kind: Annotated[
         Literal["joint", "cartesian"],
-        typer.Argument(help="Space in which the path between poses is straight: joint or cartesian."),
+        Argument(help="Space in which the path between poses is straight: joint or cartesian."),
     ],
     arm: ArmName,
-    poses: Annotated[Path, typer.Argument(help="File of poses, TOML or JSON (docs/poses.md).")],
+    poses: Annotated[Path, Argument(help="File of poses, TOML or JSON (docs/poses.md).")],
     output: OutputFolder = None,
     near: Annotated[
         str | None,
-        typer.Option(help="Initial joint positions in degrees and mm, as in 10,20,30; they select the branch."),
+        Option(help="Initial joint positions in degrees and mm, as in 10,20,30; they select the branch."),
     ] = None,
     ends: Annotated[
-        Literal["rest", "running"], typer.Option(help="Start and end at rest, or at the speed of the path.")
+        Literal["rest", "running"], Option(help="Start and end at rest, or at the speed of the path.")
     ] = "rest",
     orientation: Annotated[
         Literal["geodesic", "zyz"] | None,
-        typer.Option(help="Interpolate the orientation about a fixed axis (geodesic), or in ZYZ Euler angles (zyz)."),
+        Option(help="Interpolate the orientation about a fixed axis (geodesic), or in ZYZ Euler angles (zyz)."),
     ] = None,
     deviation_mm: Annotated[
-        float | None, typer.Option(help="Largest path deviation of the tool in mm; the default is 0.1.")
+        float | None, Option(help="Largest path deviation of the tool in mm; the default is 0.1.")
     ] = None,
     around: Annotated[
         Literal["via", "damped"] | None,
-        typer.Option(
+        Option(
             help="Stop at every pose; replace an infeasible line: via, by a detour; damped, by damped least squares."
         ),
     ] = None,
     keep_limits: Annotated[
         bool,
-        typer.Option("--keep-limits", help="Slow the motion down if the times of the file would exceed joint limits."),
+        Option("--keep-limits", help="Slow the motion down if the times of the file would exceed joint limits."),
     ] = False,
-    servo_ms: Annotated[float, typer.Option(help="Servo period of motion.csv in ms.")] = 2.0,
-    film: Annotated[bool, typer.Option(help="Draw move.gif, and move.mp4 where ffmpeg is installed.")] = True,
+    servo_ms: Annotated[float, Option(help="Servo period of motion.csv in ms.")] = 2.0,
+    film: Annotated[bool, Option(help="Draw move.gif, and move.mp4 where ffmpeg is installed.")] = True,
     as_json: Json = False,
     quiet: QuietButWarnings = False,
 ) -> None:

@@ -4,31 +4,30 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import typer
+from typer import Argument, Option
 
 from armwright.cli.shell_completion import listed_in
 
 ArmName: TypeAlias = Annotated[
     str,
-    typer.Argument(
+    Argument(
         help="Name in the catalogue, or path of an arm file.",
         autocompletion=listed_in("armwright.arm.load", "arm_names", or_file=True),
     ),
 ]
 Configuration: TypeAlias = Annotated[
-    str | None, typer.Option("-q", help="Joint positions in degrees and mm, as in 10,20,30.")
+    str | None, Option("-q", help="Joint positions in degrees and mm, as in 10,20,30.")
 ]
 Rows: TypeAlias = Annotated[
     Path | None,
-    typer.Option("--csv", help="Table of q1 ... qn, such as motion.csv, in SI units or the units in its headings."),
+    Option("--csv", help="Table of q1 ... qn, such as motion.csv, in SI units or the units in its headings."),
 ]
 OutputFolder: TypeAlias = Annotated[
-    Path | None, typer.Option("-o", "--output", help="Folder for the results; without it none are written.")
+    Path | None, Option("-o", "--output", help="Folder for the results; without it none are written.")
 ]
-Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
-Quiet: TypeAlias = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
-QuietButWarnings: TypeAlias = Annotated[
-    bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")
-]
+Json: TypeAlias = Annotated[bool, Option("--json", help="Print JSON, in SI units.")]
+Quiet: TypeAlias = Annotated[bool, Option("-q", "--quiet", help="Print nothing but errors.")]
+QuietButWarnings: TypeAlias = Annotated[bool, Option("-q", "--quiet", help="Print nothing but warnings and errors.")]
 
 
 def usage_error(option: str, message: str) -> typer.BadParameter:

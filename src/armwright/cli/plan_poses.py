@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
+from typer import Option
 
 from armwright.cli.numbers import units_of
 from armwright.cli.options import ArmName, Json
@@ -18,23 +18,23 @@ if TYPE_CHECKING:
 
 def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    count: Annotated[int, typer.Option("-n", "--count", help="Number of poses.")] = 30,
+    count: Annotated[int, Option("-n", "--count", help="Number of poses.")] = 30,
     index: Annotated[
         Literal["O1", "O2", "O3", "O4", "O5"],
-        typer.Option(help="Observability index to maximize: O1 to O5 (docs/calibration.md)."),
+        Option(help="Observability index to maximize: O1 to O5 (docs/calibration.md)."),
     ] = "O1",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the candidates.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Seed of the candidates.")] = 0,
     orientations: Annotated[
-        bool, typer.Option("--orientations", help="Orientations are measured too, not positions alone.")
+        bool, Option("--orientations", help="Orientations are measured too, not positions alone.")
     ] = False,
-    after: Annotated[Path | None, typer.Option(help="CSV of measurements to which the poses are added.")] = None,
+    after: Annotated[Path | None, Option(help="CSV of measurements to which the poses are added.")] = None,
     units: Units = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="CSV of the poses, to be completed by measurements for calibrate."),
+        Option("-o", "--output", help="CSV of the poses, to be completed by measurements for calibrate."),
     ] = None,
     as_json: Json = False,
 ) -> None:

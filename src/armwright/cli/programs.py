@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
+from typer import Argument, Option
 
 from armwright.errors import ExitStatus
 from armwright.program.language.words import Standard
@@ -16,23 +17,19 @@ if TYPE_CHECKING:
     from armwright.program.language.diagnostic import Diagnostic
 
 ProgramFiles: TypeAlias = Annotated[
-    list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
+    list[Path], Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
 ]
-ProgramFile: TypeAlias = Annotated[Path, typer.Argument(help="Program in RLO.")]
+ProgramFile: TypeAlias = Annotated[Path, Argument(help="Program in RLO.")]
 CellFile: TypeAlias = Annotated[
     Path | None,
-    typer.Option(
-        "--cell", help="Cell in which the program runs, TOML or JSON; the default is what the program IMPORTs."
-    ),
+    Option("--cell", help="Cell in which the program runs, TOML or JSON; the default is what the program IMPORTs."),
 ]
 CheckedCell: TypeAlias = Annotated[
     Path | None,
-    typer.Option("--cell", help="Cell in which the programs will run; frames, arms and devices are then checked too."),
+    Option("--cell", help="Cell in which the programs will run; frames, arms and devices are then checked too."),
 ]
-Std: TypeAlias = Annotated[
-    Standard, typer.Option(help="Version of the language: RLO-2, or only the RLO-83 of the report.")
-]
-Strict: TypeAlias = Annotated[bool, typer.Option("--strict", help="Treat an implied AFFIX (W201) as an error.")]
+Std: TypeAlias = Annotated[Standard, Option(help="Version of the language: RLO-2, or only the RLO-83 of the report.")]
+Strict: TypeAlias = Annotated[bool, Option("--strict", help="Treat an implied AFFIX (W201) as an error.")]
 
 
 def read_cell_option(path: Path | None) -> "Cell | None":

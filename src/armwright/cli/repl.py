@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 from armwright.cli.failures import outcome
 from armwright.cli.programs import CellFile, Std
@@ -27,12 +28,10 @@ _EVENT_LOG_HINT = "`:report DIR` writes all to events.jsonl"
 
 
 def repl(
-    program: Annotated[Path | None, typer.Argument(help="Program in RLO to load first.")] = None,
+    program: Annotated[Path | None, Argument(help="Program in RLO to load first.")] = None,
     cell: CellFile = None,
     std: Std = Standard.RLO_2,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one line of JSON for each input, without prompts.")
-    ] = False,
+    as_json: Annotated[bool, Option("--json", help="Print one line of JSON for each input, without prompts.")] = False,
 ) -> None:
     """Enter RLO interactively: each statement is executed in a simulated cell, and can be undone.
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import typer
+from typer import Option
 
 from armwright.cli.numbers import within
 from armwright.cli.options import Json, OutputFolder, QuietButWarnings, usage_error
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from armwright.cell.model import Cell
     from armwright.program.bytecode.instructions import Code
     from armwright.program.language.diagnostic import Diagnostic
-    from armwright.program.vm.interpreter import Limits, RunError
+    from armwright.program.vm.machine import Limits, RunError
     from armwright.program.vm.recording import Recording
     from armwright.report.run_files import RunInputs
 
@@ -33,31 +34,27 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     cell: CellFile = None,
     output: OutputFolder = None,
     servo_ms: Annotated[
-        float | None, typer.Option(help="Servo period in ms; the default is that of the cell file, or 1.")
+        float | None, Option(help="Servo period in ms; the default is that of the cell file, or 1.")
     ] = None,
     deviation_mm: Annotated[
         float | None,
-        typer.Option(
-            help="Largest path deviation of straight lines in mm; the default is that of the cell file, or 1."
-        ),
+        Option(help="Largest path deviation of straight lines in mm; the default is that of the cell file, or 1."),
     ] = None,
     around: Annotated[
         Around | None,
-        typer.Option(
-            help="Replace an infeasible straight line: via, by a detour; damped, by damped least squares; none."
-        ),
+        Option(help="Replace an infeasible straight line: via, by a detour; damped, by damped least squares; none."),
     ] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     max_steps: Annotated[
-        int, typer.Option(min=1, help="Largest number of steps that a program may execute without advancing the clock.")
+        int, Option(min=1, help="Largest number of steps that a program may execute without advancing the clock.")
     ] = 1_000_000,
     max_time: Annotated[
-        float, typer.Option(min=0.0, max=1e9, help="Largest duration of the run on the clock of the cell, in s.")
+        float, Option(min=0.0, max=1e9, help="Largest duration of the run on the clock of the cell, in s.")
     ] = 3600.0,
     most_rows: Annotated[
         int,
-        typer.Option("--motion-rows", min=2, help="Largest number of rows of motion.csv; omitted rows are reported."),
+        Option("--motion-rows", min=2, help="Largest number of rows of motion.csv; omitted rows are reported."),
     ] = 1_000_000,
     as_json: Json = False,
     quiet: QuietButWarnings = False,
@@ -72,7 +69,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
     from armwright.cli.results import warn_of_stray
-    from armwright.program.vm.interpreter import Limits, RunError
+    from armwright.program.vm.machine import Limits, RunError
     from armwright.report.run_files import RunInputs
 
     warn_of_stray(program)

@@ -72,11 +72,6 @@ def listed_in(module: str, name: str, *, or_file: bool = False) -> Complete:
     return complete
 
 
-def setting(name: str) -> Complete:
-    """Return a function that completes a word of a constant of ``clearance.settings`` with this name."""
-    return listed_in("armwright.clearance.settings", name)
-
-
 def paths(incomplete: str) -> list[str]:
     """Complete the name of a path of the tip of a five-bar."""
     from armwright.clearance.paths import PICK_AND_PLACE, TEST_PATHS

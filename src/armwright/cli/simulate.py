@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-import typer
+from typer import Option
 
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, OutputFolder
@@ -13,19 +13,17 @@ from armwright.cli.tool_options import Load, read_payload
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    configuration: Annotated[
-        str, typer.Option("-q", help="Initial joint positions in degrees and mm, as in 10,20,30.")
-    ],
+    configuration: Annotated[str, Option("-q", help="Initial joint positions in degrees and mm, as in 10,20,30.")],
     speeds: Annotated[
-        str | None, typer.Option("--qd", help="Initial joint velocities, in degrees/s (revolute) and mm/s (prismatic).")
+        str | None, Option("--qd", help="Initial joint velocities, in degrees/s (revolute) and mm/s (prismatic).")
     ] = None,
-    duration: Annotated[float, typer.Option(help="Duration of the simulation in s.")] = 1.0,
-    drives: Annotated[Literal["off", "gravity"], typer.Option(help="Drives off, or compensating gravity.")] = "off",
+    duration: Annotated[float, Option(help="Duration of the simulation in s.")] = 1.0,
+    drives: Annotated[Literal["off", "gravity"], Option(help="Drives off, or compensating gravity.")] = "off",
     method: Annotated[
         Literal["gill", "adaptive"],
-        typer.Option(help="Integrator: Runge-Kutta-Gill with fixed steps, or adaptive steps."),
+        Option(help="Integrator: Runge-Kutta-Gill with fixed steps, or adaptive steps."),
     ] = "adaptive",
-    step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and period of the rows, in ms.")] = 1.0,
+    step_ms: Annotated[float, Option(help="Step of Runge-Kutta-Gill, and period of the rows, in ms.")] = 1.0,
     load: Load = None,
     output: OutputFolder = None,
     as_json: Json = False,

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_json
@@ -10,7 +10,7 @@ from armwright.cli.output import print_json
 
 def singularity(
     arm: ArmName,
-    configuration: Annotated[str, typer.Option("-q", help="Joint positions in degrees and mm, as in 10,20,30.")],
+    configuration: Annotated[str, Option("-q", help="Joint positions in degrees and mm, as in 10,20,30.")],
     as_json: Json = False,
 ) -> None:
     """Print the factors of the Jacobian's determinant, those near zero, and the lost directions of the tool.

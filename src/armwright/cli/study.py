@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-import typer
+from typer import Argument
 
 from armwright.cli.options import Json, OutputFolder
 from armwright.cli.output import json_text, print_result
@@ -17,7 +17,7 @@ _WITH_BARS = {"five-bar-clearance"}
 def study(
     name: Annotated[
         str,
-        typer.Argument(
+        Argument(
             help="Name of the study: stanford-torque, puma-moves, five-bar-clearance or dh-calibration.",
             autocompletion=listed_in("armwright.study.study", "STUDIES"),
         ),

@@ -4,22 +4,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, NamedTuple, TypeAlias
 
-import typer
+from typer import Option
 
 from armwright.cli.options import usage_error
 
-Units: TypeAlias = Annotated[
-    str | None, typer.Option(help="Units of measurements whose header has none, as in mm,deg.")
-]
+Units: TypeAlias = Annotated[str | None, Option(help="Units of measurements whose header has none, as in mm,deg.")]
 ColumnMap: TypeAlias = Annotated[
     str | None,
-    typer.Option(
+    Option(
         "--columns",
         help="Map of column names, as in A1=joint_1_deg,X=x_mm, or a TOML file with [columns] (docs/tables.md).",
     ),
 ]
 SkipIncomplete: TypeAlias = Annotated[
-    bool, typer.Option("--skip-incomplete", help="Omit rows with empty cells, and report their number.")
+    bool, Option("--skip-incomplete", help="Omit rows with empty cells, and report their number.")
 ]
 
 

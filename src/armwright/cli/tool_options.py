@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
+from typer import Option
 
 from armwright.cli.numbers import numbers
 from armwright.cli.options import usage_error
@@ -12,10 +13,10 @@ if TYPE_CHECKING:
 
 Load: TypeAlias = Annotated[
     str | None,
-    typer.Option("--load", help="Payload in the tool frame: MASS,X,Y,Z in kg and mm, or a TOML file with its inertia."),
+    Option("--load", help="Payload in the tool frame: MASS,X,Y,Z in kg and mm, or a TOML file with its inertia."),
 ]
 MeasuredPoint: TypeAlias = Annotated[
-    str | None, typer.Option("--tool-mm", help="Measured point in the frame of the last link, in mm, as in 0,0,31.")
+    str | None, Option("--tool-mm", help="Measured point in the frame of the last link, in mm, as in 0,0,31.")
 ]
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from armwright.cli.options import ArmName, Configuration, Json, usage_error
 from armwright.cli.output import print_json_rows
@@ -22,17 +22,15 @@ _BLOCK = 1000
 def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
     q: Configuration = None,
-    qd: Annotated[str | None, typer.Option(help="Joint velocities in degrees/s and mm/s; the default is 0.")] = None,
-    qdd: Annotated[
-        str | None, typer.Option(help="Joint accelerations in degrees/s² and mm/s²; the default is 0.")
-    ] = None,
-    csv: Annotated[Path | None, typer.Option("--csv", help="Table of q, qd and qdd, such as motion.csv.")] = None,
+    qd: Annotated[str | None, Option(help="Joint velocities in degrees/s and mm/s; the default is 0.")] = None,
+    qdd: Annotated[str | None, Option(help="Joint accelerations in degrees/s² and mm/s²; the default is 0.")] = None,
+    csv: Annotated[Path | None, Option("--csv", help="Table of q, qd and qdd, such as motion.csv.")] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     load: Load = None,
     wrench: Annotated[
         str | None,
-        typer.Option("--wrench", help="External wrench on the tool along base axes: FX,FY,FZ,MX,MY,MZ in N and N m."),
+        Option("--wrench", help="External wrench on the tool along base axes: FX,FY,FZ,MX,MY,MZ in N and N m."),
     ] = None,
     as_json: Json = False,
 ) -> None:
