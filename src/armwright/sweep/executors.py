@@ -9,19 +9,11 @@ import multiprocessing
 import os
 import pickle
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from contextlib import closing, contextmanager
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
-import attrs
 import numpy as np
 
 from armwright.arrays import Array
@@ -57,16 +49,16 @@ def evaluate_blocks(
         KindError: the task cannot be pickled.
         SweepError: the workers do not start or cannot go on, or the task returned something else than its outputs.
     """
-    if scheduler is not None:
-        with connect_to_cluster(task, scheduler) as executor:
+    # Where the workers are threads of this process, its limit is theirs.
+    with extra("threadpoolctl").threadpool_limits(1):
+        if workers == 1 and scheduler is None:
+            yield from ((number, evaluate(task, points)) for number, points in blocks)
+            return
+        connection = (
+            closing(WorkerProcesses(task, workers)) if scheduler is None else connect_to_cluster(task, scheduler)
+        )
+        with connection as executor:
             yield from evaluate_in_parallel(executor, task, blocks)
-    elif workers > 1:
-        with closing(WorkerProcesses(task, workers)) as executor:
-            yield from evaluate_in_parallel(executor, task, blocks)
-    else:
-        with extra("threadpoolctl").threadpool_limits(1):
-            for number, points in blocks:
-                yield number, evaluate(task, points)
 
 
 def evaluate_in_parallel(
@@ -158,8 +150,7 @@ class WorkerProcesses:
         self._watched.close()
 
 
-@attrs.frozen(kw_only=True)
-class Cluster:
+class Cluster(NamedTuple):
     """The workers of a Dask cluster, which replaces those that die and tries a block several times.
 
     Attributes:
@@ -189,8 +180,7 @@ def connect_to_cluster(task: Task, address: str) -> Iterator[Cluster]:
     failure = f"no Dask scheduler answers at '{address}'"
     try:
         _check_scheduler(address)
-        # Where the workers are threads of this process, its threads are theirs.
-        with closing(kind.__new__(kind)) as client, extra("threadpoolctl").threadpool_limits(1):
+        with closing(kind.__new__(kind)) as client:
             client.__init__(address, timeout=CLUSTER_TIMEOUT, set_as_default=False)
             failure = f"the Dask scheduler at '{address}' has had no worker for {CLUSTER_TIMEOUT:g} s"
             client.wait_for_workers(1, timeout=CLUSTER_TIMEOUT)
@@ -207,7 +197,7 @@ def connect_to_cluster(task: Task, address: str) -> Iterator[Cluster]:
 
 
 def _check_scheduler(address: str) -> None:
-    """Check that a scheduler answers at an address, before a client is made.
+    """Check that a scheduler answers at an address: a client would wait for ever for one that is silent.
 
     Raises:
         SweepError: another part of Dask answers there.
@@ -216,19 +206,15 @@ def _check_scheduler(address: str) -> None:
 
     async def identity() -> Any:
         arguments = distributed.Security().get_connection_args("client")
-        async with (
-            asyncio.timeout(CLUSTER_TIMEOUT),
-            distributed.rpc(address, timeout=CLUSTER_TIMEOUT, connection_args=arguments) as scheduler,
-        ):
-            return await scheduler.identity()
+        async with asyncio.timeout(CLUSTER_TIMEOUT), distributed.rpc(address, connection_args=arguments) as component:
+            return await component.identity()
 
     # In a thread of its own: the caller may have an event loop that runs, as notebooks do.
     with ThreadPoolExecutor(1) as thread:
-        answer = thread.submit(asyncio.run, identity()).result()
-    kind = answer.get("type") if isinstance(answer, dict) else answer
+        kind = thread.submit(asyncio.run, identity()).result()["type"]
     if kind != "Scheduler":
         raise SweepError(
-            f"at '{address}' a Dask component of kind {shown(kind)} answers; expected the address of a scheduler"
+            f"at '{address}' a Dask component of kind '{kind}' answers; expected the address of a scheduler"
         )
 
 

@@ -56,9 +56,8 @@ def sweep_identity(task: Task, design: Design) -> dict[str, Any]:
         try:
             json.dumps(value, allow_nan=False)
         except (TypeError, ValueError) as error:
-            raise KindError(
-                f"setting '{name}': expected a value that JSON can represent, got {shown(value)}: {error}"
-            ) from error
+            text = f"setting '{name}': expected a value that JSON can represent, got {shown(value)}: {error}"
+            raise KindError(text) from error
     fields = {
         "armwright": __version__,
         "task": task.name,
@@ -124,15 +123,15 @@ class Folder:
             FileFormatError: it is damaged, or has gone; its file is not changed.
         """
         path = self.block_path(number)
-        data, checksum, damage = b"", b"", "it is not a file"
-        if path.is_file():
-            try:
+        file, damage = b"", "its checksum does not match its numbers, or it is another block"
+        try:
+            if path.is_file():
                 file = path.read_bytes()
-            except OSError as error:
-                damage = error.strerror or str(error)
             else:
-                data, checksum = file[:-32], file[-32:]
-                damage = "its checksum does not match its numbers, or it is another block"
+                damage = "it is not a file"
+        except OSError as error:
+            damage = error.strerror or str(error)
+        data, checksum = file[:-32], file[-32:]
         if checksum != self._checksum(number, data):
             runs = self.blocks[number]
             advice = "it is not changed; move or delete it and start again"
