@@ -41,7 +41,7 @@ test: $(VENV)/test   ## Run lint, types, the import contracts and all tests
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	@# Compiled modules are kept, for the processes that tests start.
-	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 proof: $(VENV)/test  ## Run every random sample at its full size and write docs/proof.md (hours; ONLY=tests/motion)
 	rm -rf out/proof

@@ -36,7 +36,8 @@ def sample(request: pytest.FixtureRequest) -> Iterator[Sample]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what `make proof` runs whole, and leave out what `make test` does not draw this time."""
+    """Begin the longest files first, mark what `make proof` runs whole, leave out what `make test` does not draw."""
+    items.sort(key=lambda item: item.get_closest_marker("early") is None)
     parts = defaultdict(list)
     for item in items:
         if (mark := item.get_closest_marker("drawn")) is not None:

@@ -13,6 +13,8 @@ import pytest
 from cli_calls import armwright
 from printed import agree, matches
 
+pytestmark = pytest.mark.early
+
 ROOT = Path(__file__).parents[1]
 HOME = ROOT / "docs" / "index.md"
 TUTORIALS = sorted(path for path in (ROOT / "docs" / "tutorials").glob("*.md") if path.stem != "index")

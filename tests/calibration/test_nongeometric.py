@@ -18,6 +18,8 @@ from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError
 from calibration.simulated import configurations, random_arm, random_errors
 
+pytestmark = pytest.mark.early
+
 NOISE = 3e-5
 # What joints give under the largest effort of gravity, and half the swing of gears [rad].
 SAG, SWING = 1e-3, 5e-4

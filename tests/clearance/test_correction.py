@@ -27,6 +27,8 @@ from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import InvalidValueError, ShapeError
 from clearance.arms import ARM_A, CENTRE
 
+pytestmark = pytest.mark.early
+
 # Twice the usual step, where no number of the thesis is compared.
 COARSE = attrs.evolve(CENTRE, step=2e-5)
 # What is asked for: a mean error at the targets with known clearances, and with estimated ones [m].

@@ -25,6 +25,8 @@ from armwright.sweep.run import run
 from armwright.sweep.task import Status, check_task, evaluate
 from clearance.arms import ARM_A, ARM_B, CENTRE, varied
 
+pytestmark = pytest.mark.early
+
 RANGE = (0.1e-3, 0.5e-3)
 # So much friction in a pin no step can follow.
 STUCK = 1e4

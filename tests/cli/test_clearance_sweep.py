@@ -20,6 +20,8 @@ from five_bar_example import CENTRE, PATHS, assert_clearances_found
 pytest.importorskip("sklearn")
 pytest.importorskip("xarray")
 
+pytestmark = pytest.mark.early
+
 # A run and another one a nanometre away tell until when a path is predictable.
 SWEEP = ("clearance", "sweep", "five-bar", *CENTRE, "--replicates", "1", "--workers", "1")
 

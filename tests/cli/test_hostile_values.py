@@ -20,6 +20,8 @@ from armwright.files.store import cache_folder
 from fork_server import fork_server
 from samples import Sample
 
+pytestmark = pytest.mark.early
+
 HERE = Path(__file__).parents[1]
 EXAMPLES = HERE.parent / "examples"
 Q = "10,-60,80,40,50,60"

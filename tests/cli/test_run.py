@@ -22,6 +22,8 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.files.output import stray_files
 from cli_calls import armwright, armwright_process
 
+pytestmark = pytest.mark.early
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 STACKING = EXAMPLES / "stacking.rlo"

@@ -10,7 +10,7 @@ import pytest
 
 from armwright.report.page import ArmRecord, JointInfo, RunPage
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.early]
 
 # The page carries five significant digits.
 DIGITS = 1e-4

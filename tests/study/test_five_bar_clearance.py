@@ -13,6 +13,8 @@ from armwright.study.five_bar_clearance import EstimateRow, SweepResult
 
 pytest.importorskip("sklearn")
 
+pytestmark = pytest.mark.early
+
 # Our path between the printed nodes is not the thesis' own; the first target, where the arm rests, is [mm].
 PRINTED = 5.1e-4
 

@@ -34,6 +34,8 @@ from armwright.study.puma_moves import (
 from armwright.study.puma_moves_study import PumaMoves
 from cli_calls import armwright
 
+pytestmark = pytest.mark.early
+
 ROUNDING = 1e-12
 
 

@@ -19,6 +19,8 @@ from armwright.files.store import Store
 from fork_server import ForkServer, fork_server
 from samples import Sample
 
+pytestmark = pytest.mark.early
+
 SOURCES = str(Path(armwright.__file__).parents[1])
 VALUE = repr(math.sin(0.5) * 1.25)
 
