@@ -11,7 +11,8 @@ from armwright.cell.simulator import Simulator
 from armwright.program import Source, compile as translate, known_cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.words import Standard
-from armwright.program.vm.interpreter import Limits, RunError, interpret
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.machine import Limits, RunError
 from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import homogeneous
 

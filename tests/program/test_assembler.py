@@ -11,7 +11,8 @@ from armwright.errors import FileFormatError
 from armwright.program import Source, compile as translate, known_cell
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.bytecode.instructions import Code, listing
-from armwright.program.vm.interpreter import RunError, interpret
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.machine import RunError
 from program.running import cell_of, code_of, corpus_text
 from program.shelf import ACCEPTED, cell_of as told_cell
 

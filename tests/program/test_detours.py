@@ -18,7 +18,8 @@ from armwright.motion.path import report_speed
 from armwright.program import compile as compile_program, known_cell
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
-from armwright.program.vm.interpreter import RunError, interpret, motion_warnings
+from armwright.program.vm.interpreter import interpret, motion_warnings
+from armwright.program.vm.machine import RunError
 from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Recording, RunStage
 from armwright.spatial.rotations import angle_between

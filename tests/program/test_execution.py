@@ -11,7 +11,7 @@ from armwright.arm.model import Joint
 from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell
 from armwright.kinematics.forward_kinematics import forward
-from armwright.program.vm.interpreter import Limits
+from armwright.program.vm.machine import Limits
 from program.running import EXACT, cell_of, down, expect, failure, printed, run
 
 PLACES = (

@@ -10,7 +10,8 @@ from armwright.program.bytecode.codegen import generate as code_of
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis.context import Context
 from armwright.program.language.diagnostic import Diagnostic
-from armwright.program.vm.interpreter import Limits, Machine, RunError, run as run_on
+from armwright.program.vm.interpreter import run as run_on
+from armwright.program.vm.machine import Limits, Machine, RunError
 from program.running import cell_of
 from program.shelf import BARE, compile_program
 from program.wandering import Wandering

@@ -14,7 +14,8 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
 from armwright.program import compile as compile_program, known_cell
 from armwright.program.language.source import Source
-from armwright.program.vm.interpreter import RunError, interpret, motion_warnings
+from armwright.program.vm.interpreter import interpret, motion_warnings
+from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import homogeneous
 

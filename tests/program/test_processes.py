@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from armwright.program import Source, compile as translate
-from armwright.program.vm.interpreter import Limits
+from armwright.program.vm.machine import Limits
 from armwright.program.vm.recording import Recording
 from program.running import cell_of, corpus_text, down, expect, failure, printed, run
 

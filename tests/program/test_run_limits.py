@@ -6,7 +6,7 @@ import pytest
 from armwright.program import Source, compile as translate
 from armwright.program.formatter.format import formatted
 from armwright.program.syntax import tree
-from armwright.program.vm.interpreter import Limits
+from armwright.program.vm.machine import Limits
 from program.running import cell_of, failure, printed, run
 
 HEAD = (

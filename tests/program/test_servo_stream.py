@@ -8,13 +8,16 @@ import pytest
 from armwright.cell.model import Cell, ContactPlane
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.program.vm.interpreter import RunError, interpret
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 from armwright.report.run_files import summary_data
 from program.guarded import guarded_program
 from program.running import cell_of, code_of, corpus_text
 from program.streams import Differences, differences, share_at_stop
 from samples import Sample
+
+pytestmark = pytest.mark.early
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CELLS = {

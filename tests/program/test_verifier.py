@@ -14,7 +14,8 @@ from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.bytecode.instructions import Op
 from armwright.program.bytecode.verifier import CodeError, Flow, State, Verifier
 from armwright.program.bytecode.verify import apply_rule, verify
-from armwright.program.vm.interpreter import Limits, RunError, interpret
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.machine import Limits, RunError
 from program.running import cell_of, code_of, corpus_text
 from program.shelf import ACCEPTED, cell_of as told_cell
 from samples import Sample

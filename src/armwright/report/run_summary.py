@@ -11,7 +11,7 @@ from armwright.files.result_table import ResultTable
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, Excerpt, excerpt, omission_text, shorten_line, shorten_list
-from armwright.program.vm.interpreter import RunError
+from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Effect, Recording, RunStage
 from armwright.report.run_files import ending_data, summary_data
 

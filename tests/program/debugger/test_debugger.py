@@ -10,7 +10,8 @@ from armwright.program.debugger.expressions import ExpressionError
 from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Variable
 from armwright.program.language.words import Standard
-from armwright.program.vm.interpreter import Limits, interpret
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.machine import Limits
 from program.running import cell_of, code_of, corpus_text, down
 
 HEAD = "VAR f, g : FRAME ;\n    n, m : SCALAR ;\n    t : TRANS ;\n    e : EVENT ;\n"

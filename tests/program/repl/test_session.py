@@ -16,8 +16,8 @@ from armwright.program.repl.frame_view import arm_lines, frame_table_lines, zyx_
 from armwright.program.repl.session import InputResult, Session
 from armwright.program.repl.undo_report import SILENT_EFFECTS
 from armwright.program.semantics.cell_symbols import ImportedFrames
-from armwright.program.vm.interpreter import Limits, interpret
-from armwright.program.vm.machine import Machine
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.machine import Limits, Machine
 from armwright.spatial.poses import homogeneous
 from program.running import DOWN, EXACT, cell_of, code_of, corpus_text, down
 

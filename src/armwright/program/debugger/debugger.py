@@ -22,8 +22,7 @@ from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Variable
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_arm
-from armwright.program.vm.interpreter import Limits, RunError
-from armwright.program.vm.machine import Machine
+from armwright.program.vm.machine import Limits, Machine, RunError
 from armwright.program.vm.process import ElementReference, Process
 from armwright.program.vm.recording import Effect
 

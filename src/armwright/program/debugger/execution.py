@@ -16,8 +16,7 @@ from armwright.program.debugger.statements import Statements
 from armwright.program.debugger.step_rules import Step
 from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import value_variable
-from armwright.program.vm.interpreter import Limits, RunError
-from armwright.program.vm.machine import Machine
+from armwright.program.vm.machine import Limits, Machine, RunError
 from armwright.program.vm.process import Process
 
 # A run to the next stop; it can be given up whenever it yields.

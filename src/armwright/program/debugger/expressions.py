@@ -21,7 +21,7 @@ from armwright.program.syntax.expressions import expression
 from armwright.program.syntax.lexer import TokenKind, scan
 from armwright.program.syntax.token_stream import PanicModeError, TokenStream
 from armwright.program.vm.expressions import evaluate_instructions
-from armwright.program.vm.machine import Machine, RunError, constant_values
+from armwright.program.vm.machine import Machine, RunError
 from armwright.program.vm.process import Activation, Process, Value
 
 
@@ -161,12 +161,9 @@ def _execute(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> 
     """
     emitter = Emitter(parsed.source, machine.code.units)
     operand = emitter.value(parsed.node)
-    steps = tuple(emitter.instructions)
-    evaluator, process = copy.copy(machine), copy.copy(frame.process)
-    evaluator.code = attrs.evolve(
-        machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source
-    )
-    evaluator.constants = constant_values(emitter.constants)
+    steps, constants = tuple(emitter.instructions), tuple(emitter.constants)
+    code = attrs.evolve(machine.code, instructions=steps, constants=constants, source=parsed.source)
+    evaluator, process = machine.with_code(code), copy.copy(frame.process)
     process.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
     try:
         evaluate_instructions(evaluator, process, steps)

@@ -13,7 +13,8 @@ import attrs
 from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
 from armwright.program.bytecode.instructions import Code, Op
-from armwright.program.vm.interpreter import Limits, Machine, advance, next_process, ready_process
+from armwright.program.vm.interpreter import advance, next_process, ready_process
+from armwright.program.vm.machine import Limits, Machine
 from armwright.program.vm.process import Process
 
 # A moment is kept when the path from the last one has taken so long [s], or so many times what keeping one takes.

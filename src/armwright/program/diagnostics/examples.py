@@ -21,7 +21,8 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport
-from armwright.program.vm.interpreter import Limits, RunError, motion_warnings
+from armwright.program.vm.interpreter import motion_warnings
+from armwright.program.vm.machine import Limits, RunError
 
 _CELLS = Path(__file__).parent / "pages" / "cells"
 _RUN = re.compile(r"^// run in (\w+)$", re.MULTILINE)

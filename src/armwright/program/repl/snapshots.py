@@ -30,16 +30,16 @@ def load_code(machine: Machine, code: Code, limits: Limits) -> Machine:
         code: of what is to be done next.
         limits: when that is taken to run for ever.
     """
-    copied = machine.copy()
-    state = copied.state
+    loaded = machine.copy().with_code(code)
+    state = loaded.state
     state.types, state.locks, state.owners, state.idle_steps = dict(code.types), {}, {}, 0
     for name, kind in code.types.items():
         if kind == VariableType(VariableKind.FRAME):
             state.tree = state.tree.declare(name)
     state.program = Process(wake_tick=state.ticks, last_arm=state.program.last_arm)
     state.processes = [state.program]
-    until = attrs.evolve(limits, time=machine.now + limits.time)
-    return Machine(code, copied.cell, copied.hardware, until, state)
+    loaded.limits = attrs.evolve(limits, time=machine.now + limits.time)
+    return loaded
 
 
 def run_statement(machine: Machine) -> None:

@@ -58,13 +58,9 @@ def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
         executed = join([last.trajectory.until(local), braking])
         efforts_before = [] if last.tau is None else [last.tau[: round(local / period)]]
         peak, when = peak_efforts(np.concatenate([*efforts_before, tau]), period)
+        stage, length = machine.state.stages[motion.stage_index], hand_length(arm, executed)
         machine.state.stages[motion.stage_index] = attrs.evolve(
-            machine.state.stages[motion.stage_index],
-            motion=executed,
-            length=hand_length(arm, executed),
-            peak_effort=peak,
-            peak_time=when,
-            stopped=True,
+            stage, motion=executed, length=length, peak_effort=peak, peak_time=when, stopped=True
         )
     return math.ceil(braking.duration / period - _ROUNDING)
 
@@ -106,11 +102,10 @@ def recompute_efforts(machine: Machine, arm: str, stage_index: int | None) -> No
     tau = trajectory_efforts(machine.cell.arms[arm].arm, last.trajectory, period, remaining_wrenches, len(last.tau) - 1)
     tau[:done_ticks] = last.tau[:done_ticks]
     machine.state.segments[arm][-1] = attrs.evolve(last, tau=tau)
-    peak, when = peak_efforts(tau, period)
     if stage_index is not None:
-        machine.state.stages[stage_index] = attrs.evolve(
-            machine.state.stages[stage_index], peak_effort=peak, peak_time=when
-        )
+        peak, when = peak_efforts(tau, period)
+        stage = machine.state.stages[stage_index]
+        machine.state.stages[stage_index] = attrs.evolve(stage, peak_effort=peak, peak_time=when)
 
 
 # ---- contact -------------------------------------------------------------------------------------------------------
@@ -119,9 +114,8 @@ def recompute_efforts(machine: Machine, arm: str, stage_index: int | None) -> No
 def update_depth_alarm(machine: Machine, motion: Motion) -> None:
     """See when an arm presses too deep by what it has begun to do, if it ever does."""
     deep = machine.hardware.excess_depth_time(motion.arm)
-    motion.alarm_tick = (
-        None if deep is None else max(machine.state.ticks, math.ceil(deep / machine.cell.period - _ROUNDING))
-    )
+    tick = None if deep is None else math.ceil(deep / machine.cell.period - _ROUNDING)
+    motion.alarm_tick = None if tick is None else max(machine.state.ticks, tick)
 
 
 def record_contact(machine: Machine, motion: Motion, tick: int | None = None) -> None:
@@ -172,9 +166,7 @@ def stop_too_deep(machine: Machine, process: Process, motion: Motion) -> NoRetur
 def _speed_advice(motion: Motion, share: float) -> list[str]:
     """Advise a speed for a depth that is this share of the least there is: the depth grows with its square."""
     speed = math.floor(motion.speed * math.sqrt(_DEPTH_RESERVE * share))
-    if speed < _MIN_SPEED:
-        return ["end this MOVE above the plane"]
-    return [f"use a lower speed: `WITH SPEED = {speed}`"]
+    return ["end this MOVE above the plane" if speed < _MIN_SPEED else f"use a lower speed: `WITH SPEED = {speed}`"]
 
 
 def _minimum_depth(machine: Machine, motion: Motion) -> float | None:
@@ -190,20 +182,16 @@ def _minimum_depth(machine: Machine, motion: Motion) -> float | None:
     return machine.cell.contact.height - float(X_WT[:, 2, 3].min())
 
 
-def refuse_contact(machine: Machine, process: Process, motion: Motion, to: str) -> NoReturn:
+def refuse_contact(machine: Machine, process: Process, motion: Motion, goal: str) -> NoReturn:
     """Refuse a stage that would come down on the plane, or press too deep into it, where no ON looks out for that.
 
     Raises:
         RunError: always.
     """
-    raise machine.error(
-        process,
-        "E404",
-        f"`{machine.spelling(motion.moved)}` would enter the plane{_plane_height_text(machine)} on its path to `{to}`",
-        motion.span,
-        "this MOVE has no ON that ends it at the contact",
-        helps=["guard the motion: `ON FORCE(Z) > 10 DO HALT`"],
-    )
+    plane = f"the plane{_plane_height_text(machine)}"
+    text = f"`{machine.spelling(motion.moved)}` would enter {plane} on its path to `{goal}`"
+    label, helps = "this MOVE has no ON that ends it at the contact", ["guard the motion: `ON FORCE(Z) > 10 DO HALT`"]
+    raise machine.error(process, "E404", text, motion.span, label, helps=helps)
 
 
 def _plane_height_text(machine: Machine) -> str:

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Mapping, Sequence
 
+import attrs
+
 from armwright.program.bytecode.instructions import Instruction, Op
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Span
@@ -63,15 +65,12 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
                 read = machine.read_number if kind.kind is VariableKind.SCALAR else machine.read_pose
                 machine.state.values[slot] = read(process, operand, step)
             else:
-                machine.replace_tree(
-                    machine.state.tree.set_pose(slot, machine.read_pose(process, operand, step)), slot, step.span
-                )
+                X_WF = machine.read_pose(process, operand, step)
+                machine.replace_tree(machine.state.tree.set_pose(slot, X_WF), slot, step.span)
         bindings[key] = slot
         machine.state.types[slot] = kind
         local_slots.append(slot)
-    activation = Activation(
-        kind="procedure", name=name, bindings=bindings, return_address=process.pc, call_span=step.span
-    )
+    activation = Activation("procedure", name, bindings, return_address=process.pc, call_span=step.span)
     activation.local_slots, activation.lock_count = tuple(local_slots), len(process.locks)
     process.stack.append(activation)
     process.pc = procedure.start
@@ -104,22 +103,16 @@ def _leave_activation(machine: Machine, process: Process, span: Span) -> None:
 
 
 def _fork(machine: Machine, process: Process, step: Instruction) -> None:
-    activation = process.activation
+    parent = process.activation
+    names, temporaries, spans = parent.bindings, parent.temporaries, parent.temporary_spans
     _check_process_limit(machine, process, step)
-    rank = machine.read_number(process, step.operands[1], step) if len(step.operands) > 1 else process.priority
+    priority = machine.read_number(process, step.operands[1], step) if len(step.operands) > 1 else process.priority
     branch = Process(
         path=(*process.path, len(process.branches)),
-        priority=rank,
+        priority=priority,
         pc=jump_target(step, 0),
         wake_tick=machine.state.ticks,
-        stack=[
-            Activation(
-                kind="main",
-                bindings=activation.bindings,
-                temporaries=dict(activation.temporaries),
-                temporary_spans=dict(activation.temporary_spans),
-            )
-        ],
+        stack=[Activation("main", "", names, dict(temporaries), dict(spans))],
         parent=process,
         last_arm=process.last_arm,
     )
@@ -173,10 +166,8 @@ def _pause(machine: Machine, process: Process, step: Instruction) -> None:
     if not 0 <= seconds <= _MAX_PAUSE:
         text = f"a PAUSE of {seconds:g} s is not possible"
         raise machine.error(process, "E231", text, step.span, f"expected 0 to {_MAX_PAUSE:g} s")
-    text = f"PAUSE {seconds:g}"
-    machine.schedule_effect(
-        process, seconds, PendingEffect(kind="PAUSE", text=text, start=machine.next_start(), span=step.span)
-    )
+    pending = PendingEffect(kind="PAUSE", text=f"PAUSE {seconds:g}", start=machine.next_start(), span=step.span)
+    machine.schedule_effect(process, seconds, pending)
 
 
 # ---- attempts and ends ---------------------------------------------------------------------------------------------
@@ -242,9 +233,9 @@ def _stop_motion(machine: Machine, process: Process, span: Span) -> int:
         return _rest_tick(machine, process.last_arm)
     motion, end = process.motion, stop_arm(machine, process, span)
     record_contact(machine, motion, end)
-    words, contact = contact_report(motion)
+    contact_text, contact = contact_report(motion)
     process.motion, arm = None, motion.arm
-    machine.record_effect(process, "STOP", f"{arm} stops{words}", span, until=end, arm=arm, data=contact)
+    machine.record_effect(process, "STOP", f"{arm} stops{contact_text}", span, until=end, arm=arm, data=contact)
     motion.early_end, since = motion.early_end or EarlyEnd.BRAKED, motion.start
     data = {**motion.event_data, **contact}
     machine.record_effect(process, "MOVE", motion.trace_text, motion.span, since=since, until=end, arm=arm, data=data)
@@ -261,9 +252,8 @@ def _rest_tick(machine: Machine, arm: str | None) -> int:
 def finish_program(machine: Machine, process: Process, span: Span, word: str) -> None:
     """End the program: arms at rest, devices off, the frame table true."""
     switched_off = shut_down(machine, span)
-    machine.record_effect(
-        process, "END", f"{word}{switched_off_text(machine, switched_off)}", span, data={"switched_off": switched_off}
-    )
+    text, data = f"{word}{switched_off_text(machine, switched_off)}", {"switched_off": switched_off}
+    machine.record_effect(process, "END", text, span, data=data)
 
 
 def switched_off_text(machine: Machine, switched_off: Sequence[str]) -> str:
@@ -308,9 +298,8 @@ def _unwind_to_recovery(machine: Machine, process: Process, span: Span) -> TryBl
         while try_blocks:
             try_block = try_blocks.pop()
             if not try_block.recovering:
-                failed = TryBlock(try_block.start, try_block.recovery, recovering=True, lock_count=try_block.lock_count)
-                try_blocks.append(failed)
-                return failed
+                try_blocks.append(attrs.evolve(try_block, recovering=True))
+                return try_block
         if len(process.stack) == 1:
             return None
         _leave_activation(machine, process, span)

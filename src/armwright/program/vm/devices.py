@@ -36,9 +36,8 @@ def _move_fingers(machine: Machine, process: Process, step: Instruction) -> None
         update_depth_alarm(machine, motion)
     text = f"{arm} {step.op}" + (f" TO {width:g}" if width is not None else "")
     kind: TimedKind = "GRASP" if closed else "OPEN"
-    machine.schedule_effect(
-        process, time, PendingEffect(kind=kind, text=text, start=machine.next_start(), span=step.span, arm=arm)
-    )
+    pending = PendingEffect(kind=kind, text=text, start=machine.next_start(), span=step.span, arm=arm)
+    machine.schedule_effect(process, time, pending)
 
 
 def _operate(machine: Machine, process: Process, step: Instruction) -> None:
@@ -48,9 +47,8 @@ def _operate(machine: Machine, process: Process, step: Instruction) -> None:
     except DeviceError as error:
         raise machine.error(process, "R602", str(error), step.span, "the device is asked here") from None
     text = f"{machine.spelling(device)} {state}"
-    machine.schedule_effect(
-        process, time, PendingEffect(kind="OPERATE", text=text, start=machine.next_start(), span=step.span)
-    )
+    pending = PendingEffect(kind="OPERATE", text=text, start=machine.next_start(), span=step.span)
+    machine.schedule_effect(process, time, pending)
 
 
 def _read_visions(machine: Machine, process: Process, step: Instruction) -> None:

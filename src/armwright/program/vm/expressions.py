@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from armwright.program.bytecode.instructions import Constant, Instruction, Op
 from armwright.program.vm.machine import Handler, Machine, jump_target
-from armwright.program.vm.operators import OPERATIONS_WITH_UNITS, UNITLESS_OPERATIONS, EvaluationError
+from armwright.program.vm.operators import OPERATIONS, OPERATIONS_WITH_UNITS, EvaluationError
 from armwright.program.vm.process import ElementReference, Process
 
 _AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -25,12 +25,9 @@ def _copy(machine: Machine, process: Process, step: Instruction) -> None:
 
 def _compute(machine: Machine, process: Process, step: Instruction) -> None:
     values = [machine.read(process, operand, step) for operand in step.operands[1:]]
+    units = (machine.code.units,) if step.op in OPERATIONS_WITH_UNITS else ()
     try:
-        value = (
-            UNITLESS_OPERATIONS[step.op](*values)
-            if step.op in UNITLESS_OPERATIONS
-            else OPERATIONS_WITH_UNITS[step.op](*values, machine.code.units)
-        )
+        value = OPERATIONS[step.op](*values, *units)
     except EvaluationError as fault:
         raise machine.error(process, fault.code, fault.message, step.span, fault.label) from None
     machine.write(process, step.operands[0], value, step)
@@ -67,7 +64,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.LOADM: _load,
     Op.LOADS: _load,
     Op.COPY: _copy,
-    **dict.fromkeys((*UNITLESS_OPERATIONS, *OPERATIONS_WITH_UNITS), _compute),
+    **dict.fromkeys(OPERATIONS, _compute),
     Op.ELEM: _element,
     Op.FORCE: _force,
 }

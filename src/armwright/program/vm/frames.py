@@ -17,9 +17,8 @@ def _affix(machine: Machine, process: Process, step: Instruction) -> None:
     spelled = machine.spelling
     if is_arm(child) or child == WORLD:
         text = "an arm cannot be affixed to a frame" if is_arm(child) else f"`{WORLD}` cannot be affixed"
-        raise machine.error(
-            process, "E308" if is_arm(child) else "E309", text, step.span, "cannot be attached to a frame"
-        )
+        code = "E308" if is_arm(child) else "E309"
+        raise machine.error(process, code, text, step.span, "cannot be attached to a frame")
     if is_arm(parent):
         process.last_arm = parent
     step_X = machine.read_pose(process, operands[2], step) if step.op is Op.AFFAT else None
@@ -48,20 +47,16 @@ def _unfix(machine: Machine, process: Process, step: Instruction) -> None:
     machine.slot_value(child, step, process)
     parent_name = machine.state.tree.parent(child)
     if len(step.operands) > 1 and (parent := machine.resolve_name(process, step.operands[1])) != parent_name:
-        is_attached = parent_name is not None and parent_name != WORLD
-        advice = (
-            f"write `UNFIX {spelled(child)} FROM {spelled(parent_name or WORLD)}`"
-            if is_attached
-            else "remove this UNFIX"
-        )
+        actual = spelled(parent_name or WORLD)
+        advice = "remove this UNFIX" if actual == WORLD else f"write `UNFIX {spelled(child)} FROM {actual}`"
         text = f"`{spelled(child)}` is not affixed to `{spelled(parent)}`"
-        label = f"is attached to {spelled(parent_name or WORLD)}"
         origins = machine.origin_labels(child, "it got its pose here")
-        raise machine.error(process, "E306", text, step.span, label, secondary=origins, helps=[advice])
+        raise machine.error(
+            process, "E306", text, step.span, f"is attached to {actual}", secondary=origins, helps=[advice]
+        )
     machine.replace_tree(machine.state.tree.unfix(child), child, step.span)
-    machine.record_effect(
-        process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data={"child": child, "parent": parent_name}
-    )
+    data = {"child": child, "parent": parent_name}
+    machine.record_effect(process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data=data)
 
 
 HANDLERS: Mapping[Op, Handler] = {Op.AFFIX: _affix, Op.AFFAT: _affix, Op.UNFIX: _unfix}

@@ -38,19 +38,6 @@ HANDLERS: Mapping[Op, Handler] = {op: handler for family in _FAMILIES for op, ha
 # Called now and then: the time on the clock [s], the line of the next statement.
 Progress = Callable[[float, int], None]
 
-__all__ = [
-    "Limits",
-    "Machine",
-    "Progress",
-    "RunError",
-    "advance",
-    "interpret",
-    "motion_warnings",
-    "next_process",
-    "ready_process",
-    "run",
-]
-
 
 def interpret(
     code: Code, cell: Cell, hardware: Hardware, progress: Progress | None = None, *, limits: Limits | None = None
@@ -139,12 +126,9 @@ def _advance(machine: Machine, process: Process) -> None:
             under_way = process.pending_effect or process.motion or machine.code.instructions[process.pc]
             text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
             raise machine.error(process, "E506", text, under_way.span, "it has reached this statement")
-    if (
-        process.motion is not None
-        and process.motion.alarm_tick is not None
-        and process.motion.alarm_tick <= machine.state.ticks
-    ):
-        stop_too_deep(machine, process, process.motion)
+    motion = process.motion
+    if motion is not None and motion.alarm_tick is not None and motion.alarm_tick <= machine.state.ticks:
+        stop_too_deep(machine, process, motion)
     if (pending := process.pending_effect) is not None:
         process.pending_effect = None
         if pending.frame_pose is not None:

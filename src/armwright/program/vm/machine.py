@@ -1,7 +1,8 @@
 """The state of a running program: clock, frames, values, processes, and what it has left so far."""
 
+import copy
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 import attrs
@@ -69,18 +70,10 @@ class Limits:
 class Machine:
     """A program that runs in a cell."""
 
-    def __init__(
-        self,
-        code: Code,
-        cell: Cell,
-        hardware: Hardware,
-        limits: Limits | None = None,
-        state: MachineState | None = None,
-    ) -> None:
-        """Stand in front of the first instruction, or where ``state`` has come to."""
-        self.code, self.cell, self.hardware = code, cell, hardware
-        self.limits = limits or Limits()
-        self.state = state or MachineState.initial(code, cell)
+    def __init__(self, code: Code, cell: Cell, hardware: Hardware, limits: Limits | None = None) -> None:
+        """Stand in front of the first instruction."""
+        self.code, self.cell, self.hardware, self.limits = code, cell, hardware, limits or Limits()
+        self.state = MachineState.initial(code, cell)
         self.constants = constant_values(code.constants)
 
     def copy(self) -> "Machine":
@@ -91,7 +84,15 @@ class Machine:
         """
         if not isinstance(self.hardware, Simulator):
             raise TypeError(f"only a simulated cell can be copied, not a {type(self.hardware).__name__}")
-        return Machine(self.code, self.cell, self.hardware.copy(), self.limits, self.state.copy())
+        copied = copy.copy(self)
+        copied.hardware, copied.state = self.hardware.copy(), self.state.copy()
+        return copied
+
+    def with_code(self, code: Code) -> "Machine":
+        """Return a machine that runs other code on the state and the hardware of this one."""
+        other = copy.copy(self)
+        other.code, other.constants = code, constant_values(code.constants)
+        return other
 
     @property
     def now(self) -> float:
@@ -100,25 +101,21 @@ class Machine:
 
     def recording(self) -> Recording:
         """Return all that happened so far."""
-        cell = self.cell
+        cell, state = self.cell, self.state
+        streams = tuple(
+            sample_stream(
+                name, arm, state.segments[name], state.tool_wrenches[name], end_tick=state.ticks, period=cell.period
+            )
+            for name, arm in cell.arms.items()
+        )
         return Recording(
             code=self.code,
             cell=cell,
             duration=self.now,
-            effects=sort_effects(self.state.effects),
-            stages=tuple(self.state.stages),
-            streams=tuple(
-                sample_stream(
-                    name,
-                    arm,
-                    self.state.segments[name],
-                    self.state.tool_wrenches[name],
-                    duration=self.now,
-                    period=cell.period,
-                )
-                for name, arm in cell.arms.items()
-            ),
-            trees=tuple(self.state.trees),
+            effects=sort_effects(state.effects),
+            stages=tuple(state.stages),
+            streams=streams,
+            trees=tuple(state.trees),
             configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
         )
 
@@ -301,11 +298,9 @@ class Machine:
         for owner in owners:
             if not (owner.descends_from(process) or process.descends_from(owner)):
                 text = f"{arm} is used by {owner.title} and by {process.title} of one COBEGIN"
-                note = "each arm belongs to one process at a time"
-                labels = self._affix_labels(moved, arm)
-                raise self.error(
-                    process, "E503", text, span, f"belongs to {owner.title}", secondary=labels, notes=[note]
-                )
+                label, notes = f"belongs to {owner.title}", ["each arm belongs to one process at a time"]
+                secondary = self._affix_labels(moved, arm)
+                raise self.error(process, "E503", text, span, label, secondary=secondary, notes=notes)
         if process not in owners:
             owners.append(process)
 
@@ -337,7 +332,7 @@ class Machine:
         since: StartTime | None = None,
         until: int | None = None,
         arm: str | None = None,
-        data: dict[str, object] | None = None,
+        data: Mapping[str, object] | None = None,
     ) -> None:
         """Record what a process did up to now, or does up to a later tick."""
         start, period = since or self.next_start(), self.cell.period

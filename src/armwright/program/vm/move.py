@@ -80,16 +80,13 @@ def advance_motion(machine: Machine, process: Process) -> None:
         if not guard.triggered and _condition_holds(machine, process, motion, guard):
             guard.triggered = True
             machine.update_hand_pose(motion.arm, motion.span)
-            action = process.activation.create_nested(
-                "action", return_address=process.pc, call_span=motion.span, lock_count=len(process.locks)
-            )
-            process.stack.append(action)
+            fields = {"return_address": process.pc, "call_span": motion.span, "lock_count": len(process.locks)}
+            process.stack.append(process.activation.create_nested("action", **fields))
             process.pc = guard.action
             return
     if machine.state.ticks < motion.stage_end_tick:
-        process.wake_tick = (
-            machine.state.ticks + 1 if any(not guard.triggered for guard in motion.guards) else motion.stage_end_tick
-        )
+        is_guarded = not all(guard.triggered for guard in motion.guards)
+        process.wake_tick = machine.state.ticks + 1 if is_guarded else motion.stage_end_tick
     elif motion.stages:
         _start_stage(machine, process, motion)
     else:
@@ -158,15 +155,11 @@ def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction)
             return name, True
     spelled, likely = machine.spelling(moved), process.last_arm or min(machine.cell.arms, default="ARM_1")
     parent = next(iter(machine.state.tree.ancestors(moved)), None)
-    raise machine.error(
-        process,
-        "E301",
-        f"`{spelled}` cannot be moved: it is not affixed to an arm",
-        begin.span,
-        "is the root of all frames" if parent is None else f"is attached to {machine.spelling(parent)}, not to an arm",
-        secondary=machine.origin_labels(moved, f"{spelled} got its pose here"),
-        helps=[f"grasp it and write `AFFIX {spelled} TO {likely}`"],
-    )
+    text = f"`{spelled}` cannot be moved: it is not affixed to an arm"
+    attached = f"is attached to {machine.spelling(parent)}, not to an arm" if parent else "is the root of all frames"
+    origins = machine.origin_labels(moved, f"{spelled} got its pose here")
+    helps = [f"grasp it and write `AFFIX {spelled} TO {likely}`"]
+    raise machine.error(process, "E301", text, begin.span, attached, secondary=origins, helps=helps)
 
 
 def _require_idle_arm(machine: Machine, process: Process, arm: str, span: Span) -> None:
@@ -175,12 +168,10 @@ def _require_idle_arm(machine: Machine, process: Process, arm: str, span: Span) 
     Raises:
         RunError: one is.
     """
-    other = machine.moving_process(arm)
-    if other is None or other.motion is None:
-        return
-    text = f"{arm} cannot begin a MOVE in {process.title} before that of {other.title} is over"
-    on_its_way = Label(other.motion.span, f"{arm} executes this MOVE")
-    raise machine.error(process, "E503", text, span, "begins before the other has ended", secondary=[on_its_way])
+    if (other := machine.moving_process(arm)) is not None and other.motion is not None:
+        text = f"{arm} cannot begin a MOVE in {process.title} before that of {other.title} is over"
+        on_its_way = Label(other.motion.span, f"{arm} executes this MOVE")
+        raise machine.error(process, "E503", text, span, "begins before the other has ended", secondary=[on_its_way])
 
 
 def _plan_stages(
@@ -284,9 +275,8 @@ def _unit_advice(machine: Machine, process: Process, goal: Goal, arm: str) -> tu
 
 def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     """Begin the next stage of a motion."""
-    stage, to = motion.stages.pop(0)
-    arm, period = machine.cell.arms[motion.arm].arm, machine.cell.period
-    trajectory = stage.trajectory
+    (stage, goal_names), period = motion.stages.pop(0), machine.cell.period
+    arm, trajectory = machine.cell.arms[motion.arm].arm, stage.trajectory
     ticks = round(trajectory.duration / period)
     # A run that lasts longer comes to its end before.
     counted = min(ticks, math.ceil(max(0.0, machine.limits.time - machine.now) / period))
@@ -299,7 +289,7 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     if not motion.guards and (touch is not None or motion.alarm_tick is not None):
         send_trajectory(machine, motion, hold(trajectory(0.0), period))
         motion.alarm_tick = None
-        refuse_contact(machine, process, motion, to[-1])
+        refuse_contact(machine, process, motion, goal_names[-1])
     if touch is not None:
         motion.first_contact = (trajectory, touch - machine.now)
     motion.stage_index, (peak, when) = len(machine.state.stages), peak_efforts(tau, period)
@@ -308,7 +298,7 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
             t0=machine.now,
             arm=motion.arm,
             span=motion.span,
-            goal_names=to,
+            goal_names=goal_names,
             speed=motion.speed,
             stage=stage,
             motion=trajectory,
@@ -321,9 +311,7 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     machine.state.segments[motion.arm].append(run)
     motion.stage_start_tick, motion.stage_end_tick = machine.state.ticks, machine.state.ticks + ticks
     if any(guard.reads_pose for guard in motion.guards):
-        times = np.arange(counted + 1) * period
-        X_WB = machine.base_pose(motion.arm)
-        motion.hand_poses = X_WB @ forward(arm, trajectory(times))
+        motion.hand_poses = machine.base_pose(motion.arm) @ forward(arm, trajectory(np.arange(counted + 1) * period))
     process.wake_tick = machine.state.ticks if motion.guards else motion.stage_end_tick
 
 
@@ -347,18 +335,13 @@ def _finish_move(machine: Machine, process: Process, motion: Motion) -> None:
     hand = machine.state.hands[arm]
     reached = motion.early_end is not EarlyEnd.HALTED and machine.has_pose(motion.goal)
     hand.reached_frame = motion.moved if motion.moved != arm else motion.goal if reached else None
-    if (
-        hand.held_frame
-        and hand.held_frame != hand.reached_frame
-        and arm not in machine.state.tree.ancestors(hand.held_frame)
-    ):
+    held = hand.held_frame
+    if held and held != hand.reached_frame and arm not in machine.state.tree.ancestors(held):
         hand.held_frame = None
     record_contact(machine, motion)
-    words, contact = contact_report(motion)
-    data = {**motion.event_data, **contact}
-    machine.record_effect(
-        process, "MOVE", motion.trace_text + words, motion.span, since=motion.start, arm=arm, data=data
-    )
+    contact_text, contact = contact_report(motion)
+    text, since, data = motion.trace_text + contact_text, motion.start, {**motion.event_data, **contact}
+    machine.record_effect(process, "MOVE", text, motion.span, since=since, arm=arm, data=data)
     process.motion = None
 
 

@@ -51,7 +51,7 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
             numbers[part.op] = _clause_value(machine, process, part)
         elif part.op is Op.MVON:
             guards.append(_guard(machine, part))
-    goals = _make_labels_unique(goals)
+    _make_labels_unique(goals)
     form = Form(
         goal=goals["goal"][0].label,
         via=tuple(goal.label for goal in goals.get(Op.MVVIA, ())),
@@ -81,8 +81,8 @@ def _goal(machine: Machine, process: Process, operand: Operand, step: Instructio
     return Goal(machine.operand_text(process, operand), operand, clause if step.op is not Op.MVBEG else step)
 
 
-def _make_labels_unique(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
-    """Return the goals with a label of its own for each, also where a program names two poses alike."""
+def _make_labels_unique(goals: dict[str, list[Goal]]) -> None:
+    """Give each goal a label of its own, also where a program names two poses alike."""
     operands: dict[str, Operand] = {}
     for goals_of_clause in goals.values():
         for index, goal in enumerate(goals_of_clause):
@@ -90,7 +90,6 @@ def _make_labels_unique(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
             while operands.setdefault(label, goal.operand) != goal.operand:
                 label += "'"
             goals_of_clause[index] = goal._replace(label=label)
-    return goals
 
 
 def _clause_value(machine: Machine, process: Process, part: Instruction) -> float:

@@ -84,11 +84,11 @@ def _distance(p: Array, q: Array) -> float:
     return distance if distance > _ROUNDING * scale else 0.0
 
 
-def pose_from_numbers(numbers: Sequence[float], units: UnitSystem) -> Array:
+def _pose_from_numbers(numbers: Sequence[float], units: UnitSystem) -> Array:
     """Return twelve numbers as a pose, the rotation made exact where it nearly is one.
 
     Raises:
-        ValueFault: the first nine are no rotation.
+        EvaluationError: the first nine are no rotation.
     """
     X = from_noap([*numbers[:9], *(length * units.metres for length in numbers[9:])])
     error = float(orthonormality_error(X[:3, :3]))
@@ -97,8 +97,8 @@ def pose_from_numbers(numbers: Sequence[float], units: UnitSystem) -> Array:
     return X if error <= EXACT_TOLERANCE else homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
 
 
-# Operations on values alone.
-UNITLESS_OPERATIONS: Mapping[Op, Callable[..., Any]] = {
+# Those with units take them as their last argument.
+OPERATIONS: Mapping[Op, Callable[..., Any]] = {
     Op.MUL: _multiply,
     Op.DIV: _divide,
     Op.ADD: lambda a, b: _checked_number(a + b),
@@ -112,13 +112,12 @@ UNITLESS_OPERATIONS: Mapping[Op, Callable[..., Any]] = {
     Op.GE: operator.ge,
     Op.GT: operator.gt,
     Op.NOT: operator.not_,
-}
-# Operations that count in the program's units, given as the last argument.
-OPERATIONS_WITH_UNITS: Mapping[Op, Callable[..., Any]] = {
     Op.XYZ: _translation,
     Op.ROTX: _rotation_about(0),
     Op.ROTY: _rotation_about(1),
     Op.ROTZ: _rotation_about(2),
     Op.DIST: lambda f, g, units: _distance(f[:3, 3], g[:3, 3]) / units.metres,
-    Op.MATX: lambda *values: pose_from_numbers(values[:-1], values[-1]),
+    Op.MATX: lambda *values: _pose_from_numbers(values[:-1], values[-1]),
 }
+# Operations that count in the program's units.
+OPERATIONS_WITH_UNITS = frozenset({Op.XYZ, Op.ROTX, Op.ROTY, Op.ROTZ, Op.DIST, Op.MATX})

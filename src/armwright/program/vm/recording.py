@@ -243,7 +243,7 @@ def sample_stream(
     segments: Sequence[TrajectorySegment],
     tool_wrenches: Sequence[ToolWrenches],
     *,
-    duration: float,
+    end_tick: int,
     period: float,
 ) -> Stream:
     """Sample what an arm does at every servo tick.
@@ -253,10 +253,10 @@ def sample_stream(
         cell_arm: its model, and its configuration at the start.
         segments: in order; the arm rests between.
         tool_wrenches: in order; each counts until the next.
-        duration: of the whole run [s].
+        end_tick: the last of the whole run.
         period: of the servo [s].
     """
-    arm, ticks = cell_arm.arm, round(duration / period) + 1
+    arm, ticks = cell_arm.arm, end_tick + 1
     q = np.empty((ticks, arm.n))
     qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
     tau, is_known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
