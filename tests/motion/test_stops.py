@@ -168,7 +168,7 @@ def test_the_singularity_and_a_joint_to_blame_are_named(
         if error is not None and error.joint is not None and error.cause == "limits" and name != "ur5":
             way, j = lifted(fast, q, A, B), error.joint - 1
             shoulder, _, wrist = np.abs(singularity_factors(arm, way)).min(axis=0)
-            # The square of the shoulder's factor is how far the wrist is outside the shoulder's offset, times twice that.
+            # The square of the shoulder's factor is twice the offset times how far the wrist is outside it.
             merged = shoulder**2 < 2 * SHOULDER_OFFSET * deviation or wrist < 2 * ROTATION_PER_METRE * deviation
             assert merged or (way[:, j] < lower[j]).any() or (way[:, j] > upper[j]).any(), str(error)
     assert causes["run"] > lines, causes
