@@ -15,8 +15,8 @@ from armwright.kinematics.jacobians import jacobian
 from armwright.motion.detour import line_or_detour
 from armwright.motion.obstruction import PathError
 from armwright.motion.straight import straight_line
-from armwright.spatial.poses import homogeneous
-from armwright.spatial.rotations import rotation_from_vector
+from armwright.spatial.poses import between, homogeneous
+from armwright.spatial.rotations import angle_between, rotation_from_vector
 from armwright.study.puma_moves import study_poses
 
 
@@ -66,7 +66,8 @@ def test_a_detour(through_the_wrist: tuple[Array, Array], by: str) -> None:
     lowest, highest = motion.extremes(0)
     assert (lowest >= arm.limits.lower).all()
     assert (highest <= arm.limits.upper).all()
-    places = forward(arm, motion(np.linspace(0, motion.duration, 3000)))[:, :3, 3]
+    poses = forward(arm, motion(np.linspace(0, motion.duration, 3000)))
+    places = poses[:, :3, 3]
     A, B = forward(arm, q)[:3, 3], X[:3, 3]
     s = np.clip((places - A) @ (B - A) / ((B - A) @ (B - A)), 0, 1)
     off = np.linalg.norm(places - A - s[:, None] * (B - A), axis=-1).max()
@@ -74,6 +75,8 @@ def test_a_detour(through_the_wrist: tuple[Array, Array], by: str) -> None:
     assert off <= way.price.distance + allowed + 1e-9
     assert "mm off the line" in str(way.price)
     if by == "via":
+        off_line = angle_between(between(forward(arm, q), X, s)[:, :3, :3], poses[:, :3, :3])
+        assert off_line.max() <= way.price.rotation * 1.001 + 1e-6
         assert all(leg.certificate.holds for leg in way.legs)
 
 

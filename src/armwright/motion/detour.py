@@ -58,6 +58,8 @@ _EASINGS, _AROUND = 3, 20
 _LOOKED_AT = 1e-3
 # The end is met to this [m], a rotation counted as ``ROTATION_PER_METRE`` says.
 _ARRIVED = 1e-6
+# The price of a detour is that of so many poses of it, and of its via pose.
+_PRICE_SAMPLES = 201
 # Efforts at rest are compared with their limits to this part.
 _ROUNDING = 1e-6
 
@@ -173,7 +175,7 @@ def _crawl(requested: StraightPath, line: CertifiedMotion) -> PathError:
     order = {"speed": 1}.get(because[0], 2)  # efforts rise where accelerations do
     worst = int(line.trajectory.segment_peaks(order)[:, because[1]].argmax())
     arm = line.certificate.arm
-    s = _nearest(requested, forward(arm, line.trajectory(line.trajectory.times[worst])))
+    s = float(_nearest_fraction(requested, forward(arm, line.trajectory(line.trajectory.times[worst]))))
     joint = arm.joint_label(because[1])
     reason = f"for the {because[0]} of {joint} the line would have to be run {factor:.0f} times slower"
     message = f"near {position_text(requested.at(0, np.array([s]))[0, :3, 3])} {reason}"
@@ -198,7 +200,8 @@ def _by_via(
             except (PathError, IncapableArmError):
                 continue
             motion = join([there.trajectory, back.trajectory])
-            distance, rotation = _apart(line, via)
+            sampled = np.asarray(solver.forward(motion(np.linspace(0.0, motion.duration, _PRICE_SAMPLES))))
+            distance, rotation = _largest_deviation(line, np.concatenate([sampled, via[None]]))
             price = Price(distance=distance, rotation=rotation, time=motion.duration - line.duration)
             legs = (there, back)
             ways.append(Detour(trajectory=motion, method="via", obstacle=obstacle, via=via, price=price, legs=legs))
@@ -264,18 +267,20 @@ def _moved(X: Array, shift: Array, rotation: Array) -> Array:
     return Y
 
 
-def _apart(line: StraightPath, X: Array) -> tuple[float, float]:
-    """Return how far a pose is from the nearest position of the line, and rotated from the orientation there."""
-    on = line.at(0, np.array([_nearest(line, X)]))[0]
-    rotation = rotation_vector(on[:3, :3].T @ X[:3, :3])
-    return float(np.linalg.norm(X[:3, 3] - on[:3, 3])), float(np.linalg.norm(rotation))
+def _largest_deviation(line: StraightPath, X: Array) -> tuple[float, float]:
+    """Return the largest distance of poses (k, 4, 4) from a line, and their largest rotation from its orientation."""
+    on = line.at(0, _nearest_fraction(line, X))
+    rotations = rotation_vector(np.swapaxes(on[:, :3, :3], -1, -2) @ X[:, :3, :3])
+    distances = np.linalg.norm(X[:, :3, 3] - on[:, :3, 3], axis=-1)
+    return float(distances.max()), float(np.linalg.norm(rotations, axis=-1).max())
 
 
-def _nearest(line: StraightPath, X: Array) -> float:
-    """Return at which fraction of a line the position nearest to a tool (4, 4) is; the middle if it has no length."""
-    way = line.shifts[0]
-    square = float(way @ way)
-    return min(max(float((X[:3, 3] - line.poses[0, :3, 3]) @ way) / square, 0.0), 1.0) if square else 0.5
+def _nearest_fraction(line: StraightPath, X: Array) -> Array:
+    """Return the fractions (...) of a line nearest to poses (..., 4, 4); the middle if it has no length."""
+    shift = line.shifts[0]
+    square = float(shift @ shift)
+    along = (X[..., :3, 3] - line.poses[0, :3, 3]) @ shift
+    return np.clip(along / square, 0.0, 1.0) if square else np.full(along.shape, 0.5)
 
 
 def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle: PathError) -> Detour | None:
