@@ -1,19 +1,23 @@
-"""Requests of an editor: breakpoints, and what a stopped program looks like: stacks, variables, expressions."""
+"""Requests of an editor: the session, breakpoints, and what a stopped program looks like: stacks, variables, values."""
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from armwright.errors import ArmwrightError
+from armwright.files.inputs import regular_file
 from armwright.program.debugger.dap_messages import Arguments, RequestError
-from armwright.program.debugger.dap_session import CODE_SOURCE_REFERENCE, EditorSession
+from armwright.program.debugger.dap_session import CODE_SOURCE_REFERENCE, EditorSession, LaunchRequest
+from armwright.program.debugger.debugger import Command
 from armwright.program.debugger.expressions import visible_names
 from armwright.program.debugger.history import ProcessPath
 from armwright.program.debugger.variables import ArrayElements, Variable
 from armwright.program.diagnostics.render import render
 from armwright.program.language.position_codec import UTF_16, PositionCodec
+from armwright.program.language.words import Standard
 from armwright.program.semantics.builtins import FUNCTIONS
 
 # So many elements are sent to an editor that does not say how many it wants.
@@ -21,6 +25,111 @@ _MAX_ELEMENTS = 1000
 # What gives a variable or an element a value.
 _ASSIGNMENT = re.compile(r"([A-Za-z][\w-]*(?:\s*\[[^\[\]]*\])?)\s*=\s*(.+)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
+_CAPABILITIES = {
+    "supportsConfigurationDoneRequest": True,
+    "supportsConditionalBreakpoints": True,
+    "supportsHitConditionalBreakpoints": True,
+    "supportsLogPoints": True,
+    "supportsBreakpointLocationsRequest": True,
+    "supportsDataBreakpoints": True,
+    "supportsEvaluateForHovers": True,
+    "supportsStepBack": True,
+    "supportsSteppingGranularity": True,
+    "supportsSetVariable": True,
+    "supportsSetExpression": True,
+    "supportsCompletionsRequest": True,
+    "supportsExceptionInfoRequest": True,
+    "supportsDelayedStackTraceLoading": True,
+    "supportsTerminateRequest": True,
+    "supportsRestartRequest": True,
+    "supportTerminateDebuggee": True,
+    "exceptionBreakpointFilters": [
+        {"filter": "uncaught", "label": "Errors that end the program", "default": True},
+        {"filter": "caught", "label": "Errors with a RECOVER", "default": False},
+    ],
+}
+
+
+# ---- session -------------------------------------------------------------------------------------------------------
+
+
+def initialize(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``initialize``: what this debugger can do."""
+    session.first_line = int(arguments.get(bool, "linesStartAt1", default=True))
+    session.first_column = int(arguments.get(bool, "columnsStartAt1", default=True))
+    return _CAPABILITIES
+
+
+def launch(session: EditorSession, arguments: Arguments) -> None:
+    """Answer ``launch``: load a program."""
+    if session.debugger is not None:
+        raise RequestError("a program has been launched already")
+    session.start(_launch_request(arguments))
+    # Now that the program is known, breakpoints can be set in it.
+    session.after_response += [lambda: session.send("initialized", {}), session.begin]
+
+
+def configuration_done(session: EditorSession, _: Arguments) -> None:
+    """Answer ``configurationDone``: the program may begin."""
+    session.configured = True
+    session.after_response.append(session.begin)
+
+
+def restart(session: EditorSession, arguments: Arguments) -> None:
+    """Answer ``restart``: load the program again."""
+    if session.launch is None:
+        raise RequestError("no program has been launched")
+    again = _launch_request(arguments.get_object("arguments")) if "arguments" in arguments else session.launch
+    session.start(again)
+    session.after_response.append(session.begin)
+
+
+def _launch_request(arguments: Arguments) -> LaunchRequest:
+    standard = str(arguments.get(object, "std", Standard.RLO_2.value))
+    if standard not in set(Standard):
+        raise RequestError(f"std: expected 2 or 83, got {standard!r}")
+    return LaunchRequest(
+        program=regular_file(Path(arguments.get(str, "program"))),
+        cell=regular_file(Path(arguments.get(str, "cell"))) if arguments.get(str, "cell", "") else None,
+        std=Standard(standard),
+        output=Path(arguments.get(str, "output")) if arguments.get(str, "output", "") else None,
+        stop_on_entry=arguments.get(bool, "stopOnEntry", default=False),
+        no_debug=arguments.get(bool, "noDebug", default=False),
+        strict=arguments.get(bool, "strict", default=False),
+    )
+
+
+def _resume(command: Command, session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer a request that lets the program go on, or back; a servo tick is the instruction of an arm."""
+    if command in {"continue", "reverse"}:
+        session.resume(command, ())
+        return {"allThreadsContinued": True}
+    granularity = arguments.get(str, "granularity", "statement")
+    if granularity not in {"statement", "line", "instruction"}:
+        raise RequestError(f"granularity: expected statement, line or instruction, got {granularity!r}")
+    if granularity == "instruction":
+        command = "tick back" if command == "back" else "tick"
+    session.resume(command, session.process_path(arguments.get(int, "threadId", 1)))
+    return {}
+
+
+def pause(session: EditorSession, _: Arguments) -> None:
+    """Answer ``pause``: stop the program where it is."""
+    debugger = session.launched_debugger
+    if not debugger.running:
+        raise RequestError("the program is not running")
+    stop = debugger.pause()
+    session.after_response.append(lambda: session.report_stop(stop))
+
+
+def terminate(session: EditorSession, _: Arguments) -> None:
+    """Answer ``terminate``: end the program."""
+    session.after_response.append(session.terminate)
+
+
+def disconnect(session: EditorSession, _: Arguments) -> None:
+    """Answer ``disconnect``: end the session."""
+    session.connected = False
 
 
 # ---- breakpoints -----------------------------------------------------------------------------------------------------
@@ -127,10 +236,8 @@ def stack_trace(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     for level, frame in enumerate(frames):
         if first <= level < first + count:
             session.frame_references.append((path, level))
-            location = session.location(frame.span)
-            answers.append(
-                {"id": len(session.frame_references), "name": frame.title, "source": session.source(), **location}
-            )
+            number, location = len(session.frame_references), session.location(frame.span)
+            answers.append({"id": number, "name": frame.title, "source": session.source(), **location})
     return {"stackFrames": answers, "totalFrames": len(frames)}
 
 
@@ -154,9 +261,7 @@ def variables(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
         group = ()
     first, count = arguments.get(int, "start", 0), arguments.get(int, "count", 0) or _MAX_ELEMENTS
     listed = group[first : first + count]
-    return {
-        "variables": [{"name": variable.name, **_variable_body(session, variable, path, level)} for variable in listed]
-    }
+    return {"variables": [{"name": line.name, **_variable_body(session, line, path, level)} for line in listed]}
 
 
 def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
@@ -258,3 +363,32 @@ def _variable_body(session: EditorSession, variable: Variable, path: ProcessPath
     optional = {"indexedVariables": variable.element_count, "evaluateName": variable.expression}
     reference = _add_reference(session, variable, path, level)
     return {**answer, "variablesReference": reference, **{key: value for key, value in optional.items() if value}}
+
+
+# What each request lets the program do; ``stepStage`` is a request of this adapter alone.
+_STEPS: Mapping[str, Command] = {
+    "continue": "continue",
+    "next": "next",
+    "stepIn": "in",
+    "stepOut": "out",
+    "stepStage": "stage",
+    "stepBack": "back",
+    "reverseContinue": "reverse",
+}
+_SESSION = (initialize, launch, configuration_done, restart, pause, terminate, disconnect, set_exception_breakpoints)
+_BREAKPOINTS = (set_breakpoints, breakpoint_locations, data_breakpoint_info, set_data_breakpoints)
+_INSPECTION = (threads, stack_trace, scopes, variables, evaluate, set_variable, set_expression, completions)
+_TEXTS = (exception_info, source)
+
+
+def _request_name(function: Callable[..., object]) -> str:
+    """Return the name of a request in the protocol: that of its function, in camel case."""
+    first, *others = function.__name__.split("_")
+    return first + "".join(map(str.capitalize, others))
+
+
+# What answers each request.
+REQUESTS: Mapping[str, Callable[[EditorSession, Arguments], Mapping[str, Any] | None]] = {
+    **{_request_name(function): function for function in (*_SESSION, *_BREAKPOINTS, *_INSPECTION, *_TEXTS)},
+    **{request: partial(_resume, command) for request, command in _STEPS.items()},
+}

@@ -74,6 +74,8 @@ class EditorSession:
         debugger: None until a program is launched.
         launch: what was asked for.
         loaded: what became of it.
+        connected: whether the editor has not left yet.
+        after_response: what is to be done once the present request is answered.
         codec: counts the columns of its text as editors do, in UTF-16 as JavaScript.
         configured: whether breakpoints have been set, so that the program may begin.
         has_begun: whether it has.
@@ -94,6 +96,7 @@ class EditorSession:
         self.launch: LaunchRequest | None = None
         self.loaded: LoadedProgram | None = None
         self.codec = PositionCodec("", UTF_16)
+        self.connected, self.after_response = True, list[Callable[[], None]]()
         self.configured = self.has_begun = self.has_ended = False
         self.first_line = self.first_column = 1
         self.breakpoints: list[tuple[int, Arguments]] = []
