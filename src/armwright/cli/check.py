@@ -11,7 +11,7 @@ from typer import Argument, Option
 
 from armwright.cli.options import Json
 from armwright.cli.output import print_json
-from armwright.cli.programs import CheckedCell, Std, Strict
+from armwright.cli.programs import CheckedCell, Std, Strict, diagnostics_data, print_diagnostics, read_cell_option
 from armwright.errors import ExitStatus, FileFormatError
 from armwright.program.language.words import Standard
 
@@ -47,7 +47,6 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright check examples/stacking.rlo --cell examples/stanford_cell.toml --emit code`
     """
-    from armwright.cli.programs import read_cell_option
     from armwright.program import compile as compile_program
 
     paths, option_cell = _program_files(programs), read_cell_option(cell)
@@ -99,8 +98,6 @@ def _programs_below(folder: Path) -> list[Path]:
 
 
 def _print(compilation: "Compilation", emit: Stage | None) -> None:
-    from armwright.cli.programs import print_diagnostics
-
     for line in _stage_lines(compilation, emit) if emit else ():
         print(line)
     if not emit or compilation.diagnostics:
@@ -143,7 +140,6 @@ def _stage_lines(compilation: "Compilation", emit: Stage) -> Iterator[str]:
 
 
 def _as_data(compilation: "Compilation", emit: Stage | None) -> dict[str, Any]:
-    from armwright.cli.programs import diagnostics_data
     from armwright.program.bytecode.instructions import shown_operands
 
     data = diagnostics_data(compilation)

@@ -1,7 +1,7 @@
 """``armwright clearance estimate``: the clearances that measurements determine, and how well."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from typer import Argument, Option
 
@@ -10,11 +10,6 @@ from armwright.cli.options import Json, usage_error
 from armwright.cli.output import print_result
 from armwright.cli.progress import waiting
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
-
-if TYPE_CHECKING:
-    from armwright.clearance.estimation.assessment import EstimateAssessment
-    from armwright.clearance.estimation.measurement_file import PathMeasurement
-    from armwright.clearance.linkage import Linkage
 
 
 def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -39,10 +34,11 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance estimate five-bar examples/five_bar_rest.csv`
     """
-    from armwright.clearance.estimation.assessment import assess_rest
+    from armwright.clearance.estimation.assessment import assess_paths, assess_rest
     from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
     from armwright.clearance.reader import load_linkage
     from armwright.cli.results import warn_of_stray
+    from armwright.errors import InvalidValueError
 
     warn_of_stray(measured)
     model = load_linkage(linkage)
@@ -50,20 +46,11 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     noise = None if noise_um is None else noise_um * 1e-6
     if isinstance(measurement, RestMeasurement):
         assessment = assess_rest(model, measurement, noise)
-    else:
-        assessment = _assess_paths(model, measurement, sweep, noise)
-    print_result(assessment, as_json=as_json)
-
-
-def _assess_paths(
-    model: "Linkage", measurement: "PathMeasurement", folder: Path | None, noise: float | None
-) -> "EstimateAssessment":
-    from armwright.clearance.estimation.assessment import assess_paths
-    from armwright.errors import InvalidValueError
-
-    if folder is None:
+    elif sweep is None:
         raise usage_error("--sweep", "measurements on paths need a sweep to compare with: `armwright clearance sweep`")
-    if noise is None:
+    elif noise is None:
         raise InvalidValueError("--noise-um: expected the standard deviation of a measured coordinate, above 0")
-    with waiting(f"learning from the simulations in {folder}") as progress:
-        return assess_paths(model, measurement, folder, noise, progress)
+    else:
+        with waiting(f"learning from the simulations in {sweep}") as progress:
+            assessment = assess_paths(model, measurement, sweep, noise, progress)
+    print_result(assessment, as_json=as_json)

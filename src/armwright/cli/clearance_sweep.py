@@ -1,7 +1,7 @@
 """``armwright clearance sweep``: error-curve features of a linkage at many clearances, stored in a folder."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from typer import Option
 
@@ -9,10 +9,6 @@ from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, set
 from armwright.cli.options import Json, Quiet
 from armwright.cli.output import print_result
 from armwright.cli.progress import sweep_bar, waiting
-
-if TYPE_CHECKING:
-    from armwright.clearance.feature_sweep import FeatureSweep
-    from armwright.sweep.designs import Design
 
 
 def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -56,9 +52,13 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance sweep five-bar --design factorial -o out/sweep`
     """
+    import numpy as np
+
+    from armwright.arrays import integer
     from armwright.clearance.feature_sweep import FeatureSweep
     from armwright.clearance.reader import load_linkage
     from armwright.clearance.sweep_summary import sweep_summary
+    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol
     from armwright.sweep.extras import check_extras
     from armwright.sweep.folder import RESULTS
     from armwright.sweep.run import run
@@ -71,7 +71,16 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         with_friction=to_friction is not None,
         replicates=replicates,
     )
-    plan = _plan(task, design, (from_mm * 1e-3, to_mm * 1e-3), to_friction, levels=levels, runs=runs, seed=seed)
+    bounds = dict.fromkeys(task.parameters, (from_mm * 1e-3, to_mm * 1e-3))
+    units = dict.fromkeys(task.parameters, "m")
+    if to_friction is not None:
+        bounds["friction"], units["friction"] = (0.0, to_friction), "1"
+    integer(levels, "levels", least=2)
+    if design == "factorial":
+        values = {name: np.linspace(*ends, levels).round(12).tolist() for name, ends in bounds.items()}
+        plan = full_factorial(values, units=units)
+    else:
+        plan = (latin_hypercube if design == "lhs" else sobol)(bounds, runs, seed, units=units)
     # A wrong path, or a step too long for the smallest clearance, is reported now; and the simulation is compiled once,
     # not by every worker.
     if not (output / RESULTS).exists():
@@ -86,30 +95,3 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     with results:
         summary = sweep_summary(task, results, output)
     print_result(summary, as_json=as_json, quiet=quiet, wrap=False)
-
-
-def _plan(
-    task: "FeatureSweep",
-    design: str,
-    clearances: tuple[float, float],
-    to_friction: float | None,
-    *,
-    levels: int,
-    runs: int,
-    seed: int,
-) -> "Design":
-    """Return the design of the sweep: clearances [m] and, if they are varied, coefficients of friction."""
-    import numpy as np
-
-    from armwright.arrays import integer
-    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol
-
-    integer(levels, "levels", least=2)
-    bounds = dict.fromkeys(task.parameters, clearances)
-    units = dict.fromkeys(task.parameters, "m")
-    if to_friction is not None:
-        bounds["friction"], units["friction"] = (0.0, to_friction), "1"
-    if design == "factorial":
-        values = {name: np.linspace(*ends, levels).round(12).tolist() for name, ends in bounds.items()}
-        return full_factorial(values, units=units)
-    return (latin_hypercube if design == "lhs" else sobol)(bounds, runs, seed, units=units)

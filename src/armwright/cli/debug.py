@@ -7,7 +7,7 @@ import typer
 from typer import Argument
 
 from armwright.cli.options import usage_error
-from armwright.cli.programs import CellFile, Std, Strict
+from armwright.cli.programs import CellFile, Std, Strict, print_diagnostics, read_cell_option
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
@@ -40,7 +40,6 @@ def debug(
     from armwright.cli.debug_terminal import Terminal
     from armwright.program import ProgramError
     from armwright.program.debugger.dap_session import LaunchRequest, MissingCellError
-    from armwright.program.diagnostics.render import render
 
     launch = LaunchRequest(
         program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False, strict=strict
@@ -48,7 +47,7 @@ def debug(
     try:
         loaded = load(launch)
     except ProgramError as error:
-        print(render(error.compilation.diagnostics, error.compilation.source), end="")
+        print_diagnostics(error.compilation.diagnostics, error.compilation.source)
         raise typer.Exit(error.exit_status) from None
     except MissingCellError as error:
         print(error)
@@ -79,7 +78,6 @@ def load(launch: "LaunchRequest") -> "LoadedProgram":
         MissingCellError: the program has no cell to run in.
         FileFormatError: a file cannot be read.
     """
-    from armwright.cli.programs import read_cell_option
     from armwright.files.inputs import read_program
     from armwright.program import api
     from armwright.program.debugger.dap_session import MissingCellError

@@ -42,16 +42,19 @@ def explain(
     if code is None:
         _list(as_json=as_json)
         return
+    import attrs
+
     from armwright.cli.terminal import console as clean_console
     from armwright.program.diagnostics.examples import diagnose_example
     from armwright.program.diagnostics.index import find_page
+    from armwright.program.language.diagnostic import to_json
     from armwright.program.language.source import Source
 
     page = find_page(code)
     source = Source("wrong.rlo", page.wrong)
     diagnostics = diagnose_example(source)
     if as_json:
-        _print_json(page, diagnostics, source)
+        print_json({**attrs.asdict(page), "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics]})
         return
     console = clean_console()
     if console.is_terminal:
@@ -76,14 +79,6 @@ def _list(*, as_json: bool) -> None:
         print(f"{chr(10) if index else ''}{name}")
         for code in codes_of_range:
             print(f"  {code}  {find_page(code).title}")
-
-
-def _print_json(page: "Page", diagnostics: "Sequence[Diagnostic]", source: "Source") -> None:
-    import attrs
-
-    from armwright.program.language.diagnostic import to_json
-
-    print_json({**attrs.asdict(page), "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics]})
 
 
 def _plain(page: "Page", diagnostics: "Sequence[Diagnostic]", source: "Source") -> Iterator[str]:

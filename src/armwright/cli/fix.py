@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Option
 
 from armwright.cli.options import Json
-from armwright.cli.programs import CheckedCell, ProgramFiles, Std
+from armwright.cli.programs import CheckedCell, ProgramFiles, Std, diagnostics_data, print_diagnostics, read_cell_option
 from armwright.errors import counted
 from armwright.program.language.words import Standard
 
@@ -34,12 +34,12 @@ def fix(
 
     **Example:** `armwright fix examples/bench.rlo --diff`
     """
-    from armwright.cli.programs import read_cell_option
     from armwright.cli.source_files import is_stream, print_difference, read_source, rewrite_all, write_back
     from armwright.cli.terminal import print_verbatim
     from armwright.program import compile as compile_program
     from armwright.program.api import import_reader
     from armwright.program.diagnostics.fixes import apply_fixes
+    from armwright.program.language.diagnostic import to_json
 
     option_cell = read_cell_option(cell)
 
@@ -51,7 +51,8 @@ def fix(
         result = apply_fixes(source, partial(compile_program, cell=option_cell, std=std, read_import=read))
         if result.applied and not (diff or printed):
             write_back(source, path, result.text)
-        row |= _as_data(result) | ({"text": result.text} if printed else {})
+        cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.description} for cure in result.applied]
+        row |= {**diagnostics_data(result.compilation), "cures": cures, **({"text": result.text} if printed else {})}
         if as_json:
             return
         if diff and result.applied:
@@ -64,8 +65,6 @@ def fix(
 
 
 def _print(result: "FixResult", *, verb: str, to_errors: bool) -> None:
-    from armwright.cli.programs import print_diagnostics
-
     out = sys.stderr if to_errors else sys.stdout
     for cure in result.applied:
         source, start = cure.source, cure.diagnostic.span.start
@@ -76,11 +75,3 @@ def _print(result: "FixResult", *, verb: str, to_errors: bool) -> None:
     print(f"{result.compilation.source.name}: {mistakes}", file=out)
     if result.compilation.diagnostics:
         print_diagnostics(result.compilation.diagnostics, result.compilation.source, to_errors=to_errors)
-
-
-def _as_data(result: "FixResult") -> dict[str, Any]:
-    from armwright.cli.programs import diagnostics_data
-    from armwright.program.language.diagnostic import to_json
-
-    cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.description} for cure in result.applied]
-    return {**diagnostics_data(result.compilation), "cures": cures}

@@ -55,7 +55,10 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.accuracy.measurement_file import read_measurements
     from armwright.report.accuracy_files import accuracy_files
 
-    _check_lengths(band_mm, corners_mm)
+    if band_mm is not None and not 0 < band_mm < float("inf"):
+        raise usage_error("--band-mm", f"expected a number above 0, got {band_mm:g}")
+    if not 0 <= corners_mm < float("inf"):
+        raise usage_error("--corners-mm", f"expected 0 or a number above 0, got {corners_mm:g}")
     bounds = _bounds(limit or [])
     for path in files:
         warn_of_stray(path)
@@ -80,16 +83,6 @@ def _exceeded(measures: "Sequence[Characteristic]") -> str:
             f"and at most {measure.displayed_limit} {unit} is allowed"
         )
     return f"limit exceeded: {'; '.join(exceeded)}"
-
-
-def _check_lengths(band_mm: float | None, corners_mm: float) -> None:
-    """Refuse a radius or a distance from corners that is not positive and finite."""
-    for name, value, valid in (
-        ("--band-mm", band_mm, band_mm is None or 0 < band_mm < float("inf")),
-        ("--corners-mm", corners_mm, 0 <= corners_mm < float("inf")),
-    ):
-        if not valid:
-            raise usage_error(name, f"expected a number above 0, got {value:g}")
 
 
 def _assessed(

@@ -1,7 +1,6 @@
 """Joint values from the command line, in degrees and millimetres, and from tables, in SI units."""
 
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armwright.cli.numbers import numbers
@@ -46,6 +45,7 @@ def rows(arm: "Arm", file: "TableFile", quantities: tuple[str, ...]) -> list["Ar
     Raises:
         FileFormatError: the file, a column or all rows are missing, or a value is not a finite number.
     """
+    from armwright.arm.positions import degrees_by_mistake
     from armwright.cli.results import warn_of_stray
     from armwright.errors import shown
     from armwright.files.unit_table import read_header
@@ -61,8 +61,9 @@ def rows(arm: "Arm", file: "TableFile", quantities: tuple[str, ...]) -> list["Ar
         text = f"expected rows of a single arm, got {shown(arms[0])} and {shown(arms[other])}"
         raise table.error(other, "arm", text)
     numbers = [table.numbers(columns[k : k + arm.n]) for k in range(0, len(columns), arm.n)]
-    if any(table.headings[name].unit == "rad" for name in columns[: arm.n]):
-        _warn_of_degrees(arm, file.path, numbers[0])
+    in_radians = any(table.headings[name].unit == "rad" for name in columns[: arm.n])
+    if in_radians and (suspicion := degrees_by_mistake(arm, numbers[0])):
+        print(f"armwright: warning: {file.path}: {suspicion}; columns without a unit are in SI units", file=sys.stderr)
     return numbers
 
 
@@ -83,11 +84,3 @@ def _columns(arm: "Arm", quantities: tuple[str, ...]) -> "Schema":
             synonyms = tuple(f"{name}{suffix}" for name in (f"joint_{i}", joint.name) if name)
             columns.append(names.Column(name=f"{symbol}{i}", quantity=quantity, unit=unit, synonyms=synonyms))
     return names.Schema(columns=columns, ignores_unknown=True)
-
-
-def _warn_of_degrees(arm: "Arm", path: Path, q: "Array") -> None:
-    """Print a warning where the positions (rows, n) of a file are probably in degrees."""
-    from armwright.arm.positions import degrees_by_mistake
-
-    if suspicion := degrees_by_mistake(arm, q):
-        print(f"armwright: warning: {path}: {suspicion}; columns without a unit are in SI units", file=sys.stderr)

@@ -14,7 +14,7 @@ import typer
 from typer import Argument, Option
 
 from armwright.cli.failures import outcome
-from armwright.cli.programs import CellFile, Std
+from armwright.cli.programs import CellFile, Std, error_data, print_diagnostics, read_cell_option
 from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.language.words import Standard
 
@@ -42,7 +42,6 @@ def repl(
 
     **Example:** `armwright repl --cell examples/stanford_cell.toml`
     """
-    from armwright.cli.programs import read_cell_option
     from armwright.cli.repl_commands import COMMANDS, Commands
     from armwright.cli.repl_lines import Script, handle_interrupt, line_editing, read_typed_line
     from armwright.program.api import import_reader
@@ -138,7 +137,6 @@ class _Printer:
 
     def answer(self, answer: "InputResult") -> None:
         """Print the effects of an input in order, and then its diagnostics."""
-        from armwright.cli.programs import print_diagnostics
         from armwright.program.repl.undo_report import SILENT_EFFECTS
         from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, excerpt, omission_text
 
@@ -212,7 +210,6 @@ class _JsonPrinter(_Printer):
 
 
 def _as_data(answer: "InputResult") -> dict[str, Any]:
-    from armwright.cli.programs import error_data
     from armwright.program.language.diagnostic import to_json
 
     return {

@@ -41,16 +41,23 @@ def _escaped(match: re.Match[str]) -> str:
     return "".join(f"\\u{units[i]:02x}{units[i + 1]:02x}" for i in range(0, len(units), 2))
 
 
-class CleanStream:
+class _StreamWrapper:
+    """A stream that adds behaviour to another one."""
+
+    def __init__(self, raw: Any) -> None:
+        """Write to a stream."""
+        self.raw = raw
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.raw, name)
+
+
+class CleanStream(_StreamWrapper):
     """An output of a command; all text that is written to it is cleaned.
 
     Attributes:
         raw: the stream itself.
     """
-
-    def __init__(self, raw: Any) -> None:
-        """Write to a stream."""
-        self.raw = raw
 
     def write(self, text: str) -> int:
         """Write a text, cleaned."""
@@ -66,27 +73,18 @@ class CleanStream:
         """The stream for Rich, which adds colours to text that ``console`` has cleaned."""
         return self.raw
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.raw, name)
 
-
-class _TolerantStream:
+class _TolerantStream(_StreamWrapper):
     """The error output of a command; failures to write it are ignored, so that they change no status or results."""
-
-    def __init__(self, stream: Any) -> None:
-        self._stream = stream
 
     def write(self, text: str) -> int:
         with contextlib.suppress(OSError):
-            self._stream.write(text)
+            self.raw.write(text)
         return len(text)
 
     def flush(self) -> None:
         with contextlib.suppress(OSError):
-            self._stream.flush()
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
+            self.raw.flush()
 
 
 def bound_widths() -> None:

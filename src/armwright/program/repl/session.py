@@ -21,18 +21,10 @@ from armwright.program.flow_analysis.analysis import Flow
 from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
+from armwright.program.repl import snapshots
 from armwright.program.repl.declarations import MergedHeaders, RedefinitionError, merge_headers
 from armwright.program.repl.input import ParsedInput, parse_input, shift_diagnostic
 from armwright.program.repl.session_text import header_title, program_text
-from armwright.program.repl.snapshots import (
-    import_frames,
-    load_code,
-    new_machine,
-    new_warnings,
-    remove_unused,
-    rename_variables,
-    run_statement,
-)
 from armwright.program.repl.undo_report import undone_lines
 from armwright.program.semantics import check
 from armwright.program.semantics.cell_symbols import ReadImport, known_cell
@@ -165,7 +157,9 @@ class Session:
         cell = cell or Cell(name=_NO_CELL, arms={})
         empty = tree.Program(Span(0, 0), (), (), Span(0, 0))
         symbols, _, _ = check.check(empty, known_cell(cell), std=std)
-        self._states = [SessionState(symbols=symbols, cell=cell, machine=new_machine(cell, self.source, self.limits))]
+        self._states = [
+            SessionState(symbols=symbols, cell=cell, machine=snapshots.new_machine(cell, self.source, self.limits))
+        ]
         self._index = 0
 
     # ---- what there is ---------------------------------------------------------------------------------------------
@@ -330,17 +324,17 @@ class Session:
                 remark = "the program has executed HALT; `:undo` restores the state before it"
                 answer = InputResult(source=source, remarks=(remark,), is_refused=True)
                 break
-            machine = load_code(before.machine, checked.code(statement), self.limits)
+            machine = snapshots.load_code(before.machine, checked.code(statement), self.limits)
             machine.state.has_ended = False
             try:
-                run_statement(machine)
+                snapshots.run_statement(machine)
             except RunError as error:
                 diagnostics.append(error.diagnostic)
                 remarks = (*undone_lines(before.machine, machine), *_skipped_text(len(entry.statements) - number - 1))
                 answer = InputResult(source=source, remarks=remarks, has_failed=True)
                 break
             effects += machine.state.effects[len(before.machine.state.effects) :]
-            diagnostics += new_warnings(before.machine, machine)
+            diagnostics += snapshots.new_warnings(before.machine, machine)
             if not shown:
                 text = " ".join(source.slice(statement.span).split())
                 done = (*before.statements, statement)
@@ -350,14 +344,14 @@ class Session:
     def _declare(self, checked: _CheckedInput) -> None:
         before, heading, source = self.state, checked.merged_headers, checked.source
         cell = checked.state.cell
-        machine = before.machine.copy() if cell is before.cell else new_machine(cell, source, self.limits)
-        rename_variables(machine, heading.new_names)
-        remove_unused(machine, heading.unused_names)
+        machine = before.machine.copy() if cell is before.cell else snapshots.new_machine(cell, source, self.limits)
+        snapshots.rename_variables(machine, heading.new_names)
+        snapshots.remove_unused(machine, heading.unused_names)
         for header in heading.imports:
             imported = None if self._read_import is None else self._read_import(header.path.value).cell
             if imported is not None:
-                import_frames(machine, imported.frames, header.span)
-        machine = load_code(machine, checked.code(), self.limits)
+                snapshots.import_frames(machine, imported.frames, header.span)
+        machine = snapshots.load_code(machine, checked.code(), self.limits)
         text = "; ".join(header_title(source, header) for header in checked.parsed.headers)
         self._append_state(attrs.evolve(checked.state, machine=machine, text=text))
 
