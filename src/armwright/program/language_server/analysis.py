@@ -73,7 +73,7 @@ class Analysis:
 
     @cached_property
     def scopes(self) -> ScopeExtents:
-        """The names that are visible in each stretch of the text."""
+        """The names that are visible in each range of the text."""
         return scope_extents(self.compiled.symbols)
 
     @cached_property
@@ -162,7 +162,7 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: CellCac
     )
     files = [*map(cells.read, imports), *([] if file is None else [file])]
     lines = {name: (file.path.absolute().as_uri(), line) for file in files for name, line in file.lines.items()}
-    # Where nothing has arms, an imported file still tells where its frames are.
+    # Where nothing has arms, an imported file still has frames.
     imported = (imported.cell for imported in compiled.imports)
     cell = compiled.cell or add_imported_frames(next(filter(None, imported), None), compiled.imports)
     return Analysis(compiled=compiled, codec=codec, cell=cell, declaration_lines=lines, cell_error=problem)
@@ -170,11 +170,11 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: CellCac
 
 @attrs.frozen(kw_only=True)
 class LexicalContext:
-    """What stands in front of a place of a text, and behind it.
+    """The tokens around a position of a text.
 
     Attributes:
-        preceding: those in front of the word, in order.
-        word: the word that is being written at the place; the place itself where there is none.
+        preceding: the tokens before the word, in order.
+        word: the word that is being written at the position; empty where there is none.
         following: the tokens from the word on.
     """
 
@@ -184,11 +184,11 @@ class LexicalContext:
 
 
 def lexical_context(text: str, offset: int, std: Standard) -> LexicalContext | None:
-    """Return what stands in front of a place; None within a comment or a text in quotes.
+    """Return the tokens around a position; None within a comment or a string.
 
     Args:
         text: the program as it is now, analysed or not.
-        offset: the place.
+        offset: the position.
         std: the language.
     """
     start = offset

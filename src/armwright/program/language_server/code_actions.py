@@ -1,4 +1,4 @@
-"""Cures of diagnostics as an editor offers them: one at a time where the cursor is, or all that are certain."""
+"""Code actions: fixes of diagnostics at the cursor, or all certain fixes of a program."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -19,20 +19,20 @@ FIX_ALL = f"{lsp.CodeActionKind.SourceFixAll.value}.armwright"
 # A longer text is not repeated in a title.
 _MAX_SHOWN_LENGTH = 30
 _DID_YOU_MEAN = re.compile(r"did you mean `([A-Za-z][\w-]*)`")
-# The place of a misspelt word is the word, or ends with it: `WITH SPED`.
+# The span of a misspelt word is the word, or ends with it: `WITH SPED`.
 _LAST_WORD = re.compile(r"(?<![\w-])[^\W\d_][\w-]*\Z")
 
 
 def code_actions(
     analysis: Analysis, uri: str, range_: lsp.Range, context: lsp.CodeActionContext
 ) -> list[lsp.CodeAction]:
-    """Return the cures that an editor asks for: of what is wrong in a stretch of text, and all that are certain.
+    """Return the fixes that an editor asks for: of the diagnostics in a range of text, and all certain ones.
 
     Args:
         analysis: of the program.
         uri: of its document.
-        range_: the stretch of text.
-        context: the kinds of cures that are asked for, and the diagnostics that the editor shows.
+        range_: the range of text.
+        context: the kinds of fixes that are requested, and the diagnostics that the editor shows.
     """
     actions = []
     if _is_requested(lsp.CodeActionKind.QuickFix.value, context):
@@ -45,14 +45,14 @@ def code_actions(
 
 
 def _is_requested(kind: str, context: lsp.CodeActionContext) -> bool:
-    """Whether an editor asks for a kind of cures, or for all kinds."""
+    """Whether an editor requests a kind of fixes, or all kinds."""
     return context.only is None or any(f"{kind}.".startswith(prefix + ".") for prefix in context.only)
 
 
 def quick_fixes(
     analysis: Analysis, uri: str, range_: lsp.Range, published: Sequence[lsp.Diagnostic]
 ) -> list[lsp.CodeAction]:
-    """Return the cures of what is wrong in a stretch of text: those that are certain, and names that were meant."""
+    """Return the fixes of the diagnostics in a range of text: certain ones, and corrections of misspelt names."""
     source, span = analysis.compiled.source, span_of(analysis.codec, range_)
     actions = []
     for diagnostic in analysis.complete.diagnostics:
@@ -79,9 +79,9 @@ def _workspace_edit(analysis: Analysis, uri: str, edits: Iterable[TextEdit]) -> 
 
 
 def _with_suggested_word(diagnostic: Diagnostic, source: Source) -> Diagnostic:
-    """Return a diagnostic that asks whether another word was meant with that word as its cure.
+    """Return a diagnostic that suggests another word with that word as its fix.
 
-    It is no certain one, so that an editor offers it and `armwright fix` leaves it alone.
+    The fix is not certain: an editor offers it, and `armwright fix` does not apply it.
     """
     word = next((match[1] for help_ in diagnostic.helps if (match := _DID_YOU_MEAN.match(help_))), None)
     if diagnostic.fixes or word is None:
@@ -94,7 +94,7 @@ def _with_suggested_word(diagnostic: Diagnostic, source: Source) -> Diagnostic:
 
 
 def all_fixes(diagnostics: Iterable[Diagnostic]) -> tuple[TextEdit, ...]:
-    """Return all certain cures that can be made at once, in the order of the text; of two that touch the first."""
+    """Return all certain fixes that can be applied at once, in the order of the text; of two that touch, the first."""
     curable = select_disjoint([diagnostic for diagnostic in diagnostics if diagnostic.fixes])
     return tuple(sorted(chain.from_iterable(map(_edits, curable)), key=lambda edit: edit.span.start))
 

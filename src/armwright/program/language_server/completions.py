@@ -1,4 +1,4 @@
-"""What can be written at a place of a program: words of the language, names of the right kind, whole statements."""
+"""Completions at a position of a program: words of the language, names of the right kind, whole statements."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
@@ -75,7 +75,7 @@ class _OperandRule:
         arms: whether an arm may.
         devices: whether a device may.
         functions: which functions of the language may.
-        words: other words with a meaning at this place.
+        words: other words with a meaning at this position.
     """
 
     kinds: frozenset[VariableKind] = frozenset()
@@ -190,16 +190,16 @@ def _rule_of_type(variable: VariableType | None) -> _OperandRule:
 
 
 def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Standard) -> Iterator[str]:
-    """Give the words that may stand at a place; of clauses those that go with the others of their MOVE."""
+    """Give the words that are valid at a position; of clauses those that go with the others of their MOVE."""
     following = takewhile(lambda token: token.key not in _CLAUSE_ENDS, context.following)
     written = expected.present_clauses | {token.key for token in following}
     allowed = VOCABULARIES[std].reserved
-    # What ends a stretch of statements is not offered behind each of them, unless it is being written.
+    # What ends a block is not offered after each of its statements, unless it is being written.
     if not expected.starts_statement and context.word.start == context.word.end:
         allowed = allowed - BLOCK_CLOSERS - {"RECOVER"}
     for word in dict.fromkeys(expected.words):
         last = word.rpartition(" ")[2]
-        # The action of ON is over in front of the place, or behind it.
+        # The action of ON has ended before the position, or starts after it.
         if last in _CLAUSES and (last in written or _EXCLUDES.get(last, frozenset()) & written):
             continue
         if last == "BLEND" and "VIA" not in written:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # How many lines a program may have that is analysed at every change.
 MAX_SHORT_LINES = 2000
-# How long nothing has to be typed before a program is analysed though nobody asks: short ones and long ones [s].
+# Time after the last key stroke until a program is analysed without a request: short and long programs [s].
 TYPING_DELAY, LONG_TYPING_DELAY = 0.02, 0.5
 
 
@@ -36,7 +36,7 @@ class Document:
     """
 
     def __init__(self, server: "RloServer", item: lsp.TextDocumentItem) -> None:
-        """Take up a text; it is analysed when somebody asks, or soon, and soon what is wrong with it is published."""
+        """Open a text; it is analysed on request or after a delay, then its diagnostics are published."""
         self._server, self.uri, self.version = server, item.uri, item.version
         self.codec = PositionCodec(item.text, server.encoding)
         path = to_fs_path(item.uri) if item.uri.startswith("file:") else None
@@ -64,7 +64,7 @@ class Document:
         return len(self.codec.line_starts) <= MAX_SHORT_LINES
 
     def change(self, changes: Sequence[lsp.TextDocumentContentChangeEvent], version: int) -> None:
-        """Make changes, one after the other; a change that names no range brings the whole text anew."""
+        """Apply changes one by one; a change without a range replaces the entire text."""
         for change in changes:
             text, replaced = self.text, Span(0, len(self.text))
             if isinstance(change, lsp.TextDocumentContentChangePartial):
@@ -74,7 +74,7 @@ class Document:
         self.invalidate()
 
     def invalidate(self) -> None:
-        """Take the analysis for old: the text has changed, or what it depends on."""
+        """Mark the analysis as outdated: the text has changed, or what it depends on."""
         self._outdated = True
         self._published.clear()
         self._stop_timer()
@@ -88,7 +88,7 @@ class Document:
         return self.last_analysis
 
     def publish(self) -> None:
-        """Publish what is wrong with the text as it is now."""
+        """Publish the diagnostics of the current text."""
         self._stop_timer()
         self._server.publish(self, self.analyse())
         self._published.set()

@@ -42,7 +42,7 @@ async def _on_hover(server: RloServer, params: lsp.HoverParams) -> lsp.Hover | N
 @feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[" ", "(", "=", ","]))
 async def _on_completion(server: RloServer, params: lsp.CompletionParams) -> lsp.CompletionList:
     document = server.document(params.text_document.uri)
-    # Names may be those from before the last words, which are read anew in any case.
+    # Names may come from an earlier analysis; the words around the cursor are parsed again in any case.
     analysis = document.last_analysis or await document.analysis()
     snippets = bool(server.client_capability("text_document.completion.completion_item.snippet_support"))
     offset = offset_of(document.codec, params.position)
@@ -266,10 +266,10 @@ def _did_change_watched_files(server: RloServer, _: lsp.DidChangeWatchedFilesPar
 
 
 def serve() -> int:
-    """Talk to an editor over standard input and output until it says goodbye.
+    """Serve an editor over standard input and output until it ends the session.
 
     Returns:
-        The exit status. The thread that reads may be at work still, for nobody.
+        The exit status. The thread that reads the input may still run.
 
     Raises:
         InvalidValueError: it sent a message that is larger than the limit; the connection is over.

@@ -99,7 +99,7 @@ class RloLexer(RegexLexer):
     def get_tokens_unprocessed(
         self, text: str, stack: Iterable[str] = ("root",)
     ) -> Iterator[tuple[int, _TokenType, str]]:
-        """Yield place, kind and text of every token; line numbers divide whatever they stand in."""
+        """Yield start, kind and text of every token; line numbers divide the tokens around them."""
         blanked, _ = blank_line_numbers(Source("", text))
         numbers = deque(match.span() for match in re.finditer(r"[0-9]+", text) if blanked[match.start()] == " ")
         for start, kind, value in super().get_tokens_unprocessed(blanked, stack):

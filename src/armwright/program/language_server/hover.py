@@ -1,4 +1,4 @@
-"""What there is to say about a place of a program: names with their types and poses, words, numbers with units."""
+"""Hover texts: names with their types and poses, keywords, numbers with units."""
 
 from collections.abc import Sequence
 from itertools import takewhile
@@ -30,7 +30,7 @@ _Description: TypeAlias = tuple[str, Sequence[str]]
 
 
 def hover(analysis: Analysis, offset: int, *, markdown: bool) -> lsp.Hover | None:
-    """Return what there is to say about a position; None where there is nothing.
+    """Return the hover text of a position; None where there is none.
 
     Args:
         analysis: of the program.

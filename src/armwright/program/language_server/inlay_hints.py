@@ -13,12 +13,12 @@ from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.positions import offset_of, position
 from armwright.program.syntax import tree
 
-# A statement that starts further in front of a place does not reach it.
+# A statement that starts further before a position does not reach it.
 _MAX_STATEMENT_LENGTH = 4000
 
 
 def inlay_hints(analysis: Analysis, within: lsp.Range) -> list[lsp.InlayHint]:
-    """Return the words that belong to a stretch of text, in order."""
+    """Return the hints of a range of text, in order."""
     statements = analysis.hinted_statements
     start, end = offset_of(analysis.codec, within.start), offset_of(analysis.codec, within.end)
     first = bisect_left(statements, start - _MAX_STATEMENT_LENGTH, key=lambda statement: statement.span.start)

@@ -55,7 +55,7 @@ def _variable_symbols(
 
 # ---- folding -------------------------------------------------------------------------------------------------------
 
-# The first and the last line of a stretch, from 0.
+# The first and the last line of a range, from 0.
 _Lines: TypeAlias = tuple[int, int]
 _OPENING = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
 _CLOSING = frozenset(("END", "COEND", "UNTIL"))
@@ -65,10 +65,10 @@ def folding_ranges(analysis: Analysis) -> list[FoldingRange]:
     """Return what can be folded away: blocks, declarations, statements and comments of several lines."""
     line_of = analysis.codec.line_of
     comments = _comment_lines(analysis)
-    stretches = {*_block_lines(analysis), *_declaration_lines(analysis), *comments}
-    stretches |= {(line_of(node.span.start), line_of(node.span.end)) for node in analysis.hinted_statements}
+    ranges = {*_block_lines(analysis), *_declaration_lines(analysis), *comments}
+    ranges |= {(line_of(node.span.start), line_of(node.span.end)) for node in analysis.hinted_statements}
     # Of those that begin in one line the longest comes last.
-    longest = dict(sorted(stretches))
+    longest = dict(sorted(ranges))
     kinds = dict.fromkeys(comments, FoldingRangeKind.Comment)
     return [FoldingRange(*lines, kind=kinds.get(lines)) for lines in longest.items() if lines[0] < lines[1]]
 

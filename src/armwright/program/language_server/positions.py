@@ -1,4 +1,4 @@
-"""Positions and edits in the words of the Language Server Protocol: lines and columns in place of offsets."""
+"""Positions and edits in the words of the Language Server Protocol: lines and columns instead of offsets."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,7 @@ from armwright.program.language.text_edits import TextEdit
 
 
 def span_range(codec: PositionCodec, span: Span) -> lsp.Range:
-    """Return a stretch of text as lines and columns."""
+    """Return a span as lines and columns."""
     return lsp.Range(position(codec, span.start), position(codec, span.end))
 
 
@@ -25,7 +25,7 @@ def offset_of(codec: PositionCodec, position: lsp.Position) -> int:
 
 
 def span_of(codec: PositionCodec, range_: lsp.Range) -> Span:
-    """Return the stretch of text between two positions."""
+    """Return the span between two positions."""
     start = offset_of(codec, range_.start)
     return Span(start, max(start, offset_of(codec, range_.end)))
 

@@ -63,7 +63,7 @@ def rename(analysis: Analysis, offset: int, new: str) -> tuple[TextEdit, ...]:
 
     Args:
         analysis: the program.
-        offset: a place in the name.
+        offset: a position in the name.
         new: its new name.
 
     Raises:
@@ -129,6 +129,6 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
 
 
 def _referring_occurrences(analysis: Analysis) -> tuple[Occurrence, ...]:
-    """Return the occurrences that stand for something by their name, and not by their place."""
+    """Return the occurrences whose meaning depends on their name, not on their position in a statement."""
     fixed = (NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE)
     return tuple(occurrence for occurrence in analysis.occurrences if occurrence.kind not in fixed)

@@ -34,14 +34,14 @@ _NAME_STYLES = {
     NameKind.AXIS: ("enumMember", _BIT["readonly"]),
 }
 
-# One stretch of a line: where it starts and how long it is, in columns; its kind and modifiers as numbers.
+# A token in a line: its start and length in columns; its kind and modifiers as numbers.
 SemanticToken = tuple[int, int, int, int]
 
 
 # An editor asks for the colours of what it shows and for those of the whole, of the same text.
 @lru_cache(maxsize=4)
 def line_tokens(analysis: Analysis) -> list[list[SemanticToken]]:
-    """Return the coloured stretches of each line of a program."""
+    """Return the semantic tokens of each line of a program."""
     codec, compiled = analysis.codec, analysis.compiled
     lines: list[list[SemanticToken]] = [[] for _ in codec.line_starts]
     names = {name.start: name for name in analysis.occurrences}
@@ -101,13 +101,13 @@ def _add_comment(lines: list[list[SemanticToken]], codec: PositionCodec, comment
 
 
 def encode(lines: Sequence[list[SemanticToken]], first: int = 0, last: int | None = None, start: int = 0) -> list[int]:
-    """Return stretches as the protocol wants them: five numbers each, places counted from the stretch before.
+    """Return tokens in the encoding of the protocol: five numbers each, positions relative to the token before.
 
     Args:
-        lines: the stretches of each line.
+        lines: the tokens of each line.
         first: the first line that is wanted.
         last: the last one.
-        start: the line of the stretch before.
+        start: the line of the token before.
     """
     numbers: list[int] = []
     line_before = start
@@ -126,7 +126,7 @@ def token_edit(old: Sequence[list[SemanticToken]], new: Sequence[list[SemanticTo
         common_head = min(len(old), len(new))
     limit = min(len(old), len(new)) - common_head
     common_tail = next((at for at in range(limit) if old[-1 - at] != new[-1 - at]), limit)
-    # The first stretch below the change counts its line from the one above, and is told again.
+    # The line of the first token after the change is relative to the one before, so it is sent again.
     while common_tail and not old[-common_tail]:
         common_tail -= 1
     common_tail -= common_tail > 0

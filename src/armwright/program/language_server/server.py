@@ -23,9 +23,9 @@ from armwright.program.language_server.positions import offset_of
 from armwright.version import __version__
 
 SECTION = "armwright"
-# What the protocol calls a request that cannot be granted.
+# The code of the protocol for a request that cannot be fulfilled.
 _REQUEST_FAILED = -32803
-# Columns are counted so where the editor says nothing.
+# Encoding of columns where the editor states none.
 DEFAULT_ENCODING = "utf-16"
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -51,7 +51,7 @@ class _Protocol(LanguageServerProtocol):
         yield self.fm.features[lsp.TEXT_DOCUMENT_DID_CHANGE], (params,), None
 
     def structure_message(self, data: dict[str, Any]) -> Any:
-        """Return a message as it came in; whoever asks what cannot be read is told so, and does not wait for ever.
+        """Return a message as received; an invalid request gets an error, so that the editor does not wait for ever.
 
         Raises:
             JsonRpcException: it makes no sense.
@@ -68,7 +68,7 @@ class RloServer(LanguageServer):
     """The server: open documents, settings, and what the editor can do."""
 
     def __init__(self) -> None:
-        """Wait for an editor."""
+        """Register the features."""
         super().__init__("armwright", __version__, protocol_cls=_Protocol)
         self.documents: dict[str, Document] = {}
         self.settings = Settings()
@@ -79,11 +79,11 @@ class RloServer(LanguageServer):
         self._last_problem = ""
         for method, options, function in _FEATURES:
             self.feature(method, options)(function)
-        # What is refused is told to the editor; its record need not have it again.
+        # Errors are sent to the editor; its log need not repeat them.
         logging.getLogger("pygls").setLevel(logging.CRITICAL)
 
     def shutdown(self) -> None:
-        """End at once: what is being read is for nobody any more, and is not waited for."""
+        """End at once, without waiting for the message that is being read."""
         if self._stop_event is not None:
             self._stop_event.set()
 
@@ -129,7 +129,7 @@ class RloServer(LanguageServer):
         return analysis, offset_of(analysis.codec, position)
 
     def invalidate(self) -> None:
-        """Take the analyses of all documents for old: what they depend on has changed."""
+        """Mark the analyses of all documents as outdated: what they depend on has changed."""
         for document in self.documents.values():
             document.invalidate()
 
@@ -140,11 +140,11 @@ class RloServer(LanguageServer):
             return analyse(document.name, document.codec, folder, self.cells, self.settings)
         except Exception as error:  # noqa: BLE001 - a conversation goes on, whatever happens in it
             self._log(error)
-            # Of a program without words nothing is known, and nothing is wrong with what is known.
+            # An empty program has no names and no diagnostics.
             return analyse(document.name, PositionCodec("", self.encoding), None, self.cells, Settings())
 
     def publish(self, document: Document, analysis: Analysis) -> None:
-        """Tell the editor what is wrong with a document."""
+        """Publish the diagnostics of a document."""
         if self.documents.get(document.uri, document) is not document:
             return
         related = bool(self.client_capability("text_document.publish_diagnostics.related_information"))
@@ -168,7 +168,7 @@ class RloServer(LanguageServer):
     # ---- settings
 
     def apply_settings(self, values: object) -> None:
-        """Take up settings as an editor tells them; what is no setting is passed over."""
+        """Apply the settings of an editor; unknown ones are ignored."""
         values = values if isinstance(values, dict) else {}
         values = values[SECTION] if isinstance(values.get(SECTION), dict) else values
         cell, std = values.get("cell"), str(values.get("std") or Standard.RLO_2)
@@ -198,7 +198,7 @@ class RloServer(LanguageServer):
                 self.apply_settings(answers[0])
 
     async def register_watchers(self) -> None:
-        """Ask the editor to tell of changes of cell files, and of settings."""
+        """Ask the editor for notifications of changes of cell files and of settings."""
         watched = lsp.DidChangeWatchedFilesRegistrationOptions([lsp.FileSystemWatcher("**/*.{toml,json}")])
         options = {
             "did_change_watched_files": (lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, watched),
@@ -213,11 +213,11 @@ class RloServer(LanguageServer):
             if self.client_capability(f"workspace.{name}.dynamic_registration")
         ]
         if registrations:
-            # An editor that will not do what it said it can do tells nothing of cell files, and that is all.
+            # An editor that refuses what it declared it can do sends no notifications.
             with suppress(JsonRpcException):
                 await self.client_register_capability_async(lsp.RegistrationParams(registrations))
 
 
 def request_error(text: str) -> JsonRpcException:
-    """Return what tells an editor that something cannot be done, and why."""
+    """Return the error of a request that cannot be fulfilled, with the reason."""
     return JsonRpcException(text, code=_REQUEST_FAILED)

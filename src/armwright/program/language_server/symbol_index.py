@@ -1,4 +1,4 @@
-"""Where the names of a program occur, and what each is there: told from the tokens, so of half-written programs too."""
+"""Occurrences of the names of a program and their kinds, from the tokens, so that incomplete programs have them too."""
 
 import enum
 from bisect import bisect_right
@@ -71,10 +71,10 @@ class Occurrence:
 
 @attrs.frozen
 class ScopeExtents:
-    """The names that are visible in each stretch of a text.
+    """The names that are visible in each range of a text.
 
     Attributes:
-        starts: where each stretch starts, in order; it ends where the next one starts.
+        starts: where each range starts, in order; it ends where the next one starts.
         scopes: the names that are visible in each.
     """
 
@@ -87,7 +87,7 @@ class ScopeExtents:
 
 
 def scope_extents(symbols: Symbols) -> ScopeExtents:
-    """Return the stretches of a program that see the same names: procedures, and what lies around them."""
+    """Return the ranges of a program in which the same names are visible: procedures, and the text between them."""
     main = symbols.scope(None)
     starts, scopes = [0], [main]
     for key, procedure in sorted(symbols.procedures.items(), key=lambda item: item[1].node.span.start):
@@ -101,7 +101,7 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
 
     Args:
         tokens: in order.
-        scopes: the names that are visible in each stretch of the text.
+        scopes: the names that are visible in each range of the text.
     """
     result: list[Occurrence] = []
     in_units = in_read = False

@@ -35,7 +35,7 @@ class MergedHeaders:
         statements: those of the session, with the names that they use now.
         spelling: of names that are declared here, and of new names for old ones, by key.
         new_names: new names of old variables and procedures, by their old ones.
-        unused_names: names that were declared anew before anything was done with them.
+        unused_names: names that were declared again before they were used.
         imports: the paths of files that are imported now for the first time.
         remarks: what is to be said about it.
     """
@@ -142,7 +142,7 @@ def _cell_name_error(name: tree.Name) -> Diagnostic:
 def _replace_units(
     headers: tuple[tree.Header, ...], statements: Sequence[tree.Statement], new: tree.Units
 ) -> tuple[tree.Header, ...]:
-    """Return the headers without the units that new ones take the place of.
+    """Return the headers without the units that new ones replace.
 
     Raises:
         NotNowError: numbers have been read in the old ones.

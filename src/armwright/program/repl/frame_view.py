@@ -1,4 +1,4 @@
-"""What there is to see of a session: the frame tree with places and turns, and the arms with their joints and hands."""
+"""Views of a session: the frame tree with positions and orientations, and the arms with their joints and grippers."""
 
 import math
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ from armwright.cell.frames import WORLD
 from armwright.program.repl.session import Session
 from armwright.program.vm.value_text import frames_with_depth
 
-# Where the middle of three turns is this near to a right angle, the other two turn about the same axis.
+# Where the middle one of three angles is this near to a right angle, the other two rotate about the same axis.
 _SAME_AXIS = 1e-9
-# Digits of places behind the point: a hundredth of a millimetre.
+# Decimals of positions: a hundredth of a millimetre.
 _DIGITS = {"M": 5, "MM": 2, "CM": 3, "IN": 3}
 
 
@@ -33,7 +33,7 @@ def frame_table_lines(session: Session) -> list[str]:
 
 
 def zyx_angles(R: Array) -> Array:
-    """Return three turns (3,) [rad]: about z, then about the new y, then about the newest x.
+    """Return the ZYX Euler angles (3,) [rad]: about z, then about the new y, then about the newest x.
 
     Where the second is a right angle the third is taken as 0.
     """
@@ -44,7 +44,7 @@ def zyx_angles(R: Array) -> Array:
 
 
 def arm_lines(session: Session) -> list[str]:
-    """Return the arms as lines: the position of each joint [deg] or [mm], and what the hand is at and holds."""
+    """Return the arms as lines: joint positions [deg] or [mm], and the frames at the gripper and in it."""
     machine, lines = session.state.machine, []
     for name, arm in machine.cell.arms.items():
         q = machine.hardware.configuration(name, machine.now)

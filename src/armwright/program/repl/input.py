@@ -1,7 +1,7 @@
-"""What somebody enters at a session: declarations, statements, expressions, whole programs; and whether more must come.
+"""The inputs of a session: declarations, statements, expressions, whole programs; and whether an input is complete.
 
 Each input is parsed by the rules of a program: what a program would have around it is put there as tokens without
-characters, so that every place is one in the text of the session.
+characters, so that every span is one in the text of the session.
 """
 
 import re
@@ -127,7 +127,7 @@ def _is_complete(tokens: Sequence[Token], diagnostics: Sequence[Diagnostic]) -> 
 
 
 def _block_depth(tokens: Sequence[Token]) -> int:
-    """Return how many stretches of statements are open behind some tokens."""
+    """Return how many blocks are open after some tokens."""
     words = [token.key for token in tokens if token.kind is TokenKind.KEYWORD]
     return sum((word in BLOCK_OPENERS) - (word in BLOCK_CLOSERS) for word in words)
 
@@ -152,7 +152,7 @@ def _strip_program_frame(tokens: Sequence[Token]) -> list[Token]:
 
 
 def _split_parts(tokens: Sequence[Token], words: Vocabulary) -> Iterator[tuple[bool, Sequence[Token]]]:
-    """Cut an input into headers and stretches of statements, each with whether it is a header."""
+    """Split an input into headers and sequences of statements, each with whether it is a header."""
     index = 0
     while index < len(tokens):
         is_header = True
@@ -201,7 +201,7 @@ def _end_of_variables(tokens: Sequence[Token], index: int) -> int:
 
 
 def _index_after(tokens: Sequence[Token], index: int, key: str) -> int:
-    """Return the place behind the next token that reads so; the end without one."""
+    """Return the index after the next token with this key; the end without one."""
     return next((number + 1 for number in range(index, len(tokens)) if tokens[number].key == key), len(tokens))
 
 
@@ -288,7 +288,7 @@ class _InputParser:
 
 
 def _split_statements(part: Sequence[Token]) -> Iterator[Sequence[Token]]:
-    """Cut a stretch of statements behind each ``;`` that is not inside one of them."""
+    """Split a sequence of statements after each ``;`` that is not inside one of them."""
     first, depth = 0, 0
     for index, token in enumerate(part):
         depth += _block_depth((token,))
@@ -312,6 +312,6 @@ def _tokens_after_brackets(tokens: Sequence[Token]) -> Sequence[Token]:
 
 
 def _synthetic_tokens(*keys: str, index: int) -> list[Token]:
-    """Return words and signs that nobody has written."""
+    """Return keywords and symbols that are not in the text."""
     kinds = {True: TokenKind.KEYWORD, False: TokenKind.SYMBOL}
     return [Token(kinds[key.isalpha()], key, key, index, index) for key in keys]

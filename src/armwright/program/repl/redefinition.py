@@ -1,4 +1,4 @@
-"""Names that are declared anew in a session: what was done with the old one keeps it, under another name."""
+"""Names that are declared again in a session: earlier statements keep the old one, under another name."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import count
@@ -15,7 +15,7 @@ _WITH_AXIS = ("FORCE",)
 
 @attrs.frozen(kw_only=True)
 class RenamedProgram:
-    """What is left of a session when names are declared anew.
+    """A session after names are declared again.
 
     Attributes:
         headers: without what they declared of these names.
@@ -49,7 +49,7 @@ def redeclare(
     unavailable: Collection[str],
     max_length: int,
 ) -> RenamedProgram:
-    """Make room for names that are declared anew.
+    """Rename what earlier statements use of names that are declared again.
 
     Procedures mean the new ones from then on; the statements before get procedures of their own where these meant
     an old one, so that the session remains the program that it was.
