@@ -41,7 +41,7 @@ def matches_hit_count(condition: str, hits: int) -> bool:
         hits: how often it has been come to, this time included.
 
     Raises:
-        CountError: the condition is none of those.
+        HitConditionError: the condition is none of those.
     """
     match = _COUNT.fullmatch(condition)
     if match is None:

@@ -9,7 +9,6 @@ import attrs
 
 from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.api import LoadedProgram, ProgramError
-from armwright.program.debugger.breakpoints import Breakpoint
 from armwright.program.debugger.dap_messages import Arguments, RequestError
 from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.debugger.history import ProcessPath
@@ -199,11 +198,9 @@ class EditorSession:
         self._report_threads(debugger)
         body = {"reason": _REASONS.get(stop.reason, stop.reason), "threadId": self.thread_id(stop.path)}
         body |= {"description": stop.text or _DESCRIPTIONS.get(stop.reason, stop.reason), "allThreadsStopped": True}
-        optional = {
-            "text": stop.text,
-            "hitBreakpointIds": [self.breakpoint_ids[number] for number in stop.breakpoint_numbers],
-        }
-        self.send("stopped", {**body, **{key: value for key, value in optional.items() if value}})
+        hits = [self.breakpoint_ids[number] for number in stop.breakpoint_numbers]
+        body |= ({"text": stop.text} if stop.text else {}) | ({"hitBreakpointIds": hits} if hits else {})
+        self.send("stopped", body)
 
     def _report_end(self, stop: Stop) -> None:
         """The program is over: its output is written, and the editor told."""
@@ -329,11 +326,9 @@ class EditorSession:
 
     def set_data_breakpoint(self, number: int, request: Arguments) -> dict[str, Any]:
         """Watch a frame or a variable; return what the editor has to know of it."""
-        condition, hits = (request.get(str, key, "").strip() for key in ("condition", "hitCondition"))
+        conditions = _breakpoint_conditions(request)
         try:
-            watch = self.launched_debugger.add_watch(
-                request.get(str, "dataId"), condition=condition, hit_condition=hits
-            )
+            watch = self.launched_debugger.add_watch(request.get(str, "dataId"), **conditions)
         except ArmwrightError as error:
             return {"id": number, "verified": False, "message": str(error)}
         self.breakpoint_ids[watch.number] = number
@@ -347,17 +342,18 @@ class EditorSession:
         if "column" in request:
             offset = self.codec.offset(line - 1, request.get(int, "column") - self.first_column)
             column = self.debugger.code.source.column(offset)
-        breakpoint_: Breakpoint = self.debugger.add_breakpoint(
-            line,
-            column,
-            condition=request.get(str, "condition", "").strip(),
-            hit_condition=request.get(str, "hitCondition", "").strip(),
-            log_message=request.get(str, "logMessage", ""),
-        )
+        conditions, log_message = _breakpoint_conditions(request), request.get(str, "logMessage", "")
+        breakpoint_ = self.debugger.add_breakpoint(line, column, **conditions, log_message=log_message)
         self.breakpoint_ids[breakpoint_.number] = number
         if breakpoint_.start is None:
             return {"id": number, "verified": False, "message": breakpoint_.message}
         return {"id": number, "verified": True, "source": self.source(), **self.location(breakpoint_.start.span)}
+
+
+def _breakpoint_conditions(request: Arguments) -> dict[str, str]:
+    """Return the conditions of a breakpoint that is requested: on values, and on how often it has been reached."""
+    keys = {"condition": "condition", "hit_condition": "hitCondition"}
+    return {name: request.get(str, key, "").strip() for name, key in keys.items()}
 
 
 def _output_event(effect: Effect) -> tuple[str, str, Span | None]:

@@ -190,15 +190,8 @@ class Debugger:
                 message = ""
             except (ExpressionError, HitConditionError) as error:
                 start, message = None, str(error)
-        number = next(self._numbers)
-        result = Breakpoint(
-            number=number,
-            start=start,
-            condition=condition,
-            hit_condition=hit_condition,
-            log_message=log_message,
-            message=message,
-        )
+        number, conditions = next(self._numbers), {"condition": condition, "hit_condition": hit_condition}
+        result = Breakpoint(number=number, start=start, **conditions, log_message=log_message, message=message)
         self.execution.breakpoints.append(result)
         return result
 
@@ -212,7 +205,7 @@ class Debugger:
 
         Raises:
             ExpressionError: nothing is kept there, or the condition makes no sense.
-            CountError: the count makes no sense.
+            HitConditionError: the count makes no sense.
         """
         kind = self.machine.type_of(slot)
         known = slot.partition("[")[0] in {*self.machine.state.types, *self.machine.state.tree}
@@ -252,7 +245,7 @@ class Debugger:
     @property
     def time(self) -> float:
         """The time on the clock of the cell [s]."""
-        return self.view.state.ticks * self.view.cell.period
+        return self.view.now
 
     @property
     def processes(self) -> list[Process]:

@@ -187,11 +187,9 @@ class Execution:
         def value(match: re.Match[str]) -> str:
             try:
                 parsed = parse_expression(match[1], view, frame.procedure)
-                return (
-                    match[1]
-                    if parsed.type is None
-                    else value_variable(view, "", evaluate(view, frame, parsed), "").value
-                )
+                if parsed.type is None:
+                    return match[1]
+                return value_variable(view, "", evaluate(view, frame, parsed), "").value
             except ExpressionError as error:
                 return f"({error})"
 
@@ -213,9 +211,8 @@ class Execution:
         if "caught" in self.exception_filters and self._error_step != step_count:
             caught = next((effect for effect in machine.state.effects[effects:] if effect.kind == "ERROR"), None)
             if caught is not None:
-                return self._stop_before_error(
-                    step_count, path, Stop(reason="exception", text=caught.text, caught=True)
-                )
+                stop = Stop(reason="exception", text=caught.text, caught=True)
+                return self._stop_before_error(step_count, path, stop)
         self.tick = max(self.tick, machine.state.ticks)
         if machine.state.has_ended:
             return Stop(reason="end", path=path)

@@ -67,7 +67,8 @@ class StackFrame:
 def call_stack(machine: Machine, process: Process, statements: Statements) -> list[StackFrame]:
     """Return where a process is, the innermost first."""
     frames = []
-    index, span = process.pc, _current_span(process, statements)
+    cause = process.waiting or process.pending_effect or process.followed_motion or statements.statement_at(process.pc)
+    index, span = process.pc, cause.span
     for activation in reversed(process.stack):
         title, procedure = _frame_title(machine, process, activation), statements.procedure_at(index)
         frames.append(StackFrame(process=process, title=title, span=span, activation=activation, procedure=procedure))
@@ -75,11 +76,6 @@ def call_stack(machine: Machine, process: Process, statements: Statements) -> li
         if activation.call_span is not None:
             span = activation.call_span
     return frames
-
-
-def _current_span(process: Process, statements: Statements) -> Span:
-    cause = process.waiting or process.pending_effect or process.followed_motion or statements.statement_at(process.pc)
-    return cause.span
 
 
 def _frame_title(machine: Machine, process: Process, activation: Activation) -> str:

@@ -51,7 +51,7 @@ def scopes(machine: Machine, frame: StackFrame) -> list[Variable]:
     """
     local_types = {} if frame.procedure is None else machine.code.procedures[frame.procedure].types
     # Of a branch in the program itself, or of a procedure that has no names, there is nothing own to be seen.
-    local = {key: frame.activation.bindings.get(key, key) for key in local_types if key in frame.activation.bindings}
+    local = {key: slot for key, slot in frame.activation.bindings.items() if key in local_types}
     values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not VariableKind.FRAME}
     parts: list[tuple[str, Callable[[], Sequence[Variable]]]] = [
         ("Locals", lambda: [make_variable(machine, slot, name=machine.spelling(key)) for key, slot in local.items()]),
@@ -95,19 +95,16 @@ def make_variable(machine: Machine, slot: str, *, name: str = "") -> Variable:
 def value_variable(machine: Machine, name: str, value: Value, kind: str) -> Variable:
     """Return a value that stands for itself."""
     if isinstance(value, np.ndarray):
-        return Variable(
-            name=name, value=_pose_text(machine, value), type=kind, children=lambda: _pose_columns(machine, value)
-        )
-    return Variable(name=name, value=_truth(value) if isinstance(value, bool) else f"{value:.12g}", type=kind)
+        text = _pose_text(machine, value)
+        return Variable(name=name, value=text, type=kind, children=lambda: _pose_columns(machine, value))
+    return Variable(name=name, value=str(value).lower() if isinstance(value, bool) else f"{value:.12g}", type=kind)
 
 
 def frame_tree_lines(machine: Machine) -> list[str]:
     """Return the tree of frames, a line each, what hangs on something under it."""
     _, *frames = frames_with_depth(machine.state.tree, sorted)
-    return [
-        WORLD,
-        *(f"{'  ' * depth}{machine.spelling(name)}  {_position_text(machine, name)}" for name, depth in frames),
-    ]
+    spelling = machine.spelling
+    return [WORLD, *(f"{'  ' * depth}{spelling(name)}  {_position_text(machine, name)}" for name, depth in frames)]
 
 
 # ---- frames, steps, arrays -----------------------------------------------------------------------------------------
@@ -162,16 +159,13 @@ def _pose_numbers(machine: Machine, X: Array) -> list[str]:
 def _position_text(machine: Machine, name: str) -> str:
     if not machine.has_pose(name):
         return _NO_VALUE
-    return (
-        f"({', '.join(_pose_numbers(machine, machine.state.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
-    )
+    position = ", ".join(_pose_numbers(machine, machine.state.tree.world(name))[9:])
+    return f"({position}) {machine.code.units.length.lower()}"
 
 
 def _array_variable(machine: Machine, slot: str, name: str, kind: VariableType) -> Variable:
-    count, elements = math.prod(kind.sizes), ArrayElements(machine, slot, name, kind)
-    return Variable(
-        name=name, value=f"{count} elements", type=str(kind), children=lambda: elements, element_count=count
-    )
+    elements, text = ArrayElements(machine, slot, name, kind), f"{math.prod(kind.sizes)} elements"
+    return Variable(name=name, value=text, type=str(kind), children=lambda: elements, element_count=len(elements))
 
 
 class ArrayElements(Sequence[Variable]):
@@ -211,17 +205,14 @@ def _arm_variable(machine: Machine, name: str) -> Variable:
     joints = [Variable(name=f"joint {number}", value=text) for number, text in enumerate(texts, 1)]
 
     def children() -> list[Variable]:
-        holds = machine.state.hands[name].held_frame
-        force = ", ".join(
-            f"{component:.6g}" for component in machine.hardware.contact_force(name, machine.now).tolist()
-        )
+        holds, force = machine.state.hands[name].held_frame, machine.hardware.contact_force(name, machine.now).tolist()
         hand = value_variable(machine, "hand", machine.gripper_pose(name), "FRAME")
         return [
             *joints,
             attrs.evolve(hand, expression=name, slot=name),
             Variable(name="moves", value=_motion_text(machine, name)),
             Variable(name="holds", value=machine.spelling(holds) if holds else "nothing"),
-            Variable(name="force", value=f"({force}) N"),
+            Variable(name="force", value=f"({', '.join(f'{component:.6g}' for component in force)}) N"),
         ]
 
     return Variable(name=name, value=", ".join(texts), type=arm.name, children=children)
@@ -248,7 +239,3 @@ def _run_variables(machine: Machine, process: Process) -> Iterable[Variable]:
     yield Variable(name="priority", value=f"{process.priority:g}")
     if process.locks:
         yield Variable(name="locks", value=", ".join(map(machine.spelling, process.locks)))
-
-
-def _truth(value: bool) -> str:  # noqa: FBT001 - a value, not a switch
-    return "true" if value else "false"

@@ -22,7 +22,7 @@ def value_text(value: Value, units: UnitSystem) -> str:
         units: of the program.
     """
     if isinstance(value, bool):
-        return "true" if value else "false"
+        return str(value).lower()
     if isinstance(value, float | int):
         return f"{value + 0.0:.6g}"
     assert isinstance(value, np.ndarray)  # noqa: S101 - elements have been read
