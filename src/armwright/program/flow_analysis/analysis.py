@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import attrs
 
-from armwright.program.flow_analysis import concurrency, control_flow, data_races, devices, frames, move, output
+from armwright.program.flow_analysis import calls, concurrency, control_flow, data_races, devices, frames, move, output
 from armwright.program.flow_analysis.context import Context, Steps
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Diagnostic
@@ -59,6 +59,7 @@ def check(
     context = Context(STEPS, state)
     context.follow(*program.statements)
     state.ended = False
-    context.follow_uncalled()
+    calls.follow_uncalled(context)
     findings = [*state.diagnostics, *concurrency.check(program, symbols, source), *data_races.check(program, symbols)]
-    return Flow(arms=state.arms, implied=state.implied), findings
+    arms = {start: arm for start, arm in state.arms.items() if arm is not None}
+    return Flow(arms=arms, implied=frozenset(start for start, always in state.implied.items() if always)), findings

@@ -5,7 +5,6 @@ from typing import Any, TypeAlias, TypeVar
 
 import attrs
 
-from armwright.program.flow_analysis.calls import CallAnalysis
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.lattice import Outcome
 from armwright.program.flow_analysis.side_effects import SideEffects, walk_statements
@@ -17,7 +16,9 @@ Step: TypeAlias = Callable[["Context", Any], None]
 Steps: TypeAlias = Mapping[type, Step]
 
 # Deepest nesting that is analysed; statements inside it only invalidate facts.
-_MAX_DEPTH = 100
+MAX_DEPTH = 100
+# Statements of procedures that are analysed at calls, in all.
+_MAX_STATEMENTS = 20_000
 
 
 def of_state(change: Callable[[FlowState, Node], None]) -> Callable[["Context", Node], None]:
@@ -34,18 +35,22 @@ class Context:
         state: the abstract state.
         loops: nesting of loops.
         recovering: whether the statement is in a RECOVER part.
+        depth: nesting of statements.
+        budget: statements of procedures that may still be analysed at calls.
+        activations: the number of calls so far.
+        followed: procedures whose body was analysed at a call.
+        skipped: procedures whose body was not analysed at a call.
     """
 
     steps: Steps
     state: FlowState
     loops: int = 0
     recovering: bool = False
-    _depth: int = 0
-    _calls: CallAnalysis = attrs.field(init=False)
-
-    def __attrs_post_init__(self) -> None:
-        """Connect the analysis of calls to that of statements."""
-        self._calls = CallAnalysis(self.state, lambda statements: self.follow(*statements))
+    depth: int = 0
+    budget: int = _MAX_STATEMENTS
+    activations: int = 0
+    followed: set[str] = attrs.field(factory=set)
+    skipped: set[str] = attrs.field(factory=set)
 
     def follow(self, *statements: tree.Statement) -> None:
         """Analyse statements in order, up to a HALT; those that are nested too deep only invalidate facts."""
@@ -57,21 +62,13 @@ class Context:
 
     def follow_one(self, statement: tree.Statement) -> None:
         """Analyse one statement; where it is nested too deep, only invalidate what it changes."""
-        self._calls.count_statement()
-        if self._depth >= _MAX_DEPTH:
+        self.budget -= bool(self.state.calls)
+        if self.depth >= MAX_DEPTH:
             self._skip(statement)
             return
-        self._depth += 1
+        self.depth += 1
         self.steps[type(statement)](self, statement)
-        self._depth -= 1
-
-    def call(self, node: tree.Call) -> None:
-        """Analyse a call."""
-        self._calls.call(node, follow=self._depth < _MAX_DEPTH)
-
-    def follow_uncalled(self) -> None:
-        """Analyse the procedures that were not analysed at each of their calls."""
-        self._calls.follow_uncalled()
+        self.depth -= 1
 
     def _skip(self, statement: tree.Statement) -> None:
         self.state.forget(self.side_effects(statement))
@@ -79,7 +76,7 @@ class Context:
             if isinstance(inner, tree.Move | tree.Grasp):
                 self.state.record(inner, None)
             elif isinstance(inner, tree.Call):
-                self._calls.skip_body(inner.name.key)
+                self.skipped.add(inner.name.key)
 
     def side_effects(self, *statements: tree.Statement) -> SideEffects:
         """Return the side effects of statements."""

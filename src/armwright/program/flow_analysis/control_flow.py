@@ -1,15 +1,16 @@
 """Control flow: facts along the paths through IF, loops, COBEGIN, TRY and calls."""
 
-import itertools
 from collections.abc import Iterator, Sequence
+from itertools import takewhile
 
-from armwright.program.flow_analysis import concurrency
-from armwright.program.flow_analysis.context import Context, Steps, of_state
+from armwright.program.flow_analysis import concurrency, constants
+from armwright.program.flow_analysis.calls import call
+from armwright.program.flow_analysis.context import Context, Steps
 from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.lattice import Outcome, Uncertainty
 from armwright.program.flow_analysis.side_effects import ANY_ARM, ANYTHING, SideEffects, union
-from armwright.program.flow_analysis.state import LAST, FlowState, Uses
+from armwright.program.flow_analysis.state import LAST, Uses
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.source import Span
@@ -21,16 +22,6 @@ _MAX_LOOP_DEPTH = 3
 _MAX_BRANCHES = 30
 # Paths of one IF that are joined name by name.
 _MAX_PATHS = 100
-
-
-def event(state: FlowState, node: tree.Signal | tree.Wait) -> None:
-    """Check the indices of an event."""
-    require_indices(state, node.event)
-
-
-def pause(state: FlowState, node: tree.Pause) -> None:
-    """Check the time of a PAUSE."""
-    require_value(state, node.duration)
 
 
 def if_(context: Context, node: tree.If) -> None:
@@ -58,14 +49,13 @@ def if_(context: Context, node: tree.If) -> None:
 def while_(context: Context, node: tree.While) -> None:
     """Analyse a loop with its test at the top."""
     require_value(context.state, node.condition)
-    _loop_that_may_not_run(
-        context, node, node.head, "WHILE", (node.body,), certain=bool(context.state.condition_value(node.condition))
-    )
+    runs = constants.condition_value(node.condition, context.state.constant) is True
+    _pretested_loop(context, node, runs=runs)
 
 
 def repeat(context: Context, node: tree.Repeat) -> None:
     """Analyse a loop with its test at the end."""
-    _loop(context, node, node.body)
+    _loop(context, node, *node.body)
     if not context.state.ended:
         require_value(context.state, node.condition)
 
@@ -74,7 +64,7 @@ def for_(context: Context, node: tree.For) -> None:
     """Analyse a counting loop."""
     state = context.state
     require_value(state, node.first, node.last, node.step)
-    passes = state.iteration_count(node)
+    passes = constants.iteration_count(node, state.constant)
     variable = state.variable(node.variable, VariableKind.SCALAR)
     if passes == 0:
         return
@@ -83,36 +73,29 @@ def for_(context: Context, node: tree.For) -> None:
     if passes == 1:
         context.follow(node.body)
     else:
-        _loop_that_may_not_run(context, node, node.head, "FOR", (node.body,), certain=passes is not None)
+        _pretested_loop(context, node, runs=passes is not None)
 
 
-def _loop_that_may_not_run(
-    context: Context, node: tree.Statement, head: Span, word: str, body: tuple[tree.Statement, ...], *, certain: bool
-) -> None:
-    """Analyse a loop that may not run at all."""
-    state = context.state
-    message, advice = (
-        f"it gets a value inside this {word}, which may not run at all",
-        f"give it a value before the {word}",
-    )
-    divergence = state.divergence(head, message, advice)
-    if certain:
-        _loop(context, node, body)
-    else:
-        with state.conditional():
-            _loop(context, node, body, divergence)
+def _pretested_loop(context: Context, node: tree.While | tree.For, *, runs: bool) -> None:
+    """Analyse a loop that may not run at all unless it is certain that it ``runs``."""
+    if runs:
+        _loop(context, node, node.body)
+        return
+    state, word = context.state, type(node).__name__.upper()
+    message, advice = f"inside this {word}, which may not run at all", f"give it a value before the {word}"
+    divergence = state.divergence(node.head, f"it gets a value {message}", advice)
+    with state.conditional():
+        _loop(context, node, node.body, divergence=divergence)
 
 
-def _loop(
-    context: Context, node: tree.Statement, body: tuple[tree.Statement, ...], divergence: Divergence | None = None
-) -> None:
+def _loop(context: Context, node: tree.Statement, *body: tree.Statement, divergence: Divergence | None = None) -> None:
     """Analyse a loop: its first pass, then any pass, with what the loop changes invalidated.
 
     Args:
         context: the analysis.
         node: the loop.
         body: its statements.
-        divergence: of a loop that may not run once.
+        divergence: of a loop that may not run at all.
     """
     state, effects = context.state, context.side_effects(node)
     if state.is_first_pass:
@@ -131,7 +114,7 @@ def _loop(
     state.forget(effects)
     again = context.path(*body, mark=mark)
     context.loops -= 1
-    context.merge(*(again,) if divergence is None else (none, again), divergence=divergence)
+    context.merge(*() if divergence is None else (none,), again, divergence=divergence)
 
 
 def cobegin(context: Context, node: tree.Cobegin) -> None:
@@ -142,7 +125,9 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     outcomes, uses = [], []
     mark = facts.checkpoint()
     for number, branch in enumerate(node.branches):
-        own, others = effects[number], _effects_of_others(effects, number)
+        own = effects[number]
+        # Of many branches, the others may change anything.
+        others = union((*effects[:number], *effects[number + 1 :])) if len(effects) <= _MAX_BRANCHES else ANYTHING
         state.forget(others)
         state.last.set(LAST, last)
         facts.uncertainties = (*uncertainties, _uncertainty(context, own, others))
@@ -200,8 +185,8 @@ def try_(context: Context, node: tree.Try) -> None:
 
 def _assigned_before_failure(context: Context, statements: Sequence[tree.Statement]) -> Iterator[str]:
     """Yield the variables that are assigned before any statement can fail."""
-    for link in itertools.takewhile(lambda statement: isinstance(statement, tree.Assign | tree.Print), statements):
-        name = context.state.variable(link.target) if isinstance(link, tree.Assign) else None
+    for statement in takewhile(lambda statement: isinstance(statement, tree.Assign | tree.Print), statements):
+        name = context.state.variable(statement.target) if isinstance(statement, tree.Assign) else None
         if name is not None and not is_any_element(name):
             yield name
 
@@ -215,13 +200,8 @@ def lock(context: Context, node: tree.Lock) -> None:
 def end(context: Context, node: tree.Halt | tree.Retry) -> None:
     """End this path."""
     # A RETRY without a TRY has been reported.
-    message = isinstance(node, tree.Halt) or context.recovering
-    context.state.ended, context.state.end_span = True, node.span if message else None
-
-
-def _effects_of_others(effects: list[SideEffects], number: int) -> SideEffects:
-    """Return the side effects of all branches but one; of many branches, anything."""
-    return ANYTHING if len(effects) > _MAX_BRANCHES else union((*effects[:number], *effects[number + 1 :]))
+    is_valid = isinstance(node, tree.Halt) or context.recovering
+    context.state.ended, context.state.end_span = True, node.span if is_valid else None
 
 
 STEPS: Steps = {
@@ -231,13 +211,13 @@ STEPS: Steps = {
     tree.Repeat: repeat,
     tree.For: for_,
     tree.Cobegin: cobegin,
-    tree.Signal: of_state(event),
-    tree.Wait: of_state(event),
-    tree.Pause: of_state(pause),
+    tree.Signal: lambda context, node: require_indices(context.state, node.event),
+    tree.Wait: lambda context, node: require_indices(context.state, node.event),
+    tree.Pause: lambda context, node: require_value(context.state, node.duration),
     tree.Lock: lock,
     tree.Try: try_,
     tree.Retry: end,
     tree.Halt: end,
-    tree.Call: lambda context, node: context.call(node),
+    tree.Call: call,
     tree.Poison: lambda context, node: context.state.forget(context.side_effects(node)),
 }

@@ -45,25 +45,17 @@ class FrameState:
         """
         self._facts, self._rigid = facts, rigid
         self._children: dict[str, int] = {}
-        self._count = self._carried = self._unknown_parents = self._assignments = self._order = 0
-        self.links: FactTable[Link | None] = FactTable(
-            facts, default=None, unknown=ANY_LINK, joined=join_links, watch=self._watch
-        )
-        self.may_be_assigned = FactTable(facts, default=False, unknown=True, joined=or_)
+        self._count = self._carried = self._unknown_parents = self._assignments = 0
+        self.links: FactTable[Link | None] = FactTable(facts, None, ANY_LINK, join_links, watch=self._watch)
+        self.may_be_assigned = FactTable(facts, False, True, or_)
         # Of what may have a value, whether it is definitely assigned, or where the paths diverge.
-        self.definitely_assigned: FactTable[Divergence | bool] = FactTable(
-            facts, default=False, unknown=True, joined=self._join_assigned
-        )
+        self.definitely_assigned: FactTable[Divergence | bool] = FactTable(facts, False, True, self._join_assigned)
         self.divergence: Divergence | None = None
         # Poses of frames relative to their parents.
-        self._steps: FactTable[Pose | None] = FactTable(facts, default=None, unknown=None, joined=agreed_value)
-        self.assigned: FactTable[Assignment | None] = FactTable(facts, default=None, unknown=None, joined=agreed_value)
-        self.grippers = FactTable(
-            facts, default=GripperState(), unknown=ANY_GRIPPER, joined=join_grippers, group=GRIPPERS
-        )
-        self.grips: FactTable[Grip | None] = FactTable(
-            facts, default=None, unknown=ANY_GRIP, joined=join_grips, group=GRIPS
-        )
+        self._steps: FactTable[Pose | None] = FactTable(facts, None, None, agreed_value)
+        self.assigned: FactTable[Assignment | None] = FactTable(facts, None, None, agreed_value)
+        self.grippers = FactTable(facts, GripperState(), ANY_GRIPPER, join_grippers, GRIPPERS)
+        self.grips: FactTable[Grip | None] = FactTable(facts, None, ANY_GRIP, join_grips, GRIPS)
         frames = dict(cell.frames) if cell else {}
         for name in (WORLD, STATION, *frames):
             self.mark_assigned(name)
@@ -189,24 +181,23 @@ class FrameState:
 
     def set_world_pose(self, name: str, pose: Pose | None) -> None:
         """Record the pose of a frame in WORLD, unless assigning one may move others."""
-        link = None if is_any_element(name) else self.links[name]
-        if is_any_element(name) or pose is None or self._rigid or (link is not None and link.parent is None):
+        if is_any_element(name) or pose is None or self._rigid:
             return
-        above = IDENTITY if link is None or link.parent is None else self.world_pose(link.parent)
-        self._steps.set(name, None if above is None else compose(inverse(above), pose))
+        link = self.links[name] or Link(WORLD)
+        if link.parent is not None:
+            parent_pose = self.world_pose(link.parent)
+            self._steps.set(name, None if parent_pose is None else compose(inverse(parent_pose), pose))
 
     def assign(self, name: str, span: Span) -> None:
         """Record the assignment of a pose to a frame."""
         self._assignments += 1
-        self._order += 1
         if is_any_element(name):
             self.forget(name)
             return
-        self.assigned.set(name, Assignment(self._order, span, moved=self.may_be_assigned[name]))
+        self.assigned.set(name, Assignment(self._assignments, span, moved=self.may_be_assigned[name]))
         self._steps.set(name, None)
         self.mark_assigned(name)
-        root = self.rigid_root(name)
-        if root is None:
+        if (root := self.rigid_root(name)) is None:
             self.forget_grippers()
         else:
             self.displace(root)
@@ -249,10 +240,8 @@ class FrameState:
     def open(self, arm: str, span: Span) -> None:
         """Open the fingers."""
         grip = self.grips[arm]
-        grasped = None if grip is None or grip.frame == UNKNOWN else grip.frame
-        released = (
-            None if grasped is None or (link := self.links[grasped]) is None or link.parent != arm else (grasped, span)
-        )
+        link = None if grip is None or grip.frame == UNKNOWN else self.links[grip.frame]
+        released = (grip.frame, span) if grip and link and link.parent == arm else None
         self.grippers.set(arm, attrs.evolve(self.grippers[arm], open=True, doubtful=False, opened=span, left=released))
         self.grips.set(arm, None)
 
@@ -266,13 +255,9 @@ class FrameState:
 
     def forget(self, name: str) -> None:
         """Invalidate the facts about a frame, and about grippers that may be at it."""
-        if is_any_element(name):
-            self._facts.invalidate(name)
-        else:
-            self.links.set(name, self.links.unknown)
-            self.mark_assigned(name)
-            self.assigned.set(name, None)
-            self._steps.set(name, None)
+        if not is_any_element(name):
+            self.links.set(name, ANY_LINK)
+        self.forget_pose(name)
         self.forget_grippers()
 
     def forget_gripper(self, arm: str | None, *, grasps: bool) -> None:
@@ -283,8 +268,8 @@ class FrameState:
             grasps: whether it may have closed its fingers on something.
         """
         if arm is not None:
-            self.grippers.set(arm, self.grippers.unknown)
-            self.grips.set(arm, self.grips.unknown if grasps else self.grips[arm])
+            self.grippers.set(arm, ANY_GRIPPER)
+            self.grips.set(arm, ANY_GRIP if grasps else self.grips[arm])
         else:
             for name in (GRIPPERS, GRIPS) if grasps else (GRIPPERS,):
                 self._facts.invalidate(name)

@@ -54,6 +54,12 @@ class Outcome:
     changed: Mapping[tuple["FactTable[Any]", str], Any]
     invalidated: Mapping[str, int]
 
+    def value(self, table: "FactTable[V]", key: str) -> V:
+        """Return the value of a name at the end of the path."""
+        entry = table, key
+        value: V = self.changed[entry] if entry in self.changed else table.value_after(key, self.invalidated)
+        return value
+
 
 class Facts:
     """All tables of facts, with a log by which they are rolled back together."""
@@ -98,7 +104,7 @@ class Facts:
         while len(self.changes) > mark:
             table, key, old = self.changes.pop()
             if table is not None:
-                table.restore(key, old)
+                table.write(key, old)
             elif old is None:
                 del self.invalidated[key]
             else:
@@ -113,14 +119,8 @@ class Facts:
         """
         joined: list[tuple[FactTable[Any], str, Any]] = []
         for table, key in dict.fromkeys(entry for outcome in outcomes for entry in outcome.changed):
-            values = [
-                outcome.changed[table, key]
-                if (table, key) in outcome.changed
-                else table.value_after(key, outcome.invalidated)
-                for outcome in outcomes
-                if not concurrent or (table, key) in outcome.changed
-            ]
-            joined.append((table, key, reduce(table.joined, values)))
+            taken = [outcome for outcome in outcomes if not concurrent or (table, key) in outcome.changed]
+            joined.append((table, key, reduce(table.joined, (outcome.value(table, key) for outcome in taken))))
         for name in dict.fromkeys(name for outcome in outcomes for name in outcome.invalidated):
             last = max(outcome.invalidated.get(name, 0) for outcome in outcomes)
             if last != self.invalidated.get(name):
@@ -130,52 +130,38 @@ class Facts:
             table.set(key, value)
 
 
+@attrs.define(eq=False)
 class FactTable(Generic[V]):
-    """One kind of fact, by name."""
+    """One kind of fact, by name.
 
-    def __init__(
-        self,
-        facts: Facts,
-        *,
-        default: V,
-        unknown: V,
-        joined: Callable[[V, V], V],
-        group: str = "",
-        watch: Callable[[V, int], None] | None = None,
-    ) -> None:
-        """Make an empty table.
+    Attributes:
+        facts: all tables.
+        default: value of names without an entry.
+        unknown: value of invalidated names (the top of the lattice).
+        joined: the join of the values of two paths.
+        group: a key that invalidates the whole table.
+        watch: called with each value that is written and 1, and with each that is overwritten and -1.
+    """
 
-        Args:
-            facts: all tables.
-            default: value of names without an entry.
-            unknown: value of invalidated names (the top of the lattice).
-            joined: the join of the values of two paths.
-            group: a key that invalidates the whole table.
-            watch: called with each value that is written and 1, and with each that is overwritten and -1.
-        """
-        self._facts, self._group, self._watch = facts, group, watch
-        self.default, self.unknown, self.joined = default, unknown, joined
-        self._none = (default, 0)
-        self._entries: dict[str, tuple[V, int]] = {}
+    facts: Facts
+    default: V
+    unknown: V
+    joined: Callable[[V, V], V]
+    group: str = ""
+    watch: Callable[[V, int], None] | None = None
+    _entries: dict[str, tuple[V, int]] = attrs.field(factory=dict, init=False)
 
     def __getitem__(self, key: str) -> V:
         """Return the value of a name."""
-        invalidated = self._facts.invalidated
-        if invalidated:
-            return self.value_after(key, invalidated)
-        return self._entries.get(key, self._none)[0]
+        return self.value_after(key, self.facts.invalidated)
 
     def value_after(self, key: str, invalidated: Mapping[str, int]) -> V:
         """Return the value of a name after these names have been invalidated."""
-        value, version = self._entries.get(key, self._none)
-        array_name, bracket, _ = key.partition("[")
-        invalidated_at = invalidated.get(f"{array_name}[]" if bracket else key, 0)
-        if (
-            version < invalidated_at
-            or version < invalidated.get(EVERYTHING, 0)
-            or version < invalidated.get(self._group, 0)
-        ):
-            return self.unknown
+        value, version = self._entries.get(key) or (self.default, 0)
+        if invalidated:
+            latest = invalidated.get
+            if version < max(latest(any_element_name(key), 0), latest(EVERYTHING, 0), latest(self.group, 0)):
+                return self.unknown
         return value
 
     def items(self) -> Iterator[tuple[str, V]]:
@@ -185,27 +171,21 @@ class FactTable(Generic[V]):
 
     def set(self, key: str, value: V) -> None:
         """Set the value of a name."""
-        facts = self._facts
+        facts = self.facts
         if facts.uncertainties and facts.is_uncertain(key):
             value = self.unknown
-        old = self._entries.get(key)
-        facts.changes.append((self, key, old))
-        self._write(key, old, (value, facts.version))
+        facts.changes.append((self, key, self._entries.get(key)))
+        self.write(key, (value, facts.version))
 
-    def restore(self, key: str, old: tuple[V, int] | None) -> None:
-        """Restore an entry."""
-        self._write(key, self._entries.get(key), old)
-
-    def _write(self, key: str, old: tuple[V, int] | None, new: tuple[V, int] | None) -> None:
-        if self._watch is not None:
-            if old is not None:
-                self._watch(old[0], -1)
-            if new is not None:
-                self._watch(new[0], 1)
-        if new is None:
-            del self._entries[key]
-        else:
-            self._entries[key] = new
+    def write(self, key: str, entry: tuple[V, int] | None) -> None:
+        """Write an entry, or remove it."""
+        old = self._entries.pop(key, None) if entry is None else self._entries.get(key)
+        if entry is not None:
+            self._entries[key] = entry
+        if self.watch is not None:
+            for value, count in ((old, -1), (entry, 1)):
+                if value is not None:
+                    self.watch(value[0], count)
 
 
 def agreed_value(value: V | None, other: V | None) -> V | None:

@@ -5,7 +5,7 @@ from armwright.program.flow_analysis.context import Context, Steps
 from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import warn_of_implicit_unfix
-from armwright.program.flow_analysis.state import FlowState
+from armwright.program.flow_analysis.state import LAST, FlowState
 from armwright.program.language.diagnostic import Label, Severity, labels
 from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED
@@ -159,7 +159,8 @@ def _report_not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
     link, name, here = state.table.links[moved], state.name(moved), state.table.affix_labels(moved, "affixed here")
     parent = state.name(link.parent) if link and link.parent else WORLD
     text, label = f"`{name}` cannot be moved: it is not affixed to an arm", f"is attached to {parent}, not to an arm"
-    arm = state.last_arm() or state.some_arm()
+    last = state.last[LAST]
+    arm = state.some_arm() if last in (None, UNKNOWN) else last
     advice = "" if moved == WORLD else f"grasp it and write `AFFIX {name} TO {arm}` first"
     state.report("E301", text, node.moved.span, label, secondary=here, advice=advice)
 

@@ -5,6 +5,7 @@ A pose is twelve numbers, columns n, o, a, p, in metres.
 
 import math
 from collections.abc import Sequence
+from operator import add, mul
 from typing import TYPE_CHECKING, TypeAlias
 
 from armwright.program.language.kinds import VariableKind
@@ -23,17 +24,15 @@ _NUMBERS = 12
 
 def compose(first: Pose, step: Pose) -> Pose:
     """Return the composition of a pose and a transformation."""
-    rotated = [
-        sum(first[3 * k + row] * step[3 * column + k] for k in range(3)) for column in range(4) for row in range(3)
-    ]
-    return (*rotated[:9], *(first[9 + row] + rotated[9 + row] for row in range(3)))
+    columns, rows = (step[i : i + 3] for i in (0, 3, 6, 9)), [first[row:9:3] for row in range(3)]
+    rotated = [sum(map(mul, row, column)) for column in columns for row in rows]
+    return (*rotated[:9], *map(add, first[9:], rotated[9:]))
 
 
 def inverse(pose: Pose) -> Pose:
     """Return the inverse transformation."""
-    rotated = [pose[3 * column + row] for row in range(3) for column in range(3)]
-    back = [-sum(pose[3 * row + k] * pose[9 + k] for k in range(3)) for row in range(3)]
-    return (*rotated, *back)
+    shift = (-sum(map(mul, pose[i : i + 3], pose[9:])) for i in (0, 3, 6))
+    return (*pose[0:9:3], *pose[1:9:3], *pose[2:9:3], *shift)
 
 
 def constant_pose(state: "FlowState", node: tree.Expression) -> Pose | None:
@@ -102,14 +101,13 @@ def _lengths(state: "FlowState", nodes: Sequence[tree.Expression]) -> tuple[floa
 
 def _numbers(state: "FlowState", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
     """Return numbers in the units of the program."""
-    pose = []
+    numbers = []
     for node in nodes:
         if isinstance(node, tree.Number):
             number = None if math.isnan(node.value) else convert(node.value, node.unit, state.symbols.units)
         else:
-            known = state.number(node)
-            number = None if known is None else known[0]
+            number = state.constant(node)
         if number is None:
             return None
-        pose.append(number)
-    return tuple(pose)
+        numbers.append(number)
+    return tuple(numbers)

@@ -102,42 +102,29 @@ class FlowState:
         self.side_effects = SideEffectAnalysis(program, symbols)
         self.facts = Facts()
         self.table = FrameState(cell, self.facts, rigid=self.side_effects.rigid)
-        self.numbers: FactTable[tuple[float, Span] | None] = FactTable(
-            self.facts, default=None, unknown=None, joined=agreed_value
-        )
-        self.steps: FactTable[Pose | None] = FactTable(self.facts, default=None, unknown=None, joined=agreed_value)
-        self.last: FactTable[str | None] = FactTable(self.facts, default=None, unknown=UNKNOWN, joined=_join_arms)
+        self.numbers: FactTable[tuple[float, Span] | None] = FactTable(self.facts, None, None, agreed_value)
+        self.steps: FactTable[Pose | None] = FactTable(self.facts, None, None, agreed_value)
+        self.last: FactTable[str | None] = FactTable(self.facts, None, UNKNOWN, _join_arms)
         self.now = Activation(scope=symbols.scope(None))
         self.calls: list[Called] = []
         self.branches: list[Uses] = []
         self.is_first_pass = self.ended = False
         self.end_span: Span | None = None
         self.conditions = 0
-        self._arms: dict[int, str | None] = {}
-        self._implied: dict[int, bool] = {}
+        # Results by where a statement starts: its arm on all paths, and whether an AFFIX is implied on all of them.
+        self.arms: dict[int, str | None] = {}
+        self.implied: dict[int, bool] = {}
         self._reported_slots: set[str] = set()
         self._reported: set[tuple[str, Span]] = set()
         for name in symbols.imported:
             self.table.forget(name)
 
-    # ---- results for code generation ---------------------------------------------------------------------------------
-
-    @property
-    def arms(self) -> dict[int, str]:
-        """The arms of MOVEs and GRASPs that are the same on every path through them, by where they start."""
-        return {start: arm for start, arm in self._arms.items() if arm is not None}
-
-    @property
-    def implied(self) -> frozenset[int]:
-        """The MOVEs that always affix the grasped frame to its arm first, by where they start."""
-        return frozenset(start for start, always in self._implied.items() if always)
-
     def record(self, statement: tree.Move | tree.Grasp, arm: str | None, *, implied: bool = False) -> None:
         """Record the arm of a statement on this path through it; None where it is unknown."""
         if not self.is_first_pass:
             start = statement.span.start
-            self._arms[start] = arm if self._arms.get(start, arm) == arm else None
-            self._implied[start] = implied and self._implied.get(start, True)
+            self.arms[start] = arm if self.arms.get(start, arm) == arm else None
+            self.implied[start] = implied and self.implied.get(start, True)
 
     # ---- names -------------------------------------------------------------------------------------------------------
 
@@ -170,8 +157,8 @@ class FlowState:
         slot = self.slot_of(key)
         if not indices or slot is None:
             return slot
-        numbers = [self._index(*pair) for pair in zip(indices, result.sizes, strict=False)]
-        known = [str(number) for number in numbers if number is not None]
+        pairs = zip(map(self.constant, indices), result.sizes, strict=False)
+        known = [f"{value:.0f}" for value, size in pairs if value and value.is_integer() and 1 <= value <= size]
         return f"{slot}[{','.join(known) if len(known) == len(result.sizes) else ''}]"
 
     def frame(self, node: object) -> str | None:
@@ -184,7 +171,7 @@ class FlowState:
             # A number that was reported before is NaN, one with a unit depends on the units of the program.
             return None if node.unit or node.value != node.value else (node.value, node.span)
         if isinstance(node, tree.Binary | tree.Unary):
-            result = constants.constant_value(node, self._known)
+            result = constants.constant_value(node, self.constant)
             return None if result is None else (result, node.span)
         name = self.variable(node, VariableKind.SCALAR)
         return None if name is None or is_any_element(name) else self.numbers[name]
@@ -197,16 +184,9 @@ class FlowState:
         self.table.mark_assigned(name)
         self.numbers.set(name, None if value is None else (value[0], span))
 
-    def condition_value(self, node: tree.Expression) -> bool | None:
-        """Return the value of a condition; None where it is not constant."""
-        return constants.condition_value(node, self._known)
-
-    def iteration_count(self, node: tree.For) -> int | None:
-        """Return the iterations of a FOR: 0, 1, or 2 for more; None where they are not constant."""
-        return constants.iteration_count(node, self._known)
-
-    def _known(self, node: tree.Expression) -> float | None:
-        result = None if isinstance(node, tree.Binary | tree.Unary) else self.number(node)
+    def constant(self, node: tree.Expression) -> float | None:
+        """Return the value of a constant number; None where it is not constant."""
+        result = self.number(node)
         return None if result is None else result[0]
 
     def name(self, slot: str) -> str:
@@ -218,15 +198,6 @@ class FlowState:
     def some_arm(self) -> str:
         """Return an arm to name in advice."""
         return min(self.cell.arms, default="ARM_1") if self.cell else "ARM_1"
-
-    def last_arm(self) -> str | None:
-        """Return the arm named or moved last, for advice."""
-        return None if (arm := self.last[LAST]) == UNKNOWN else arm
-
-    def _index(self, node: tree.Expression, size: int) -> int | None:
-        known = self.number(node)
-        value = 0.0 if known is None else known[0]
-        return int(value) if value.is_integer() and 1 <= value <= size else None
 
     # ---- reachability ------------------------------------------------------------------------------------------------
 
@@ -279,13 +250,11 @@ class FlowState:
 
         What had no value before may have one then, or none: there the paths diverge.
         """
-        names = effects.values | effects.posed | effects.affixed
-        lacking = [
-            name for name in self.slots(names) if not is_any_element(name) and not self.table.may_be_assigned[name]
-        ]
+        slots = self.slots(effects.values | effects.posed | effects.affixed)
+        unassigned = [slot for slot in slots if not is_any_element(slot) and not self.table.may_be_assigned[slot]]
         self.forget(effects)
-        for name in lacking:
-            self.table.definitely_assigned.set(name, divergence or False)
+        for slot in unassigned:
+            self.table.definitely_assigned.set(slot, divergence or False)
 
     def forget(self, effects: SideEffects) -> None:
         """Invalidate what a part of the program may change."""
