@@ -161,10 +161,8 @@ def thesis_fit(data: BoardMeasurement) -> Array:
         reached = chain().forward(data.q, errors)
         residual = reached.position - data.points
         size = np.linalg.norm(residual, axis=1)
-        slope = (
-            np.einsum("mi,mik->k", residual / np.maximum(size, 1e-12)[:, None], reached.position_jacobian)[fitted]
-            * bound
-        )
+        direction = residual / np.maximum(size, 1e-12)[:, None]
+        slope = np.einsum("mi,mik->k", direction, reached.position_jacobian)[fitted] * bound
         return float(size.sum() * 1e3), slope * 1e3
 
     start, bounds = np.zeros(len(fitted)), [(-1.0, 1.0)] * len(fitted)

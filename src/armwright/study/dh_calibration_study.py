@@ -87,11 +87,5 @@ def _parameter(row: ParameterRow) -> tuple[str, ...]:
     def shown(x: float | None, spec: str, absent: str = "") -> str:
         return absent if x is None else format(x * scale, spec)
 
-    return (
-        row.name,
-        unit,
-        shown(row.true, "+z.3f"),
-        shown(row.thesis, "+z.3f"),
-        shown(row.ours, "+z.3f", "fixed"),
-        shown(row.standard_error, ".3f"),
-    )
+    true, thesis, ours = shown(row.true, "+z.3f"), shown(row.thesis, "+z.3f"), shown(row.ours, "+z.3f", "fixed")
+    return row.name, unit, true, thesis, ours, shown(row.standard_error, ".3f")

@@ -138,11 +138,6 @@ def arm() -> Linkage:
     return load_linkage("five-bar")
 
 
-def feature_sweep() -> FeatureSweep:
-    """Return the task of the sweep, with a single run for each of its 729 points as in the thesis."""
-    return FeatureSweep(linkage=arm(), paths=PATHS, simulation_settings=SETTINGS, replicates=0)
-
-
 def run_sweep(progress: Callable[[str, float], None] | None = None, *, levels: Sequence[float] = LEVELS) -> SweepResult:
     """Simulate the 729 linkages on three paths and fit models to the nine features.
 
@@ -156,7 +151,8 @@ def run_sweep(progress: Callable[[str, float], None] | None = None, *, levels: S
     check_extra()  # before the simulations, which take a minute
     report = progress or (lambda _task, _part: None)
     points = np.array(list(product(levels, repeat=3)))
-    task, block, parts = feature_sweep(), 96, []
+    # A single run for each point, as in the thesis.
+    task, block, parts = FeatureSweep(linkage=arm(), paths=PATHS, simulation_settings=SETTINGS, replicates=0), 96, []
     for first in range(0, len(points), block):
         parts.append(task(points[first : first + block]))
         report(f"simulating {len(points)} linkages on {len(PATHS)} paths", min(1.0, (first + block) / len(points)))
@@ -291,15 +287,9 @@ def _measured_features(name: str, selected: Iterable[str]) -> Array:
 def _estimate(name: str, method: str, ours: Array) -> EstimateRow:
     true = np.array(ARMS[name])
     accuracy = 100 * (1 - np.abs(ours / true - 1))
-    return EstimateRow(
-        arm=name,
-        method=method,
-        true=tuple(true * 1e3),
-        printed=PRINTED_ESTIMATES.get((name, method)),
-        ours=tuple(float(x) * 1e3 for x in ours),
-        printed_mean=PRINTED_MEANS.get((name, method)),
-        accuracy=tuple(map(float, accuracy)),
-    )
+    printed, printed_mean = PRINTED_ESTIMATES.get((name, method)), PRINTED_MEANS.get((name, method))
+    millimetres = tuple(float(x) * 1e3 for x in ours)
+    return EstimateRow(name, method, tuple(true * 1e3), printed, millimetres, printed_mean, tuple(accuracy.tolist()))
 
 
 def _in_print(values: Features) -> tuple[float, ...]:

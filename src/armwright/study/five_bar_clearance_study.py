@@ -66,10 +66,7 @@ class FiveBarClearance:
         yield ResultTable(
             title="Table 5.3: repeatability of 30 cycles [mm]; ours leaning in the friction cone and encoder noise",
             heads=("arm", "c2", "c3", "c4", "printed", "ours"),
-            rows=[
-                (row.arm, *_fixed(row.clearances, 3), f"{row.printed:.3f}", f"{row.ours:.3f}")
-                for row in self.repeatability
-            ],
+            rows=[(row.arm, *_fixed((*row.clearances, row.printed, row.ours), 3)) for row in self.repeatability],
         )
         yield ResultTable(
             title="Table 5.4: features of arm A: slope mm/s, intercept mm, amplitude mm",
@@ -98,14 +95,11 @@ class FiveBarClearance:
                 heads=("arm", "case", "", "Q1", "Q2", "Q3", "mean"),
                 rows=[line for row in rows for line in _target(row)],
             )
-        ours = (self.corrected.nodes * 1e3).tolist()
+        nodes = zip(("p1", "p3", "p5"), study.PRINTED_NODES, (self.corrected.nodes * 1e3).tolist(), strict=True)
         yield ResultTable(
             title="Table 5.11: nodes of the corrected path [mm]",
             heads=("node", "printed x", "y", "ours x", "y"),
-            rows=[
-                (f"p{2 * i + 1}", *_fixed((*printed, *computed), 3))
-                for i, (printed, computed) in enumerate(zip(study.PRINTED_NODES, ours, strict=True))
-            ],
+            rows=[(node, *_fixed((*printed, *ours), 3)) for node, printed, ours in nodes],
         )
 
     def figures(self) -> dict[str, str | bytes]:

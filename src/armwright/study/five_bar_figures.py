@@ -1,5 +1,9 @@
 """The figures of the study of the five-bar with joint clearance."""
 
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
 import numpy as np
 
 from armwright.arrays import Array
@@ -8,14 +12,14 @@ from armwright.clearance.correction import Correction
 from armwright.clearance.features import WINDOW, spectrum
 from armwright.clearance.ideal import tip_position
 from armwright.clearance.paths import Path, PickAndPlace, named_path
-from armwright.clearance.scenario import prepare_scenario
+from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.report.clearance_figures import paths, spectrum_figure, surface
 from armwright.report.clearance_run_figures import clearance_run_figures
 from armwright.report.figures import curves
 from armwright.study import five_bar_clearance as study
 
-_TIME, _ERROR = "time, s", "error, mm"
+_over_time = partial(curves, x_label="time, s")
 _SHOWN = {"slope": "slope, mm/s", "intercept": "intercept, mm", "amp_dc": "amplitude, mm"}
 
 
@@ -27,7 +31,7 @@ def figures(swept: study.SweepResult, correction: Correction) -> dict[str, str |
 def _single_run() -> dict[str, str | bytes]:
     """Draw figures 4.6 to 4.9: path y1 with a clearance of half a millimetre in every joint."""
     run = _half("y1")
-    files: dict[str, str | bytes] = {"figure4.06.svg": _torques("Figure 4.6: drives on path y1", named_path("y1"))}
+    files: dict[str, str | bytes] = {"figure4.06.svg": _torques("Figure 4.6: drives on path y1", run.scenario)}
     numbers = {"path": "4.07", "bearings": "4.08", "error": "4.09"}
     for drawing in clearance_run_figures(ClearanceRun.of(run)):
         if drawing.name in numbers:
@@ -37,27 +41,15 @@ def _single_run() -> dict[str, str | bytes]:
 
 def _curves() -> dict[str, str | bytes]:
     """Draw figures 4.10 to 4.13: error curves of paths along y and x, and their spectra."""
-    files: dict[str, str | bytes] = {}
-    y = {name: _half(name) for name in ("y1", "y3")}
-    files["figure4.10.svg"] = curves(
-        "Figure 4.10: error curves along y, and the straight part that is fitted",
-        y["y1"].time,
-        {name: run.distance * 1e3 for name, run in y.items()},
-        x_label=_TIME,
-        y_label=_ERROR,
-        spans=(WINDOW,),
-        fits={f"fit of {name}": _fit(run) for name, run in y.items()},
-    )
-    x = {name: _half(name) for name in ("x2", "x5")}
+    y, x = ({name: _half(name) for name in names} for names in (("y1", "y3"), ("x2", "x5")))
     first = x["x2"]
-    files["figure4.11.svg"] = curves(
-        "Figure 4.11: error curves along x",
-        first.time,
-        {name: run.distance * 1e3 for name, run in x.items()},
-        x_label=_TIME,
-        y_label=_ERROR,
-        spans=[tuple(first.scenario.path.knots[1:3])],
-    )
+    start, end = first.scenario.path.knots[1:3]
+    fits = {f"fit of {name}": _fit(run) for name, run in y.items()}
+    title = "Figure 4.10: error curves along y, and the straight part that is fitted"
+    files: dict[str, str | bytes] = {
+        "figure4.10.svg": _error_curves(title, y, WINDOW, fits=fits),
+        "figure4.11.svg": _error_curves("Figure 4.11: error curves along x", x, (start, end)),
+    }
     spectra = {name: spectrum(run.distance) * 1e3 for name, run in x.items()}
     frequencies = np.arange(len(spectra["x2"])) / (len(first.time) * (first.time[1] - first.time[0]))
     for number, title, highest in (
@@ -79,13 +71,9 @@ def _surfaces(swept: study.SweepResult) -> dict[str, str | bytes]:
         table = swept.values[f"y1_{feature}"].reshape(9, 9, 9) * 1e3
         for c3 in (0.1e-3, 0.25e-3, 0.5e-3):
             k = int(np.abs(levels - c3).argmin())
-            files[f"figure4.{number}.svg"] = surface(
-                f"Figure 4.{number}: {label.partition(',')[0]} on path y1, play of J3 {c3 * 1e3:g} mm",
-                levels * 1e3,
-                levels * 1e3,
-                table[:, k, :],
-                ("play of J2, mm", "play of J4, mm", label),
-            )
+            title = f"Figure 4.{number}: {label.partition(',')[0]} on path y1, play of J3 {c3 * 1e3:g} mm"
+            axes = ("play of J2, mm", "play of J4, mm", label)
+            files[f"figure4.{number}.svg"] = surface(title, levels * 1e3, levels * 1e3, table[:, k, :], axes)
             number += 1
     return files
 
@@ -98,14 +86,8 @@ def _arm_a() -> dict[str, str | bytes]:
             "speed of centres, as the thesis": study.run_of("A", path, study.SETTINGS),
             "speed of surfaces": study.run_of("A", path, study.SURFACE),
         }
-        files[f"figure5.{number:02d}.svg"] = curves(
-            f"Figure 5.{number}: error of arm A on path {path}",
-            next(iter(both.values())).time,
-            {name: run.distance * 1e3 for name, run in both.items()},
-            x_label=_TIME,
-            y_label=_ERROR,
-            spans=(WINDOW,),
-        )
+        title = f"Figure 5.{number}: error of arm A on path {path}"
+        files[f"figure5.{number:02d}.svg"] = _error_curves(title, both, WINDOW)
     return files
 
 
@@ -116,20 +98,14 @@ def _corrected(correction: Correction) -> dict[str, str | bytes]:
     runs = {name: _simulated(path, study.ARMS["A"]) for name, path in both.items()}
     wanted = tip_position(study.arm(), runs["path as it is"].scenario.ideal.q) * 1e3
     told = {name: tip_position(study.arm(), run.scenario.ideal.q) * 1e3 for name, run in runs.items()}
+    commanded = {name: {"wanted": wanted, "told": told[name]} for name in both}
+    taken = {name: {"wanted": wanted, "taken": run.tip * 1e3} for name, run in runs.items()}
     files: dict[str, str | bytes] = {
-        "figure5.10.svg": paths(
-            "Figure 5.10: the path, and the path corrected",
-            {name: {"wanted": wanted, "told": told[name]} for name in both},
-            targets,
-        ),
-        "figure5.11.svg": paths(
-            "Figure 5.11: what arm A makes of them",
-            {name: {"wanted": wanted, "taken": run.tip * 1e3} for name, run in runs.items()},
-            targets,
-        ),
+        "figure5.10.svg": paths("Figure 5.10: the path, and the path corrected", commanded, targets),
+        "figure5.11.svg": paths("Figure 5.11: what arm A makes of them", taken, targets),
     }
     for letter, (name, path) in zip("ab", both.items(), strict=True):
-        files[f"figure5.12{letter}.svg"] = _torques(f"Figure 5.12 {letter}: drives, {name}", path)
+        files[f"figure5.12{letter}.svg"] = _torques(f"Figure 5.12 {letter}: drives, {name}", runs[name].scenario)
         times = np.linspace(0.0, path.duration, 1001)
         moment = path.evaluate(times)
         lines = {
@@ -139,7 +115,7 @@ def _corrected(correction: Correction) -> dict[str, str | bytes]:
             "acceleration y, 10 m/s²": moment.acceleration[:, 1] / 10,
         }
         title = f"Figure 5.13 {letter}: speeds and accelerations, {name}"
-        files[f"figure5.13{letter}.svg"] = curves(title, times, lines, x_label=_TIME, y_label="m/s, 10 m/s²")
+        files[f"figure5.13{letter}.svg"] = _over_time(title, times, lines, y_label="m/s, 10 m/s²")
     return files
 
 
@@ -158,9 +134,15 @@ def _fit(run: Simulation) -> tuple[Array, Array]:
     return ends, intercept + slope * ends
 
 
-def _torques(title: str, path: Path) -> str:
-    task = prepare_scenario(study.arm(), path, study.SETTINGS)
+def _torques(title: str, scenario: Scenario) -> str:
     some = slice(None, None, 20)
-    times = np.asarray(np.arange(len(task.ideal.q))[some] * task.h, dtype=np.float64)
-    lines = {f"M{i + 1}": task.ideal.efforts[some, i] for i in range(2)}
-    return curves(title, times, lines, x_label=_TIME, y_label="torque, N m")
+    times = np.asarray(np.arange(len(scenario.ideal.q))[some] * scenario.h, dtype=np.float64)
+    lines = {f"M{i + 1}": scenario.ideal.efforts[some, i] for i in range(2)}
+    return _over_time(title, times, lines, y_label="torque, N m")
+
+
+def _error_curves(title: str, runs: Mapping[str, Simulation], span: tuple[float, float], **options: Any) -> str:
+    """Draw the errors of the tip of some runs, with a span of the time marked."""
+    time = next(iter(runs.values())).time
+    errors = {name: run.distance * 1e3 for name, run in runs.items()}
+    return _over_time(title, time, errors, y_label="error, mm", spans=(span,), **options)

@@ -99,19 +99,14 @@ def joints_along(kind: MoveKind) -> Trajectory:
         return joint_trajectory()
     t = sample_times()
     X = path_of(kind)(t)
-    solver = solver_of(_wide(load_arm("puma560-seed")))
-    start = inverse(load_arm("puma560-seed"), X[0], np.radians(PRINTED_Q[0])).best.q
-    q, _ = chain(solver, X, start)
+    arm = load_arm("puma560-seed")
+    free = {"lower": -np.inf, "upper": np.inf}
+    joints = [attrs.evolve(joint, limits=attrs.evolve(joint.limits, **free)) for joint in arm.joints]
+    start = inverse(arm, X[0], np.radians(PRINTED_Q[0])).best.q
+    q, _ = chain(solver_of(attrs.evolve(arm, joints=joints)), X, start)
     # The velocities at both ends are those of the parabola through three samples.
     first, last = (sign * (-3 * p[0] + 4 * p[1] - p[2]) / (2 * PERIOD) for sign, p in ((1, q[:3]), (-1, q[:-4:-1])))
     return xspline(t, q, first, last)
-
-
-def _wide(arm: Arm) -> Arm:
-    """Return the arm without position limits."""
-    free = {"lower": -np.inf, "upper": np.inf}
-    joints = [attrs.evolve(joint, limits=attrs.evolve(joint.limits, **free)) for joint in arm.joints]
-    return attrs.evolve(arm, joints=joints)
 
 
 @attrs.frozen(kw_only=True)
@@ -140,15 +135,12 @@ def configuration_table() -> list[ConfigurationRow]:
     arm, rows = load_arm("puma560-seed"), []
     for name, printed, X in zip(NAMES, PRINTED_Q, study_poses(), strict=True):
         solution = inverse(arm, X, np.radians(printed))
-        computed = np.degrees(solution.best.q)
+        q, allowed = np.degrees(solution.best.q), tuple(branch.label for branch in solution.allowed)
+        branch, farthest = solution.best.label, float(np.abs(q - printed).max())
+        computed = tuple(q.tolist())
         rows.append(
             ConfigurationRow(
-                pose=name,
-                printed=printed,
-                computed=tuple(computed.tolist()),
-                branch=solution.best.label,
-                farthest=float(np.abs(computed - printed).max()),
-                allowed=tuple(branch.label for branch in solution.allowed),
+                pose=name, printed=printed, computed=computed, branch=branch, farthest=farthest, allowed=allowed
             )
         )
     return rows
@@ -223,9 +215,7 @@ def move_table() -> list[MoveRow]:
     rows = []
     for kind, name in MOVES.items():
         X, joints = poses_along(kind, t), joints_along(kind)
-        uses = {
-            limit: Largest(float(use.max()), int(use.argmax()) + 1) for limit, use in limit_use(arm, joints).items()
-        }
+        uses = limit_use(arm, joints).items()
         rows.append(
             MoveRow(
                 name=name,
@@ -234,9 +224,7 @@ def move_table() -> list[MoveRow]:
                 deviation=_deviation(X[:, :3, 3]),
                 rotation=float(angle_between(X[:-1, :3, :3], X[1:, :3, :3]).sum()),
                 joints=float(np.abs(np.diff(joints(t), axis=0)).sum()),
-                speed=uses["speed"],
-                acceleration=uses["acceleration"],
-                effort=uses["effort"],
+                **{limit: Largest(float(use.max()), int(use.argmax()) + 1) for limit, use in uses},
                 slower=slowing_for_limits(arm, joints)[0],
                 stopped=_stopped(arm, kind),
             )
@@ -288,21 +276,15 @@ def detour_table() -> list[DetourRow]:
         except PathError as error:
             rows.append(DetourRow(method=method, exists=False, summary=str(error)))
         else:
-            rows.append(
-                DetourRow(method=method, exists=True, summary=f"{move.times[-1]:.1f} s; {move.detours[-1].price}")
-            )
+            summary = f"{move.times[-1]:.1f} s; {move.detours[-1].price}"
+            rows.append(DetourRow(method=method, exists=True, summary=summary))
     return rows
 
 
 # Figures of the project: curves over time, the path in space, overviews, and the film.
 CURVES: dict[int, tuple[MoveKind, int]] = {
-    5: ("joint", 0),
-    6: ("joint", 1),
-    7: ("joint", 2),
-    16: ("seed", 0),
-    17: ("seed", 1),
-    18: ("seed", 2),
-}
+    5: ("joint", 0), 6: ("joint", 1), 7: ("joint", 2), 16: ("seed", 0), 17: ("seed", 1), 18: ("seed", 2),
+}  # fmt: skip
 PATHS: dict[int, MoveKind] = {10: "joint", 19: "seed"}
 OVERVIEWS: dict[int, MoveKind] = {22: "joint", 23: "seed"}
 FILM = 25

@@ -34,12 +34,9 @@ class PumaMoves:
     @classmethod
     def run(cls, progress: Callable[[str, float], None] | None = None) -> "PumaMoves":  # noqa: ARG003 - takes seconds
         """Run the study."""
-        return cls(
-            configurations=puma_moves.configuration_table(),
-            angles=puma_moves.angle_table(),
-            moves=puma_moves.move_table(),
-            detours=puma_moves.detour_table(),
-        )
+        configurations, angles = puma_moves.configuration_table(), puma_moves.angle_table()
+        moves, detours = puma_moves.move_table(), puma_moves.detour_table()
+        return cls(configurations=configurations, angles=angles, moves=moves, detours=detours)
 
     def as_data(self) -> dict[str, Any]:
         """Return the tables as plain data."""
@@ -68,16 +65,8 @@ class PumaMoves:
         yield ResultTable(
             title="A second from A by B to C",
             heads=(
-                "move",
-                "inverse solved",
-                "path mm",
-                "deviation from A B C mm",
-                "tool rotates deg",
-                "joints rotate deg",
-                "speed, of limit",
-                "acceleration",
-                "effort",
-                "must run slower",
+                *("move", "inverse solved", "path mm", "deviation from A B C mm", "tool rotates deg"),
+                *("joints rotate deg", "speed, of limit", "acceleration", "effort", "must run slower"),
             ),
             rows=map(_move, self.moves),
         )
@@ -95,21 +84,18 @@ class PumaMoves:
     def figures(self) -> dict[str, str | bytes]:
         """Return the project's figures by the name of their file, the last one as a film."""
         t = puma_moves.sample_times()
-        positions = {name: X[:3, 3] for name, X in zip(puma_moves.NAMES, puma_moves.study_poses(), strict=True)}
+        positions = dict(zip(puma_moves.NAMES, puma_moves.study_poses()[:, :3, 3], strict=True))
         pose_times = dict(zip(puma_moves.NAMES, puma_moves.TIMES, strict=True))
         files: dict[str, str | bytes] = {}
+        curves = {number: puma_moves.figure_panels(number) for number in puma_moves.CURVES}
         for number, (kind, _) in puma_moves.CURVES.items():
-            curves = puma_moves.figure_panels(number)
-            files[_name(number)] = panels(f"Figure {number}: {_title(kind)}", t, curves, marks=pose_times)
+            files[_name(number)] = panels(f"Figure {number}: {_title(kind)}", t, curves[number], marks=pose_times)
         for number, kind in puma_moves.PATHS.items():
-            X = puma_moves.poses_along(kind, t)
             title = f"Figure {number}: {_title(kind)}, path and approach vectors"
-            files[_name(number)] = path_figure(title, X, positions)
+            files[_name(number)] = path_figure(title, puma_moves.poses_along(kind, t), positions)
         for number, kind in puma_moves.OVERVIEWS.items():
+            three = [curves[shown][0] for shown, (moved, _) in puma_moves.CURVES.items() if moved == kind]
             X = puma_moves.poses_along(kind, t)
-            three = [
-                puma_moves.figure_panels(curves)[0] for curves, (moved, _) in puma_moves.CURVES.items() if moved == kind
-            ]
             files[_name(number)] = overview(f"Figure {number}: {_title(kind)}", t, three, X, positions)
         move = render_films(load_arm("puma560-seed"), puma_moves.joint_trajectory(), puma_moves.study_poses())
         return {**files, **{name.replace("move", f"figure{puma_moves.FILM}"): film for name, film in move.items()}}

@@ -41,6 +41,7 @@ CONFIGURATIONS = 2000
 # number may result from rounded intermediate results.
 AGREES = 0.01
 NEAR = 0.05
+_EFFORT_UNITS = ("N m", "N m", "N", "N m", "N m", "N m")
 
 
 def study_arm() -> Arm:
@@ -86,15 +87,9 @@ def torques() -> Torques:
     motion = quintic(START, GOAL, DURATION)
     t = np.linspace(0.0, DURATION, SAMPLES)
     q, qd, qdd = (motion(t, order) for order in range(3))
-    return Torques(
-        t=t,
-        q=q,
-        qd=qd,
-        qdd=qdd,
-        empty=inverse_dynamics(study_arm(), q, qd, qdd),
-        bejczy=bejczy_efforts(q, qdd, fitted_coefficients(), gravity=GRAVITY),
-        loaded=inverse_dynamics(loaded_arm(), q, qd, qdd),
-    )
+    empty, loaded = (inverse_dynamics(arm, q, qd, qdd) for arm in (study_arm(), loaded_arm()))
+    bejczy = bejczy_efforts(q, qdd, fitted_coefficients(), gravity=GRAVITY)
+    return Torques(t=t, q=q, qd=qd, qdd=qdd, empty=empty, bejczy=bejczy, loaded=loaded)
 
 
 def figure(study: Torques, number: int) -> Panel:
@@ -109,19 +104,15 @@ def figure(study: Torques, number: int) -> Panel:
     """
     one_of("figure", str(number), map(str, range(3, 12)))
     if number < 6:
-        title, unit, course = (
-            ("position", "rad", study.q),
-            ("speed", "rad/s", study.qd),
-            ("acceleration", "rad/s²", study.qdd),
-        )[number - 3]
-        return Panel(f"{title} of joint 1", unit, {"joint 1": course[:, 0]})
+        title, unit = (("position", "rad"), ("speed", "rad/s"), ("acceleration", "rad/s²"))[number - 3]
+        return Panel(f"{title} of joint 1", unit, {"joint 1": (study.q, study.qd, study.qdd)[number - 3][:, 0]})
     joint = number - 6
     curves = {
         "Newton-Euler, no load": study.empty[:, joint],
         "Bejczy": study.bejczy[:, joint],
         "Newton-Euler, largest load": study.loaded[:, joint],
     }
-    return Panel(f"effort of joint {joint + 1}", "N" if joint == 2 else "N m", curves)
+    return Panel(f"effort of joint {joint + 1}", _EFFORT_UNITS[joint], curves)
 
 
 @attrs.frozen(kw_only=True)
@@ -149,32 +140,28 @@ class JointRow:
 
 def joint_table(study: Torques) -> list[JointRow]:
     """Return the differences of the cases for every joint; by the report they are largest at the wrist."""
-    empty = _mean(study.empty)
-    bejczy, load = _mean(study.bejczy - study.empty) / empty, _mean(study.loaded - study.empty) / empty
-    limits = study_arm().limits.effort
+    columns = {
+        "peak": np.abs(study.empty).max(axis=0),
+        "peak_loaded": np.abs(study.loaded).max(axis=0),
+        "limit": study_arm().limits.effort,
+        "bejczy": _rms(study.bejczy - study.empty) / _rms(study.empty),
+        "load": _rms(study.loaded - study.empty) / _rms(study.empty),
+    }
     return [
-        JointRow(
-            joint=i + 1,
-            unit="N" if i == 2 else "N m",
-            peak=float(np.abs(study.empty[:, i]).max()),
-            peak_loaded=float(np.abs(study.loaded[:, i]).max()),
-            limit=float(limits[i]),
-            bejczy=float(bejczy[i]),
-            load=float(load[i]),
-        )
-        for i in range(6)
+        JointRow(joint=i + 1, unit=unit, **{name: float(column[i]) for name, column in columns.items()})
+        for i, unit in enumerate(_EFFORT_UNITS)
     ]
 
 
-def _mean(course: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(course**2, axis=0)))
+def _rms(efforts: Array) -> Array:
+    """Return the root mean square of each joint's efforts over the motion."""
+    return np.asarray(np.sqrt(np.mean(efforts**2, axis=0)))
 
 
 def fit_configurations() -> Array:
     """Return random configurations within the joint limits, to which constants are fitted, (m, 6)."""
-    arm = study_arm()
-    rng = np.random.default_rng(SEED)
-    return rng.uniform(arm.limits.lower, arm.limits.upper, size=(CONFIGURATIONS, arm.n))
+    limits = study_arm().limits
+    return np.random.default_rng(SEED).uniform(limits.lower, limits.upper, size=(CONFIGURATIONS, 6))
 
 
 def fitted_coefficients() -> Coefficients:

@@ -1,24 +1,13 @@
 """The study of the Stanford arm's efforts: TR-83-008, appendices II and III, figures 3 to 11."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import attrs
 
 from armwright.files.result_table import ResultTable
 from armwright.report.figures import curves
-from armwright.study.stanford_torque import (
-    FormRow,
-    JointRow,
-    PrintedRow,
-    Torques,
-    coefficient_table,
-    figure,
-    form_table,
-    joint_table,
-    load_table,
-    torques,
-)
+from armwright.study import stanford_torque as study
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -33,50 +22,37 @@ class StanfordTorque:
         joints: the largest efforts of each joint.
     """
 
-    constants: list[PrintedRow]
-    load: list[PrintedRow]
-    forms: list[FormRow]
-    efforts: Torques
-    joints: list[JointRow]
+    constants: list[study.PrintedRow]
+    load: list[study.PrintedRow]
+    forms: list[study.FormRow]
+    efforts: study.Torques
+    joints: list[study.JointRow]
 
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def run(cls, progress: Callable[[str, float], None] | None = None) -> "StanfordTorque":  # noqa: ARG003 - takes a second
         """Run the study."""
-        efforts = torques()
-        return cls(
-            constants=coefficient_table(),
-            load=load_table(),
-            forms=form_table(),
-            efforts=efforts,
-            joints=joint_table(efforts),
-        )
+        efforts = study.torques()
+        joints = study.joint_table(efforts)
+        constants, load, forms = study.coefficient_table(), study.load_table(), study.form_table()
+        return cls(constants=constants, load=load, forms=forms, efforts=efforts, joints=joints)
 
     def as_data(self) -> dict[str, Any]:
         """Return the tables as plain data."""
-        tables: Mapping[str, Iterable[Any]] = {
-            "constants": self.constants,
-            "load": self.load,
-            "form of D11": self.forms,
-            "joints": self.joints,
-        }
-        return {name: [attrs.asdict(row) for row in rows] for name, rows in tables.items()}
+        data = attrs.asdict(self, filter=attrs.filters.exclude("efforts"))
+        return {"form of D11" if name == "forms" else name: rows for name, rows in data.items()}
 
     def tables(self) -> Iterator[ResultTable]:
         """Yield the tables, printed beside computed."""
-        heads = ("constant", "printed", "computed", "unit", "verdict", "remark")
-        for title, rows in (
+        for title, table in (
             ("Bejczy's model, appendix III", self.constants),
             ("Link 6 with the largest load, appendix II", self.load),
         ):
             yield ResultTable(
                 title=title,
-                heads=heads,
-                rows=[
-                    (row.name, f"{row.printed:g}", f"{row.computed:.4g}", row.unit, row.verdict, row.note)
-                    for row in rows
-                ],
+                heads=("constant", "printed", "computed", "unit", "verdict", "remark"),
+                rows=[(x.name, f"{x.printed:g}", f"{x.computed:.4g}", x.unit, x.verdict, x.note) for x in table],
             )
         yield ResultTable(
             title="Residuals of forms of D11",
@@ -88,12 +64,8 @@ class StanfordTorque:
             heads=("joint", "peak", "peak, loaded", "motor", "error of Bejczy's model", "effect of the load"),
             rows=[
                 (
-                    str(row.joint),
-                    f"{row.peak:.2f}",
-                    f"{row.peak_loaded:.2f}",
-                    f"{row.limit:g} {row.unit}",
-                    f"{row.bejczy * 100:.0f} %",
-                    f"{row.load * 100:.0f} %",
+                    *(str(row.joint), f"{row.peak:.2f}", f"{row.peak_loaded:.2f}", f"{row.limit:g} {row.unit}"),
+                    *(f"{row.bejczy * 100:.0f} %", f"{row.load * 100:.0f} %"),
                 )
                 for row in self.joints
             ],
@@ -103,8 +75,7 @@ class StanfordTorque:
         """Return figures 3 to 11 by the name of their file."""
         files: dict[str, str | bytes] = {}
         for number in range(3, 12):
-            shown = figure(self.efforts, number)
-            files[f"figure{number:02d}.svg"] = curves(
-                f"Figure {number}: {shown.title}", self.efforts.t, shown.lines, x_label="time, s", y_label=shown.unit
-            )
+            panel = study.figure(self.efforts, number)
+            title, t = f"Figure {number}: {panel.title}", self.efforts.t
+            files[f"figure{number:02d}.svg"] = curves(title, t, panel.lines, x_label="time, s", y_label=panel.unit)
         return files
