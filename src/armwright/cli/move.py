@@ -1,6 +1,7 @@
 """``armwright move``: plan a motion through poses, straight in joint space or straight paths of the tool."""
 
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,9 +14,7 @@ from armwright.cli.progress import counting
 from armwright.cli.results import warn_of_stray, write_results
 
 if TYPE_CHECKING:
-    from armwright.arm.model import Arm
-    from armwright.motion.moves import Move
-    from armwright.motion.poses_file import PosesFile
+    from collections.abc import Iterator
 
 # Bounds of the options [ms], [mm].
 _PERIOD_MS, _DEVIATION_MM = (0.01, 1000.0), (1e-4, 100.0)
@@ -73,7 +72,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.motion.certificate import slower
     from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
     from armwright.motion.move_assessment import MoveAssessment
-    from armwright.motion.moves import joint_move
+    from armwright.motion.moves import cartesian_move, joint_move, stopping_move
     from armwright.motion.poses_file import read_poses
     from armwright.report.move_files import move_files
     from armwright.report.movie import render_films
@@ -84,7 +83,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     if orientation is not None and around is not None:
         raise usage_error("--orientation", "lines with stops (--around) rotate about a fixed axis; omit this option")
     within(servo_ms, _PERIOD_MS, "--servo-ms")
-    deviation = 0.1 if deviation_mm is None else within(deviation_mm, _DEVIATION_MM, "--deviation-mm")
+    deviation = within(0.1 if deviation_mm is None else deviation_mm, _DEVIATION_MM, "--deviation-mm") * 1e-3
     warn_of_stray(poses)
     model, file = load_arm(arm), read_poses(poses)
     start = None if near is None else joint_values(model, near, "--near")
@@ -92,7 +91,12 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     if kind == "joint":
         planned = joint_move(model, file.poses, **timed)
     else:
-        planned = _cartesian(model, file, poses, around, timed, orientation=orientation, deviation=deviation * 1e-3)
+        with _detour_hint(poses, around):
+            if around is None:
+                axis = orientation or "geodesic"
+                planned = cartesian_move(model, file.poses, **timed, orientation=axis, deviation=deviation)
+            else:
+                planned = stopping_move(model, file.poses, method=around, near=start, deviation=deviation)
     notes = list(file.notes)
     factor, reason = slowing_for_limits(planned.arm, planned.trajectory)
     if reason is not None and factor > 1 + ROUNDING:
@@ -115,27 +119,17 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     print_result(assessment, as_json=as_json, quiet=quiet, output=output)
 
 
-def _cartesian(
-    arm: "Arm",
-    file: "PosesFile",
-    path: Path,
-    around: Literal["via", "damped"] | None,
-    timed: dict[str, Any],
-    *,
-    orientation: Literal["geodesic", "zyz"] | None,
-    deviation: float,
-) -> "Move":
-    """Plan a Cartesian move; where its path is blocked, say which options search for a detour."""
+@contextmanager
+def _detour_hint(path: Path, around: Literal["via", "damped"] | None) -> "Iterator[None]":
+    """Add to the error of a blocked Cartesian path which options search for a detour."""
     from armwright.errors import ArmwrightError
-    from armwright.motion.moves import cartesian_move, stopping_move
     from armwright.motion.obstruction import PathError
 
     # Whether either finds a detour is known only after a search, which takes time.
     hint = "`--around damped` and `--around via` search for a detour"
-    try:
-        if around is None:
-            return cartesian_move(arm, file.poses, **timed, orientation=orientation or "geodesic", deviation=deviation)
+    if around is not None:
         hint = f"`--around {'via' if around == 'damped' else 'damped'}` searches for another detour"
-        return stopping_move(arm, file.poses, method=around, near=timed["near"], deviation=deviation)
+    try:
+        yield
     except PathError as error:
         raise ArmwrightError(f"{path}: {error}{'' if error.cause == 'reach' else f'; {hint}'}") from error
