@@ -61,7 +61,10 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
         print_json(to_sarif([(result.diagnostics, result.source, path.as_posix()) for result, path in pairs]))
     else:
         for compilation in compilations:
-            _print(compilation, emit)
+            for line in _stage_lines(compilation, emit) if emit else ():
+                print(line)
+            if not emit or compilation.diagnostics:
+                print_diagnostics(compilation.diagnostics, compilation.source, to_errors=emit is not None)
         if len(compilations) > 1:
             print(_totals_line(compilations), file=sys.stderr if emit else sys.stdout)
     if any(compilation.code is None for compilation in compilations):
@@ -95,13 +98,6 @@ def _programs_below(folder: Path) -> list[Path]:
 
     files = (Path(parent, name) for parent, _, names in os.walk(folder, onerror=refuse) for name in names)
     return sorted(path for path in files if path.suffix == _SUFFIX and path.is_file())
-
-
-def _print(compilation: "Compilation", emit: Stage | None) -> None:
-    for line in _stage_lines(compilation, emit) if emit else ():
-        print(line)
-    if not emit or compilation.diagnostics:
-        print_diagnostics(compilation.diagnostics, compilation.source, to_errors=emit is not None)
 
 
 def _totals_line(compilations: "list[Compilation]") -> str:

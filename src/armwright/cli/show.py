@@ -1,14 +1,7 @@
 """``armwright show``: the tables of an arm."""
 
-from typing import TYPE_CHECKING
-
 from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_json
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from armwright.files.result_table import ResultTable
 
 # Width at which tables are measured [characters]; none is wider.
 _WIDEST = 200
@@ -21,6 +14,7 @@ def show(arm: ArmName, as_json: Json = False) -> None:
 
     **Example:** `armwright show puma560`
     """
+    from rich import box
     from rich.table import Table
 
     from armwright.arm.description import as_data, facts, tables
@@ -39,7 +33,11 @@ def show(arm: ArmName, as_json: Json = False) -> None:
         console.print()
         console.print(result.title, style="bold")
         if result.heads:
-            table = _compact(result)
+            table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+            for head in result.heads:
+                table.add_column(head, justify="right", no_wrap=True)
+            for row in result.rows:
+                table.add_row(*row)
             # A narrow terminal wraps lines; it must not truncate numbers.
             width = console.measure(table, options=console.options.update(max_width=_WIDEST)).maximum
             clean_console(width=max(width, console.width)).print(table)
@@ -48,15 +46,3 @@ def show(arm: ArmName, as_json: Json = False) -> None:
     for fact in facts(model):
         grid.add_row(*fact)
     console.print(grid)
-
-
-def _compact(result: "ResultTable") -> "Table":
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    for column in result.heads:
-        table.add_column(column, justify="right", no_wrap=True)
-    for row in result.rows:
-        table.add_row(*row)
-    return table
