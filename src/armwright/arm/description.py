@@ -1,5 +1,7 @@
 """The tables of an arm: geometry, limits, inertia and drives in degrees and millimetres; as plain data in SI."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -8,6 +8,8 @@ Taken apart behind Tz(d_i) instead of in front of Rx, the same product is a stan
 length become part of the base, and each row takes over those of the next. Link frames move with it.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

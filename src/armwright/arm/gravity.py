@@ -4,6 +4,8 @@ All that weighs an arm asks the arm: ``Arm.gravity`` is the one place, and ``fel
 it, for cells, for URDF files and for arms that were calibrated in the frame of an instrument.
 """
 
+from __future__ import annotations
+
 import warnings
 
 import attrs

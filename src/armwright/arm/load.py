@@ -1,5 +1,7 @@
 """Arms from files: the catalogue by name, any other by path."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 

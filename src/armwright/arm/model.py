@@ -9,6 +9,8 @@ away, as for axes that are nearly parallel, a fixed transform F stands among the
 All quantities are SI and radians.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterable, Sized
 from functools import cached_property
@@ -285,7 +287,7 @@ def _motors(value: Iterable[Motor]) -> tuple[Motor, ...]:
     return _parts(value, Motor, "motors")
 
 
-def _same_length(arm: "Arm", attribute: "attrs.Attribute[Any]", value: Sized) -> None:
+def _same_length(arm: Arm, attribute: attrs.Attribute[Any], value: Sized) -> None:
     if len(value) != len(arm.joints):
         raise ShapeError(f"arm '{arm.name}': {len(arm.joints)} joints but {len(value)} {attribute.name}")
 

@@ -1,5 +1,7 @@
 """Joint positions at the door of a public function: one per joint, and a warning where they look like degrees."""
 
+from __future__ import annotations
+
 import inspect
 import math
 import warnings

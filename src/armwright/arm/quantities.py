@@ -1,5 +1,7 @@
 """Quantities and poses in files that people write: the key tells the unit."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from typing import NamedTuple, TypeVar

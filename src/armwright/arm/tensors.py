@@ -1,5 +1,7 @@
 """Inertia tensors: which a body can have."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arrays import Array

@@ -1,5 +1,7 @@
 """How well the dimensions of an arm are known: the covariance of its errors, as a calibration tells it."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 
 import attrs

@@ -1,5 +1,7 @@
 """The units of a revolute and of a prismatic joint, in SI and as people read them."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -3,6 +3,8 @@
 Of a base or tool whose rotation is off by more than rounding, the nearest true one is read back.
 """
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Iterator, Mapping

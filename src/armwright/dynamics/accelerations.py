@@ -1,5 +1,7 @@
 """Forward dynamics: joint accelerations from efforts, by two algorithms that share only the link transform."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

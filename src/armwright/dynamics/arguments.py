@@ -1,5 +1,7 @@
 """The arguments of the functions of dynamics: joint arrays whose leading axes fit together."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 

@@ -6,6 +6,8 @@ link; accelerations are passed back outward. Accelerations here are those of mat
 linear speeds never appear.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 

@@ -4,6 +4,8 @@ Report TR-83-008 prints the model in its appendix III with errors. The form here
 report's constants, ``fitted`` determines those of an arm.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import cast
 

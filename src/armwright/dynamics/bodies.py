@@ -1,5 +1,7 @@
 """Rigid bodies over abstract scalars: their combination, and their change of frames."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 from armwright.arm.model import Link

@@ -1,5 +1,7 @@
 """Energy of a moving arm."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

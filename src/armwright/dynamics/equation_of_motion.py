@@ -1,5 +1,7 @@
 """The terms of the equation of motion: the effort of each joint by its causes."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

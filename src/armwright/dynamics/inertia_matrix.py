@@ -1,5 +1,7 @@
 """The mass matrix: the efforts at one joint by the accelerations of another."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 from armwright.arm.model import Arm

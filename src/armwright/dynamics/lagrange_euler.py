@@ -10,6 +10,8 @@ the derivative of the pose of link i by q_j, U_ijk that of U_ij by q_k; with the
 and the efforts are D qdd + h qd qd + G. Numbers of links and joints run from 0 here.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from typing import TypeAlias, cast
 

@@ -1,5 +1,7 @@
 """Newton-Euler inverse dynamics: the joint efforts that a motion requires."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

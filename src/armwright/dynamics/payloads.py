@@ -1,5 +1,7 @@
 """A load on the tool, as part of the last link."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

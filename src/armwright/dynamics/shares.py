@@ -1,5 +1,7 @@
 """Shares of the efforts: those by gravity alone, and those by the speeds alone."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 from armwright.arm.model import Arm

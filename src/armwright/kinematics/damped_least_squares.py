@@ -1,5 +1,7 @@
 """Joint rates for a twist of the tool that stay bounded at and near singular configurations."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

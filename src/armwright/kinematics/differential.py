@@ -4,6 +4,8 @@ Both work at the wrist centre, with the angles of the build (see ``ClosedFormGeo
 the wrist centre in the shoulder frame, n, o, a the axes of the last wrist frame, and a d before a letter for its rate.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Literal, NamedTuple, TypeAlias, get_args
 

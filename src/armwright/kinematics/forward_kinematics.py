@@ -1,5 +1,7 @@
 """Forward kinematics: the pose of every link and of the tool."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

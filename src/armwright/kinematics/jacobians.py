@@ -1,5 +1,7 @@
 """The Jacobian: the linear and angular velocity of the tool for joint speeds, and its derivative along a motion."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Literal, TypeAlias
 

@@ -1,5 +1,7 @@
 """How well a configuration can move the tool: measures of the Jacobian that are 0 where a direction is lost."""
 
+from __future__ import annotations
+
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np

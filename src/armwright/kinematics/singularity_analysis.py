@@ -1,5 +1,7 @@
 """Singular configurations: which factor of the determinant vanishes, which twists are lost, which motions are idle."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

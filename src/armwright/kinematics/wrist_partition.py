@@ -6,6 +6,8 @@
 The first three joints move the wrist centre and the last three do not, so the inverse is that of two blocks of three.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arm.model import Arm

@@ -4,6 +4,8 @@ The path does not go through the via points: it leaves the straight segment a ti
 the next one a time ``blend`` after it. Position, speed and acceleration are continuous.
 """
 
+from __future__ import annotations
+
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np

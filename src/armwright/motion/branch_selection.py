@@ -1,5 +1,7 @@
 """Which configuration to take at each of several poses: one branch kept where it can be, else the shortest path."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """What a planned path is certified to keep: its deviation, and the limits of the joints."""
 
+from __future__ import annotations
+
 from typing import Any, Literal, TypeAlias
 
 import attrs
@@ -57,12 +59,12 @@ class Certificate:
     because: BindingLimit | None = None
     backward: float | None = None
 
-    def run_slower(self, factor: float, peaks: dict[LimitName, Array], because: BindingLimit | None) -> "Certificate":
+    def run_slower(self, factor: float, peaks: dict[LimitName, Array], because: BindingLimit | None) -> Certificate:
         """Return that of the same motion run ``factor`` times slower for a limit, with the peaks that it has then."""
         time, total = self.worst_time * factor, self.factor * factor
         return attrs.evolve(self, worst_time=time, peaks=peaks, factor=total, because=because)
 
-    def retimed(self, stretch: float) -> "Certificate":
+    def retimed(self, stretch: float) -> Certificate:
         """Return that of the same motion, all of it run so many times slower; efforts are those of the faster one."""
         peaks = stretched_peaks(**self.peaks, stretch=stretch)
         return attrs.evolve(self, peaks=peaks, worst_time=self.worst_time * stretch)

@@ -1,5 +1,7 @@
 """Motions with a certificate: a followed motion of the tool, run as fast as the limits of the joints allow."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs
@@ -35,13 +37,13 @@ class CertifiedMotion:
     trajectory: Trajectory
     certificate: Certificate
 
-    def slowed(self, arm: AnyArm, factor: float, because: BindingLimit) -> "CertifiedMotion":
+    def slowed(self, arm: AnyArm, factor: float, because: BindingLimit) -> CertifiedMotion:
         """Return the same motion run ``factor`` times slower, for a limit of a joint, from 0."""
         trajectory = self.trajectory.slowed(factor)
         certificate = self.certificate.run_slower(factor, limit_peaks(arm, trajectory), because)
         return CertifiedMotion(trajectory=trajectory, certificate=certificate)
 
-    def on_ticks(self, period: float) -> "CertifiedMotion":
+    def on_ticks(self, period: float) -> CertifiedMotion:
         """Return the same motion slowed by less than a servo period [s], to end on a whole number of them."""
         trajectory, certificate = whole_ticks(self.trajectory, period), self.certificate
         if not trajectory.duration:

@@ -1,5 +1,7 @@
 """Configurations along a path: each next to the one before it."""
 
+from __future__ import annotations
+
 from collections.abc import Generator, Iterator
 from typing import NamedTuple
 

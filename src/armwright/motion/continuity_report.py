@@ -1,5 +1,7 @@
 """How smooth a motion is: what jumps where, at every knot and at both ends."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

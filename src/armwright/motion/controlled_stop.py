@@ -9,6 +9,8 @@ a clock that only slows down never asks a joint for more speed than the motion d
 acceleration. So there is always a stop within the limits, however near to them the motion runs: at worst its own end.
 """
 
+from __future__ import annotations
+
 import math
 from itertools import pairwise
 

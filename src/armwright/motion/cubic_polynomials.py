@@ -1,5 +1,7 @@
 """Cubics: from rate to rate in a given time, and through points with rates given or estimated."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arrays import LARGEST, ArrayLike, exact_shape

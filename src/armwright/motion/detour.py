@@ -1,5 +1,7 @@
 """Detours of straight lines: by a via pose beside the line, or along it by damped rates; and their cost."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from itertools import chain
 from typing import Literal, TypeAlias

@@ -5,6 +5,8 @@ chord by no more than d²/8 times its greatest second derivative. How much the t
 speeds and accelerations of the joints, which are known exactly on every interval, and the levers of the arm.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple, Protocol
 

@@ -7,6 +7,8 @@ Run k times slower, a motion asks of every joint at every point for
 so the least slowing follows from the roots of a parabola in 1/k, for each sample of the motion.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import NamedTuple
 

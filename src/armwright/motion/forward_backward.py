@@ -4,6 +4,8 @@ Two passes: backward, from the end, the largest x from which the end can still b
 largest u that stays below them. Standing still, x = u = 0, keeps all bounds, so there is always a path.
 """
 
+from __future__ import annotations
+
 import logging
 import math
 from types import SimpleNamespace

@@ -3,6 +3,8 @@
 A path is a trajectory of which only the positions count; its time is a mere parameter s.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """What profiles are given: points and when they are passed, two ends, limits; checked once for all of them."""
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 

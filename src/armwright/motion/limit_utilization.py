@@ -1,5 +1,7 @@
 """Which part of its limits a motion uses, and how much slower it must run to keep them all."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arrays import Array

@@ -1,5 +1,7 @@
 """The assessment of a planned move: its poses, their times and deviations, and how far limits are utilized."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from typing import Any
 

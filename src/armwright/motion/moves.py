@@ -1,5 +1,7 @@
 """Joint moves and Cartesian moves through poses, by straight segments with blends: of the joints, or of the tool."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Sequence
 
@@ -66,7 +68,7 @@ class Move:
     certificate: Certificate | None = None
     detours: tuple[Detour, ...] = ()
 
-    def slowed(self, factor: float, because: BindingLimit | None = None) -> "Move":
+    def slowed(self, factor: float, because: BindingLimit | None = None) -> Move:
         """Return the same move run ``factor`` times slower, for a limit of a joint, from 0, if for any."""
         slow = self.trajectory.slowed(factor)
         certificate = self.certificate

@@ -1,5 +1,7 @@
 """What stops the arm along poses, and how that is diagnosed."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -50,7 +52,7 @@ class PathError(ArmwrightError, ValueError):
         self.reason = reason or message
         super().__init__(message)
 
-    def restated(self, segment: int, message: str) -> "PathError":
+    def restated(self, segment: int, message: str) -> PathError:
         """Return the same error by another number of its segment, and in other words."""
         return PathError(self.cause, segment, self.fraction, message, joint=self.joint, reason=self.reason)
 
@@ -77,7 +79,7 @@ class Obstruction(NamedTuple):
     near: str = ""
     blamed: tuple[int, ...] = ()
 
-    def agrees(self, other: "Obstruction", duration: float) -> bool:
+    def agrees(self, other: Obstruction, duration: float) -> bool:
         """Whether one that was found less closely is this one, and names a joint that is to blame."""
         if other.cause != self.cause:
             return False

@@ -5,6 +5,8 @@ trajectory like any other, so that limits are checked exactly and the motion can
 again.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """A path of the tool through poses, and the report's rule for how densely and how fast to run it."""
 
+from __future__ import annotations
+
 import math
 from itertools import accumulate
 from typing import NamedTuple

@@ -9,6 +9,8 @@ constant, so x at a later position of it is x + 2 u (s - s_i), linear too: the b
 its end.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Literal, NamedTuple, TypeAlias
 

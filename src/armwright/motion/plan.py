@@ -1,5 +1,7 @@
 """The stages of one move, planned together: point to point, straight line, through frames."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from typing import Literal, TypeAlias
 

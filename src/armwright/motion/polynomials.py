@@ -3,6 +3,8 @@
 Coefficients are (m, k, n): of m segments and n joints, of the powers 0 to k-1 of the time since the segment began.
 """
 
+from __future__ import annotations
+
 import math
 from functools import cache
 

@@ -1,5 +1,7 @@
 """Poses in a file: where the tool should pass, and when."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import attrs

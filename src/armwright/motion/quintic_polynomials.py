@@ -1,5 +1,7 @@
 """Point to point: the quintic that rests at both ends."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -8,6 +8,8 @@ so a bound of that bounds the width. The joints are solved along this path, whic
 it one.
 """
 
+from __future__ import annotations
+
 import contextlib
 from functools import cache, partial
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """What a planner asks of an arm, plain or compiled: the same functions, evaluated at once or by kernels."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias

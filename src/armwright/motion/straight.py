@@ -1,5 +1,7 @@
 """Straight lines with a certificate."""
 
+from __future__ import annotations
+
 import math
 from functools import partial
 

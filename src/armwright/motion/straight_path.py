@@ -1,5 +1,7 @@
 """Straight segments of the tool over time: one line at even speed, or several past frames as the report times them."""
 
+from __future__ import annotations
+
 from typing import TypeAlias
 
 import attrs

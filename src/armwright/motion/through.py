@@ -1,5 +1,7 @@
 """Through frames without a stop, as the report moves: knots on the straight segments, and an X-spline of the joints."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arm.positions import single_configuration

@@ -1,5 +1,7 @@
 """The fastest run along a given path: always some joint at a limit of speed, acceleration or effort."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from typing import get_args

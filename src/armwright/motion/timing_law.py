@@ -11,6 +11,8 @@ run takes just that part more: so the duration depends on the path as the shorte
 window happens to fit.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """How far the tool may leave its path: in position and in orientation."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Where the tool is planned to be: positions and orientations through poses, straight with blends, over time."""
 
+from __future__ import annotations
+
 from typing import Literal, TypeAlias
 
 import attrs
@@ -40,7 +42,7 @@ class ToolPath:
     """
 
     position: Trajectory
-    orientation: "Rotations | ZYZAngles"
+    orientation: Rotations | ZYZAngles
     times: Array
 
     @property
@@ -58,7 +60,7 @@ class ToolPath:
         parts = np.clip(np.ceil(np.diff(self.knots) / step), fewest, _ENOUGH).astype(np.intp)
         return divided(self.knots, parts)
 
-    def slowed(self, factor: float) -> "ToolPath":
+    def slowed(self, factor: float) -> ToolPath:
         """Return the same path run ``factor`` times slower."""
         position, orientation = self.position.slowed(factor), self.orientation.slowed(factor)
         return ToolPath(position=position, orientation=orientation, times=self.times * factor)
@@ -106,7 +108,7 @@ class ZYZAngles:
         """Return rotations (..., 3, 3) at times (...)."""
         return from_zyz(self.angles(t))
 
-    def slowed(self, factor: float) -> "ZYZAngles":
+    def slowed(self, factor: float) -> ZYZAngles:
         """Return the same rotations run ``factor`` times slower."""
         return ZYZAngles(self.angles.slowed(factor))
 
@@ -152,7 +154,7 @@ class Rotations:
         vector = np.where(since <= -width, before * since, np.where(since >= width, after * since, blend))
         return np.asarray(self.R[i] @ rotation_from_vector(vector))
 
-    def slowed(self, factor: float) -> "Rotations":
+    def slowed(self, factor: float) -> Rotations:
         """Return the same rotations run ``factor`` times slower."""
         p = self.plan
         slow = BlendPlan(

@@ -6,6 +6,8 @@ stops the arm is returned and not raised, as whoever tries several branches goes
 about it, the path is followed once more in small steps.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """A motion of all joints in time: piecewise polynomials, known exactly between samples too."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -146,7 +148,7 @@ class Trajectory:
         integer(order, "order", least=0)
         return peaks(derivative(self.coefficients, order), np.diff(self.times))
 
-    def slowed(self, factor: float) -> "Trajectory":
+    def slowed(self, factor: float) -> Trajectory:
         """Return the same path run ``factor`` times slower; faster below 1.
 
         Raises:
@@ -159,7 +161,7 @@ class Trajectory:
             coefficients = self.coefficients * powers[:, None]
         return Trajectory(times=self.times * factor, coefficients=coefficients)
 
-    def retimed(self, duration: float) -> "Trajectory":
+    def retimed(self, duration: float) -> Trajectory:
         """Return the same path run in another time, which is met to the last bit.
 
         Args:
@@ -176,13 +178,13 @@ class Trajectory:
         times = np.append(np.minimum(slow.times[:-1], duration), duration)
         return Trajectory(times=times, coefficients=slow.coefficients)
 
-    def reversed(self) -> "Trajectory":
+    def reversed(self) -> Trajectory:
         """Return the reversed motion: at time t where this motion is at the time t before its end."""
         signs = (-1.0) ** np.arange(self.coefficients.shape[1])
         back = shifted(self.coefficients, np.diff(self.times))[::-1] * signs[:, None]
         return Trajectory(times=self.duration - self.times[::-1], coefficients=back)
 
-    def until(self, t: float) -> "Trajectory":
+    def until(self, t: float) -> Trajectory:
         """Return the first ``t`` seconds of the motion, all of it where it is not longer.
 
         Raises:

@@ -1,5 +1,7 @@
 """Point to point in the shortest time that speed and acceleration allow: the trapezoid of speed."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

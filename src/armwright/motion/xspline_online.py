@@ -12,6 +12,8 @@ the rate at the last knot, and the step between them. It is a value: what pushes
 Compiled loops call ``xspline_kernel(n).single(state, knot, step, state, segment)``, which works in place.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import cache
 

@@ -14,6 +14,8 @@ The report has b = 0: then each rate follows from the one before it and the next
 whose acceleration is continuous, which has to know all knots.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import TypeAlias
 

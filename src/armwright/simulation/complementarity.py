@@ -12,6 +12,8 @@ With a positive definite M there is exactly one answer. The same question answer
 and speeds for accelerations.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

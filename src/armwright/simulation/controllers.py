@@ -1,5 +1,7 @@
 """Controllers: what the drives do at a moment, given where the arm is."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Protocol, TypeAlias
 

@@ -3,6 +3,8 @@
 Whoever asks for the steps watches for events between their ends and begins anew behind each.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple, Protocol, TypeAlias, get_args

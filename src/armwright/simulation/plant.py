@@ -1,5 +1,7 @@
 """An arm as a simulation sees it: what its joints feel at one moment, and what they do between two events."""
 
+from __future__ import annotations
+
 import math
 from functools import cached_property
 from typing import NamedTuple

@@ -1,5 +1,7 @@
 """The result of a simulation: the motion, its energies and the events of its joints."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from enum import Enum, IntEnum

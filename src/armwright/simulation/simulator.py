@@ -6,6 +6,8 @@ hold it, a brake goes on or off. At an event, which joints are held from then on
 one answer (``solve_complementarity``), so nothing chatters and no speed creeps.
 """
 
+from __future__ import annotations
+
 import itertools
 import math
 from collections.abc import Callable, Sequence

@@ -1,5 +1,7 @@
 """Poses from what a person writes: a position, and an orientation in any of the usual forms."""
 
+from __future__ import annotations
+
 from itertools import product
 
 import numpy as np

@@ -1,5 +1,7 @@
 """ZYZ Euler angles: R = Rz(phi) Ry(theta) Rz(psi), as in the wrist of a PUMA; and roll, pitch, yaw."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

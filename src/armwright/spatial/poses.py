@@ -1,5 +1,7 @@
 """Poses: homogeneous matrices, their twelve numbers, their inverse, the straight path between two."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, exact_shape, of_shape

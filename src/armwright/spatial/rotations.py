@@ -1,5 +1,7 @@
 """Rotations: how far from one a matrix is, the nearest one, the rotation between two, and interpolation."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -9,6 +9,8 @@ put a frame farther from its joint than the arm is long, it stands at the joint 
 transform in place of the four numbers. Nothing is bent.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 

@@ -1,5 +1,7 @@
 """The chain in a URDF file: from a base link to a tip link, and what hangs on every link of it."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 
 import attrs

@@ -5,6 +5,8 @@ one that is spelt nearly as URDF spells it is refused, since what it says would 
 <origin> says of a pose.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Collection
@@ -62,7 +64,7 @@ class Element:
     location: str
     tag: str
     attributes: dict[str, str]
-    children: "tuple[Element, ...]"
+    children: tuple[Element, ...]
 
     @property
     def name(self) -> str:
@@ -74,11 +76,11 @@ class Element:
         key = ", ".join(part for part in (self.location, attribute) if part)
         return FileFormatError(self.path, self.line, key, message)
 
-    def find_all(self, tag: str) -> "list[Element]":
+    def find_all(self, tag: str) -> list[Element]:
         """Return the elements in it that have a name, in their order."""
         return [child for child in self.children if child.tag == tag]
 
-    def find(self, tag: str) -> "Element | None":
+    def find(self, tag: str) -> Element | None:
         """Return the element in it that has a name, or None.
 
         Raises:
@@ -89,7 +91,7 @@ class Element:
             raise children[1].error("", f"occurs twice, first in line {children[0].line}")
         return children[0] if children else None
 
-    def require(self, tag: str) -> "Element":
+    def require(self, tag: str) -> Element:
         """Return the element in it that has a name.
 
         Raises:

@@ -1,5 +1,7 @@
 """Arms from URDF files."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias

@@ -1,5 +1,7 @@
 """What stands in a URDF file: links and joints that make a tree, poses, bodies, limits and friction."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter

@@ -4,6 +4,8 @@ The frame of link i stands where joint i does, on frame i-1 of the table, and mo
 it. So joint i+1 stands at A_i with joint i at 0, whose rpy are alpha, 0 and theta as they are in the table.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator, Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring

@@ -1,5 +1,7 @@
 """One branch of one arm: all six angles that bring the tool to a pose, over abstract scalars."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

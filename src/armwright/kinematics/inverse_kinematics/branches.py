@@ -1,5 +1,7 @@
 """All branches of a closed form for one pose, over abstract scalars: what is compiled for an arm."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,5 +1,7 @@
 """Ranking configurations: residuals, limits, duplicates, order, and one word on the whole."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from typing import NamedTuple
 

@@ -7,6 +7,8 @@ plane of the arm, with an elbow or with a slide.
 Angles are those of the build, not the joints' own: see ``ClosedFormGeometry``.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Literal, TypeAlias
 

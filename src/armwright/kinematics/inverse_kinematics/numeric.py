@@ -1,5 +1,7 @@
 """Inverse kinematics step by step, for every arm without a closed form: fewer than six joints, six, or more."""
 
+from __future__ import annotations
+
 import math
 
 import attrs

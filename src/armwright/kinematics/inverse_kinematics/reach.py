@@ -1,5 +1,7 @@
 """The nearest position in reach, for a tool that keeps its orientation."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 

@@ -4,6 +4,8 @@ Two tables of Denavit-Hartenberg numbers may describe one arm: twists of the oth
 elsewhere, frames slid along parallel axes. The lines are the same.
 """
 
+from __future__ import annotations
+
 import math
 from functools import lru_cache
 from typing import Any

@@ -1,5 +1,7 @@
 """Joint positions that are equal but for whole revolutions, and the distance between joint configurations."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Self-motion: where a pose leaves a joint free, the configuration that is inside the limits."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import TypeAlias
 

@@ -1,5 +1,7 @@
 """What inverse kinematics answers: branches with labels and violations, and one word on the whole."""
 
+from __future__ import annotations
+
 import enum
 import math
 from collections.abc import Iterator

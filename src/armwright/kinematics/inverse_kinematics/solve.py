@@ -1,5 +1,7 @@
 """Inverse kinematics: in closed form where the arm has one, else step by step; ranked."""
 
+from __future__ import annotations
+
 from functools import partial
 
 import numpy as np
