@@ -7,7 +7,7 @@ import attrs
 
 from armwright.errors import ArmwrightError
 from armwright.program.bytecode.emitter import Emitter
-from armwright.program.bytecode.instructions import Instruction, Op, Operand
+from armwright.program.bytecode.instructions import Operand
 from armwright.program.debugger.snapshot import StackFrame
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
@@ -102,7 +102,7 @@ def evaluate(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> 
     if parsed.type is ExpressionType.EVENT:
         return float(evaluator.state.events.get(evaluator.resolve_name(process, operand), 0))
     try:
-        return evaluator.read(process, operand, Instruction(op=Op.PRINT, span=parsed.node.span))
+        return evaluator.read(process, operand, parsed.node.span)
     except RunError as error:
         raise ExpressionError(str(error)) from None
 

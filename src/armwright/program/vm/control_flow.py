@@ -25,21 +25,21 @@ def _jump(machine: Machine, process: Process, step: Instruction) -> None:  # noq
 
 
 def _jump_if_not(machine: Machine, process: Process, step: Instruction) -> None:
-    if not machine.read(process, step.operands[0], step):
+    if not machine.read(process, step.operands[0], step.span):
         process.pc = jump_target(step, 1)
 
 
 def _for(machine: Machine, process: Process, step: Instruction) -> None:
     variable, count, *bounds = step.operands[:5]
-    passes = machine.read_number(process, count, step)
-    first, last, increment = (machine.read_number(process, bound, step) for bound in bounds)
+    passes = machine.read_number(process, count, step.span)
+    first, last, increment = (machine.read_number(process, bound, step.span) for bound in bounds)
     if increment == 0:
         raise machine.error(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
     if passes > (last - first) / increment + _ROUNDING:
         process.pc = jump_target(step, 5)
         return
-    machine.write(process, variable, first + passes * increment, step)
-    machine.write(process, count, passes + 1, step)
+    machine.write(process, variable, first + passes * increment, step.span)
+    machine.write(process, count, passes + 1, step.span)
 
 
 # ---- procedures ----------------------------------------------------------------------------------------------------
@@ -63,9 +63,9 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
                 continue
             if by_value:
                 read = machine.read_number if kind.kind is VariableKind.SCALAR else machine.read_pose
-                machine.state.values[slot] = read(process, operand, step)
+                machine.state.values[slot] = read(process, operand, step.span)
             else:
-                X_WF = machine.read_pose(process, operand, step)
+                X_WF = machine.read_pose(process, operand, step.span)
                 machine.replace_tree(machine.state.tree.set_pose(slot, X_WF), slot, step.span)
         bindings[key] = slot
         machine.state.types[slot] = kind
@@ -106,7 +106,7 @@ def _fork(machine: Machine, process: Process, step: Instruction) -> None:
     parent = process.activation
     names, temporaries, spans = parent.bindings, parent.temporaries, parent.temporary_spans
     _check_process_limit(machine, process, step)
-    priority = machine.read_number(process, step.operands[1], step) if len(step.operands) > 1 else process.priority
+    priority = machine.read_number(process, step.operands[1], step.span) if len(step.operands) > 1 else process.priority
     branch = Process(
         path=(*process.path, len(process.branches)),
         priority=priority,
@@ -162,7 +162,7 @@ def end_process(machine: Machine, process: Process) -> None:
 
 
 def _pause(machine: Machine, process: Process, step: Instruction) -> None:
-    seconds = machine.read_number(process, step.operands[0], step)
+    seconds = machine.read_number(process, step.operands[0], step.span)
     if not 0 <= seconds <= _MAX_PAUSE:
         text = f"a PAUSE of {seconds:g} s is not possible"
         raise machine.error(process, "E231", text, step.span, f"expected 0 to {_MAX_PAUSE:g} s")

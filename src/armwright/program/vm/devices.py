@@ -18,7 +18,7 @@ def _move_fingers(machine: Machine, process: Process, step: Instruction) -> None
         text = "GRASP names no arm, and no arm has been used before"
         raise machine.error(process, "E307", text, step.span, "which arm?", helps=[f"write `GRASP {example}`"])
     machine.claim_arm(process, arm, step.span)
-    width = machine.read_number(process, step.operands[1], step) if len(step.operands) > 1 else None
+    width = machine.read_number(process, step.operands[1], step.span) if len(step.operands) > 1 else None
     metres = None if width is None else width * machine.code.units.metres
     if metres is not None and not 0 <= metres <= 1:
         text = f"the fingers cannot open to {width:g} {machine.code.units.length.lower()}"

@@ -16,21 +16,21 @@ _INTEGER_TOLERANCE = 1e-9
 def _load(machine: Machine, process: Process, step: Instruction) -> None:
     constant = step.operands[1]
     assert isinstance(constant, Constant)  # noqa: S101 - the translator gives one
-    machine.write(process, step.operands[0], machine.constants[constant.index], step)
+    machine.write(process, step.operands[0], machine.constants[constant.index], step.span)
 
 
 def _copy(machine: Machine, process: Process, step: Instruction) -> None:
-    machine.write(process, step.operands[0], machine.read(process, step.operands[1], step), step)
+    machine.write(process, step.operands[0], machine.read(process, step.operands[1], step.span), step.span)
 
 
 def _compute(machine: Machine, process: Process, step: Instruction) -> None:
-    values = [machine.read(process, operand, step) for operand in step.operands[1:]]
+    values = [machine.read(process, operand, step.span) for operand in step.operands[1:]]
     units = (machine.code.units,) if step.op in OPERATIONS_WITH_UNITS else ()
     try:
         value = OPERATIONS[step.op](*values, *units)
     except EvaluationError as fault:
         raise machine.error(process, fault.code, fault.message, step.span, fault.label) from None
-    machine.write(process, step.operands[0], value, step)
+    machine.write(process, step.operands[0], value, step.span)
 
 
 def _element(machine: Machine, process: Process, step: Instruction) -> None:
@@ -39,7 +39,7 @@ def _element(machine: Machine, process: Process, step: Instruction) -> None:
     sizes = machine.state.types[array].sizes
     indices = []
     for number, (operand, size) in enumerate(zip(step.operands[2:], sizes, strict=True), 1):
-        value = machine.read_number(process, operand, step)
+        value = machine.read_number(process, operand, step.span)
         index = round(value) if math.isfinite(value) else 0
         if abs(value - index) > _INTEGER_TOLERANCE or not 1 <= index <= size:
             index_name = f"index {number}" if len(sizes) > 1 else "the index"
@@ -57,7 +57,7 @@ def _force(machine: Machine, process: Process, step: Instruction) -> None:
     value = 0.0
     if arm is not None:
         value = float(machine.hardware.contact_force(arm, machine.now)[_AXES[str(step.operands[1])]])
-    machine.write(process, step.operands[0], value, step)
+    machine.write(process, step.operands[0], value, step.span)
 
 
 HANDLERS: Mapping[Op, Handler] = {
@@ -76,6 +76,6 @@ def evaluate_instructions(machine: Machine, process: Process, steps: Sequence[In
         index += 1
         if step.op is Op.JZ:
             # AND and OR jump forwards; nothing else in an expression jumps.
-            index = index if machine.read(process, step.operands[0], step) else jump_target(step, 1)
+            index = index if machine.read(process, step.operands[0], step.span) else jump_target(step, 1)
         else:
             HANDLERS[step.op](machine, process, step)

@@ -21,10 +21,10 @@ def _affix(machine: Machine, process: Process, step: Instruction) -> None:
         raise machine.error(process, code, text, step.span, "cannot be attached to a frame")
     if is_arm(parent):
         process.last_arm = parent
-    step_X = machine.read_pose(process, operands[2], step) if step.op is Op.AFFAT else None
-    machine.slot_value(parent, step, process)
+    step_X = machine.read_pose(process, operands[2], step.span) if step.op is Op.AFFAT else None
+    machine.slot_value(process, parent, step.span)
     if step_X is None:
-        machine.slot_value(child, step, process)
+        machine.slot_value(process, child, step.span)
     if machine.state.tree.would_close_cycle(child, parent):
         note = "frames form a tree with the root WORLD; each is attached to one parent"
         label = f"{spelled(child)} cannot be attached to {'itself' if child == parent else spelled(parent)}"
@@ -44,7 +44,7 @@ def _unfix(machine: Machine, process: Process, step: Instruction) -> None:
     if is_arm(child) or child == WORLD:
         code, text = "E308" if is_arm(child) else "E309", f"`{spelled(child)}` cannot be unfixed"
         raise machine.error(process, code, text, step.span, "has no parent")
-    machine.slot_value(child, step, process)
+    machine.slot_value(process, child, step.span)
     parent_name = machine.state.tree.parent(child)
     if len(step.operands) > 1 and (parent := machine.resolve_name(process, step.operands[1])) != parent_name:
         actual = spelled(parent_name or WORLD)

@@ -143,7 +143,7 @@ class Machine:
             return VariableType(VariableKind.FRAME)
         return VariableType(self.state.types[base].kind) if bracket else self.state.types[base]
 
-    def read(self, process: Process, operand: Operand, step: Instruction) -> Value:
+    def read(self, process: Process, operand: Operand, span: Span) -> Value:
         """Return the value of an operand.
 
         Raises:
@@ -154,40 +154,40 @@ class Machine:
             return float(operand)
         if operand.startswith("%"):
             value = process.activation.temporaries[operand]
-            return self.slot_value(value.name, step, process) if isinstance(value, ElementReference) else value
-        return self.slot_value(process.activation.bindings.get(operand, operand), step, process)
+            return self.slot_value(process, value.name, span) if isinstance(value, ElementReference) else value
+        return self.slot_value(process, process.activation.bindings.get(operand, operand), span)
 
-    def slot_value(self, name: str, step: Instruction, process: Process) -> Value:
+    def slot_value(self, process: Process, name: str, span: Span) -> Value:
         """Return what a kept name holds."""
         if self.type_of(name).kind is VariableKind.FRAME:
             self.update_frame(process, name)
             if not self.has_pose(name):
                 text = f"frame `{self.spelling(name)}` is used before it has a value"
-                raise self.error(process, "E304", text, step.span, "no value here")
+                raise self.error(process, "E304", text, span, "no value here")
             return self.state.tree.world(name)
         if (value := self.state.values.get(name)) is None:
             text = f"`{self.spelling(name)}` is used before it has a value"
-            raise self.error(process, "E303", text, step.span, "no value here")
+            raise self.error(process, "E303", text, span, "no value here")
         return value
 
-    def read_number(self, process: Process, operand: Operand, step: Instruction) -> float:
+    def read_number(self, process: Process, operand: Operand, span: Span) -> float:
         """Return the value of an operand that is a number."""
-        value = self.read(process, operand, step)
+        value = self.read(process, operand, span)
         assert isinstance(value, float | int)  # noqa: S101 - the checker knows the kinds
         return float(value)
 
-    def read_pose(self, process: Process, operand: Operand, step: Instruction) -> Array:
+    def read_pose(self, process: Process, operand: Operand, span: Span) -> Array:
         """Return the value of an operand that is a pose or a step."""
-        value = self.read(process, operand, step)
+        value = self.read(process, operand, span)
         assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
         return value
 
-    def write(self, process: Process, operand: Operand, value: Value, step: Instruction) -> None:
+    def write(self, process: Process, operand: Operand, value: Value, span: Span) -> None:
         """Give a variable, an element or a value in passing its value."""
         assert isinstance(operand, str)  # noqa: S101 - the translator names what is written
         if operand.startswith("%") and not isinstance(process.activation.temporaries.get(operand), ElementReference):
             process.activation.temporaries[operand] = value
-            process.activation.temporary_spans[operand] = step.span
+            process.activation.temporary_spans[operand] = span
             return
         name = self.resolve_name(process, operand)
         if self.type_of(name).kind is not VariableKind.FRAME:
@@ -195,9 +195,9 @@ class Machine:
             self.state.values[name] = value
             return
         assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
-        self.set_pose(process, name, value, step.span)
+        self.set_pose(process, name, value, span)
         text, data = f"{self.spelling(name)} = {value_text(value, self.code.units)}", pose_data(name, value)
-        self.record_effect(process, "PLACE", text, step.span, data=data)
+        self.record_effect(process, "PLACE", text, span, data=data)
 
     def has_pose(self, name: str) -> bool:
         """Whether a frame stands somewhere."""

@@ -145,7 +145,7 @@ def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction)
     """Return the arm that carries what is moved, and whether it hangs there only from now on."""
     if is_arm(moved):
         return moved, False
-    machine.slot_value(moved, begin, process)
+    machine.slot_value(process, moved, begin.span)
     if (arm := machine.carrier(moved)) is not None:
         return arm, False
     X_WM = machine.state.tree.world(moved)
@@ -210,7 +210,7 @@ def _plan_stages(
 
 
 def _goal_pose(machine: Machine, process: Process, goal: Goal) -> Array:
-    return machine.read_pose(process, goal.operand, goal.instruction)
+    return machine.read_pose(process, goal.operand, goal.span)
 
 
 def _slow_to_duration(
@@ -252,7 +252,7 @@ def _fail_move(
         process,
         CODES[obstacle.cause],
         obstacle_message(obstacle, label, arm, machine.cell.arms[arm].arm),
-        goal.instruction.span,
+        goal.span,
         "cannot be reached",
         secondary=secondary,
         notes=(obstacle_location(obstacle, kind, stage.frames, arm),),

@@ -14,11 +14,11 @@ _MAX_DURATION = 1e6
 
 
 class Goal(NamedTuple):
-    """One frame of a MOVE: as its stages are called by, its operand, the clause that names it."""
+    """One frame of a MOVE: as its stages are called by, its operand, the part of the program that names it."""
 
     label: str
     operand: Operand
-    instruction: Instruction
+    span: Span
 
 
 class MoveRequest(NamedTuple):
@@ -75,10 +75,9 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
 
 def _goal(machine: Machine, process: Process, operand: Operand, step: Instruction) -> Goal:
     span = step.span
-    if isinstance(operand, str) and operand.startswith("%"):
+    if step.op is not Op.MVBEG and isinstance(operand, str) and operand.startswith("%"):
         span = process.activation.temporary_spans[operand]
-    clause = Instruction(op=step.op, operands=step.operands, span=span)
-    return Goal(machine.operand_text(process, operand), operand, clause if step.op is not Op.MVBEG else step)
+    return Goal(machine.operand_text(process, operand), operand, span)
 
 
 def _make_labels_unique(goals: dict[str, list[Goal]]) -> None:
@@ -95,7 +94,7 @@ def _make_labels_unique(goals: dict[str, list[Goal]]) -> None:
 def _clause_value(machine: Machine, process: Process, part: Instruction) -> float:
     """Return speed, blend [m] or duration [s], checked."""
     operand = part.operands[0]
-    value = machine.read_number(process, operand, part)
+    value = machine.read_number(process, operand, part.span)
     name = f"{machine.operand_text(process, operand)} = {value:g}" if isinstance(operand, str) else f"{value:g}"
     if part.op is Op.MVSPD:
         if not LOWEST_SPEED <= value <= HIGHEST_SPEED:
