@@ -1,6 +1,8 @@
 """Concurrency: deadlocks, equal priorities, and arms that two branches use."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import count, dropwhile
 
 import attrs
 
@@ -66,13 +68,13 @@ def report_shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
     used = {arm for branch in branches for arm in branch.arms}
     for branch in branches:
         for arm, use in branch.arms.items():
-            free = _unused_arm(state, used)
             first = first_use.setdefault(arm, use)
             if first is use:
                 continue
             does = "moved" if first.moves and use.moves else "used"
             text, note = f"{arm} is {does} in two branches of one COBEGIN", "each arm belongs to one process at a time"
             here = (Label(first.span, "first branch"), *dict.fromkeys((*first.affixed_at, *use.affixed_at)))
+            free = _unused_arm(state, used)
             advice = f"use {free} in one branch, or give the arm over with SIGNAL and WAIT outside COBEGIN"
             state.report("E503", text, use.span, "second branch", secondary=here, note=note, advice=advice)
 
@@ -80,7 +82,7 @@ def report_shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
 def _unused_arm(state: FlowState, used: set[str]) -> str:
     """Return an arm that no branch uses."""
     free = sorted(state.cell.arms - used) if state.cell else []
-    return free[0] if free else next(arm for n in range(1, len(used) + 2) if (arm := f"ARM_{n}") not in used)
+    return free[0] if free else next(arm for n in count(1) if (arm := f"ARM_{n}") not in used)
 
 
 # ---- events ----------------------------------------------------------------------------------------------------------
@@ -92,6 +94,11 @@ class _EventStep:
 
     node: tree.Signal | tree.Wait
     event: str
+
+    @property
+    def is_wait(self) -> bool:
+        """Whether it is a WAIT."""
+        return isinstance(self.node, tree.Wait)
 
 
 class _Events:
@@ -112,99 +119,77 @@ class _Events:
         if isinstance(node, tree.Cobegin):
             self.cobegins.append((scope, node))
         elif isinstance(node, tree.Call):
-            self.passed.update(
-                array_name(name) for argument in node.arguments if (name := written_name(argument, scope))
-            )
+            names = (written_name(argument, scope) for argument in node.arguments)
+            self.passed.update(array_name(name) for name in names if name)
         elif isinstance(node, tree.Signal | tree.Wait) and (name := written_name(node.event, scope)) is not None:
             if isinstance(node, tree.Wait):
                 self.waits.setdefault(name, []).append((scope, node))
             else:
                 self.signals.setdefault(name, []).append(node)
 
-    def is_signalled(self, name: str) -> bool:
-        """Whether something may signal an event, or another element of its array."""
-        return array_name(name) in self.passed or any(array_name(other) == array_name(name) for other in self.signals)
+    def is_signalled(self, array: str) -> bool:
+        """Whether something may signal an event, or an element of an array of events."""
+        return array in self.passed or array in map(array_name, self.signals)
 
     def sequences(self, scope: Scope, branches: Iterable[Sequence[tree.Statement]]) -> list[list[_EventStep]]:
         """Return the SIGNALs and WAITs of branches in order, of events that no other statement uses."""
-        steps = [[*_unconditional_steps(branch, scope)] for branch in branches]
-        here = {id(step.node) for several in steps for step in several}
-        waiting = [{step.event for step in several if isinstance(step.node, tree.Wait)} for several in steps]
-        names = {step.event for several in steps for step in several}
-        own = {
-            name
-            for name in names
-            if self._is_closed(name, scope, here) and sum(name in statement for statement in waiting) == 1
-        }
-        return [[step for step in several if step.event in own] for several in steps]
+        sequences = [[*_unconditional_steps(branch, scope)] for branch in branches]
+        here = {id(step.node) for steps in sequences for step in steps}
+        # Of each event, in how many branches it is awaited.
+        awaited = Counter(event for steps in sequences for event in {step.event for step in steps if step.is_wait})
+        own = {event for event, number in awaited.items() if number == 1 and self._is_closed(event, scope, here)}
+        return [[step for step in steps if step.event in own] for steps in sequences]
 
     def _is_closed(self, name: str, scope: Scope, here: set[int]) -> bool:
-        procedure = scope.procedure
-        if procedure is not None:
-            # Several activations of a procedure share what is not local to it.
-            key = array_name(name).rpartition(".")[2]
-            if not scope.is_local(key) or key in procedure.parameters:
-                return False
-        unclear = is_any_element(name) or f"{array_name(name)}[]" in (*self.waits, *self.signals)
-        if unclear or array_name(name) in self.passed or name not in self.signals:
+        array = array_name(name)
+        key = array.rpartition(".")[2]
+        # Several activations of a procedure share what is not local to it.
+        is_shared = scope.procedure is not None and (not scope.is_local(key) or scope.is_parameter(key))
+        any_element = is_any_element(name) or f"{array}[]" in (*self.waits, *self.signals)
+        if is_shared or any_element or array in self.passed or name not in self.signals:
             return False
-        nodes = [*self.signals[name], *(node for _, node in self.waits.get(name, ()))]
+        nodes = (*self.signals[name], *(node for _, node in self.waits[name]))
         return all(id(node) in here for node in nodes)
 
 
 def _unconditional_steps(statements: Sequence[tree.Statement], scope: Scope) -> Iterator[_EventStep]:
     """Yield the unconditional SIGNALs and WAITs, up to a HALT."""
     for node in statements:
-        match node:
-            case tree.Signal(event=event) | tree.Wait(event=event):
-                name = written_name(event, scope)
-                if name is not None:
-                    yield _EventStep(node, name)
-            case tree.Block(statements=inner):
-                yield from _unconditional_steps(inner, scope)
-            case tree.Lock(body=body):
-                yield from _unconditional_steps((body,), scope)
-            case tree.Halt():
-                return
-            case _:
-                pass
+        if isinstance(node, tree.Signal | tree.Wait):
+            if (name := written_name(node.event, scope)) is not None:
+                yield _EventStep(node, name)
+        elif isinstance(node, tree.Block | tree.Lock):
+            yield from _unconditional_steps(child_statements(node), scope)
+        elif isinstance(node, tree.Halt):
+            return
 
 
 def _may_halt_while_waiting(scope: Scope, statements: Sequence[tree.Statement]) -> bool:
     """Whether a HALT may end the program while other processes wait."""
     waiting = [(statement, scope.procedure is not None) for statement in statements]
     while waiting:
-        node, beside = waiting.pop()
-        if beside and isinstance(node, tree.Halt):
+        node, is_concurrent = waiting.pop()
+        if is_concurrent and isinstance(node, tree.Halt):
             return True
         # In an action of a MOVE it only ends the MOVE.
-        inside = () if isinstance(node, tree.Move) else child_statements(node)
-        waiting += [(inner, beside or isinstance(node, tree.Cobegin)) for inner in inside]
+        children = () if isinstance(node, tree.Move) else child_statements(node)
+        waiting += [(child, is_concurrent or isinstance(node, tree.Cobegin)) for child in children]
     return False
 
 
 def _report_never_signalled(findings: DiagnosticList, events: _Events) -> None:
-    reported: set[str] = set()
+    # The first WAIT of each event or array of events.
+    first: dict[str, tuple[Scope, tree.Wait]] = {}
     for name, waits in events.waits.items():
-        scope, node = waits[0]
-        key = array_name(name).rpartition(".")[2]
-        kind, procedure = scope.type(key), scope.procedure
-        is_parameter = procedure is not None and scope.is_local(key) and key in procedure.parameters
-        if (
-            kind is None
-            or kind.kind is not VariableKind.EVENT
-            or is_parameter
-            or events.is_signalled(name)
-            or array_name(name) in reported
-        ):
-            continue
-        reported.add(array_name(name))
-        text = expression_text(node.event)
-        message = f"nothing signals `{text}`, so this WAIT never ends"
-        advice = f"write `SIGNAL {text}` in another branch"
-        findings.report(
-            "E501", message, node.span, "waits for ever", secondary=scope.declaration_labels(key), advice=advice
-        )
+        first.setdefault(array_name(name), waits[0])
+    for array, (scope, node) in first.items():
+        key = array.rpartition(".")[2]
+        kind, text = scope.type(key), expression_text(node.event)
+        is_event = kind is not None and kind.kind is VariableKind.EVENT
+        if is_event and not scope.is_parameter(key) and not events.is_signalled(array):
+            message = f"nothing signals `{text}`, so this WAIT never ends"
+            here, advice = scope.declaration_labels(key), f"write `SIGNAL {text}` in another branch"
+            findings.report("E501", message, node.span, "waits for ever", secondary=here, advice=advice)
 
 
 # ---- waits that cannot end -------------------------------------------------------------------------------------------
@@ -220,7 +205,7 @@ def _check_deadlock(findings: DiagnosticList, branches: list[list[_EventStep]], 
     signals: dict[str, tuple[int, _EventStep]] = {}
     for number in stuck:
         for step in branches[number][reached[number] :]:
-            if isinstance(step.node, tree.Signal):
+            if not step.is_wait:
                 signals.setdefault(step.event, (number, step))
     path: dict[int, None] = {}
     now = min(stuck)
@@ -230,42 +215,36 @@ def _check_deadlock(findings: DiagnosticList, branches: list[list[_EventStep]], 
             _report_too_few_signals(findings, stuck[now], branches)
             return
         now, _ = signals[stuck[now].event]
-    cycle = list(path)[list(path).index(now) :]
-    _report_cyclic_wait(
-        findings, [(stuck[statement], signals[stuck[statement].event][1]) for statement in cycle], source, main=main
-    )
+    cycle = [stuck[number] for number in dropwhile(lambda number: number != now, path)]
+    _report_cyclic_wait(findings, [(wait, signals[wait.event][1]) for wait in cycle], source, main=main)
 
 
 def _simulate(branches: list[list[_EventStep]]) -> list[int]:
     """Simulate the branches and return how far each comes: SIGNALs are counted, each event has one waiting branch."""
     reached = [0] * len(branches)
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     waiting_branches: dict[str, int] = {}
     ready = list(range(len(branches)))
     while ready:
         number = ready.pop()
-        steps = branches[number]
-        while reached[number] < len(steps):
-            step = steps[reached[number]]
-            if isinstance(step.node, tree.Signal):
-                counts[step.event] = counts.get(step.event, 0) + 1
-                if step.event in waiting_branches:
-                    ready.append(waiting_branches.pop(step.event))
-            elif counts.get(step.event, 0) == 0:
+        while reached[number] < len(branches[number]):
+            step = branches[number][reached[number]]
+            if step.is_wait and not counts[step.event]:
                 waiting_branches[step.event] = number
                 break
-            else:
-                counts[step.event] -= 1
+            counts[step.event] += -1 if step.is_wait else 1
+            if not step.is_wait and step.event in waiting_branches:
+                ready.append(waiting_branches.pop(step.event))
             reached[number] += 1
     return reached
 
 
 def _report_too_few_signals(findings: DiagnosticList, step: _EventStep, branches: list[list[_EventStep]]) -> None:
-    nodes = [statement.node for several in branches for statement in several if statement.event == step.event]
-    signals = [node.span for node in nodes if isinstance(node, tree.Signal)]
+    steps = [other for branch in branches for other in branch if other.event == step.event]
+    signals = [other.node.span for other in steps if not other.is_wait]
     text = f"`{expression_text(step.node.event)}` is waited for more often than it is signalled"
     here = tuple(Label(span, "signalled here") for span in signals[:_MAX_LOCATIONS])
-    note = f"{len(nodes) - len(signals)} WAITs, and {len(signals)} SIGNAL{'s' * (len(signals) > 1)}"
+    note = f"{len(steps) - len(signals)} WAITs, and {len(signals)} SIGNAL{'s' * (len(signals) > 1)}"
     findings.report("E501", text, step.node.span, "waits for ever", secondary=here, note=note)
 
 
@@ -285,9 +264,9 @@ def _report_cyclic_wait(
         labels.append(Label(wait.node.span, f"waits for the SIGNAL in line {source.line(signal.node.span.start)}"))
         labels.append(Label(signal.node.span, "comes after that WAIT"))
     first, *others = sorted(labels, key=lambda label: label.span.start)
-    count = len(cycle)
-    message = {
-        1: f"{'the program' if main else 'this branch'} waits for itself for ever",
-        2: "these two branches wait for each other for ever",
-    }.get(count, f"these {count} branches wait for one another for ever")
+    message = f"these {len(cycle)} branches wait for one another for ever"
+    if len(cycle) == 1:
+        message = f"{'the program' if main else 'this branch'} waits for itself for ever"
+    elif len(cycle) == 2:
+        message = "these two branches wait for each other for ever"
     findings.report("E501", message, first.span, first.text, secondary=tuple(others))

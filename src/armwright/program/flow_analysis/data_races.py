@@ -10,7 +10,7 @@ from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, la
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import array_name, is_any_element
 from armwright.program.language.source import Span
-from armwright.program.semantics.symbols import Scope, Symbols, scoped_bodies
+from armwright.program.semantics.symbols import Scope, ScopedBody, Symbols, scoped_bodies
 from armwright.program.syntax import tree
 
 # Concurrent branches that are checked, and pairs of writes, signals and waits that are compared.
@@ -55,7 +55,7 @@ class _Write:
     """A statement that gives a variable a value.
 
     Attributes:
-        name: of the variable or element, as ``writes.written_name`` gives it.
+        name: of the variable or element, as ``written_name`` gives it.
         text: as the program writes it.
         span: the statement, or the call in the branch that leads to it.
         value: the number, where that is all it depends on.
@@ -81,24 +81,20 @@ class _Branch:
 
     def leads_to(self, other: "_Branch") -> bool:
         """Whether it signals an event that another waits for."""
-        return any(_may_be_equal(branch, two) for branch, two in self._signal_wait_pairs(other))
+        return any(True for _ in self.handshakes(other))
 
     def orders(self, write: _Write, other: "_Branch", later: _Write) -> bool:
         """Whether it signals after a write an event that another branch awaits before its own write."""
-        return any(
-            _may_be_equal(branch, two) and write.location.may_precede(branch[1]) and two[1].may_precede(later.location)
-            for branch, two in self._signal_wait_pairs(other)
-        )
+        pairs = self.handshakes(other)
+        return any(write.location.may_precede(signal) and wait.may_precede(later.location) for signal, wait in pairs)
 
-    def _signal_wait_pairs(self, other: "_Branch") -> "Iterator[tuple[tuple[str, _Location], tuple[str, _Location]]]":
-        return islice(product(self.signals, other.waits), _MAX_PAIRS)
-
-
-def _may_be_equal(branch: tuple[str, _Location], other: tuple[str, _Location]) -> bool:
-    """Whether two events may be the same."""
-    names = {branch[0], other[0]}
-    any_element = any(is_any_element(name) for name in names) and len({array_name(name) for name in names}) == 1
-    return _ANY in names or len(names) == 1 or any_element
+    def handshakes(self, other: "_Branch") -> Iterator[tuple[_Location, _Location]]:
+        """Yield the SIGNALs and the WAITs of another branch that may be about the same event."""
+        for (signalled, signal), (awaited, wait) in islice(product(self.signals, other.waits), _MAX_PAIRS):
+            names = {signalled, awaited}
+            any_element = any(map(is_any_element, names)) and array_name(signalled) == array_name(awaited)
+            if _ANY in names or len(names) == 1 or any_element:
+                yield signal, wait
 
 
 def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
@@ -109,10 +105,8 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
     findings = DiagnosticList()
     everywhere = scoped_bodies(program, symbols)
     for scope, statements in everywhere:
-        cobegins = [branch for branch in walk_statements(statements) if isinstance(branch, tree.Cobegin)]
-        inner = {
-            id(branch) for cobegin in cobegins for branch in walk_statements(part.body for part in cobegin.branches)
-        }
+        cobegins = [node for node in walk_statements(statements) if isinstance(node, tree.Cobegin)]
+        inner = {id(node) for cobegin in cobegins for node in walk_statements(child_statements(cobegin))}
         for cobegin in cobegins:
             if len(cobegin.branches) <= _MAX_BRANCHES:
                 # A COBEGIN in a branch or a procedure may run concurrently with other statements.
@@ -122,18 +116,11 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
 
 
 def _check_branches(
-    findings: DiagnosticList,
-    cobegin: tree.Cobegin,
-    scope: Scope,
-    symbols: Symbols,
-    others: Sequence[tuple[Scope, tuple[tree.Statement, ...]]],
+    findings: DiagnosticList, cobegin: tree.Cobegin, scope: Scope, symbols: Symbols, others: Sequence[ScopedBody]
 ) -> None:
     """Check the branches of one COBEGIN; ``others`` may run concurrently."""
     branches = [_branch(_walk((part.body,), scope, symbols), scope) for part in cobegin.branches]
-    outside = [
-        _branch((step for step in _walk(body, own, symbols) if not _is_inside(step.node.span, cobegin.span)), own)
-        for own, body in others
-    ]
+    outside = [_branch(_walk(body, own, symbols), own, without=cobegin.span) for own, body in others]
     names = dict.fromkeys(name for branch in branches for name in branch.writes)
     for name in names:
         writers = [branch for branch in branches if name in branch.writes]
@@ -176,24 +163,21 @@ def _report(findings: DiagnosticList, first: _Write, second: _Write) -> None:
     findings.report("W503", text, second.span, "second branch", secondary=here, note=note, advice=advice)
 
 
-def _is_inside(span: Span, around: Span) -> bool:
-    return around.start <= span.start and span.end <= around.end
-
-
 # ---- what a branch does ----------------------------------------------------------------------------------------------
 
 
-def _branch(steps: Iterable[_Step], scope: Scope) -> _Branch:
-    """Return the writes and events of the statements of a branch."""
+def _branch(steps: Iterable[_Step], scope: Scope, *, without: Span | None = None) -> _Branch:
+    """Return the writes and events of the statements of a branch, those in a span left out."""
     branch = _Branch({}, [], [])
     for step in steps:
-        if isinstance(step.node, tree.Signal | tree.Wait):
-            name = written_name(step.node.event, step.scope)
+        node = step.node
+        if without is not None and without.start <= node.span.start and node.span.end <= without.end:
+            continue
+        if isinstance(node, tree.Signal | tree.Wait):
+            name = written_name(node.event, step.scope) or _ANY
+            events = branch.signals if isinstance(node, tree.Signal) else branch.waits
             # In a procedure an event may be a parameter.
-            known = name is not None and "." not in name
-            (branch.signals if isinstance(step.node, tree.Signal) else branch.waits).append(
-                (name if known and name is not None else _ANY, step.location)
-            )
+            events.append((_ANY if "." in name else name, step.location))
         for write in _writes(step, scope):
             branch.writes.setdefault(write.name, []).append(write)
     return branch
@@ -229,9 +213,8 @@ def _walk(body: Sequence[tree.Statement], scope: Scope, symbols: Symbols) -> Ite
     """Yield statements, all inside them, and all in the procedures that they call, each procedure once."""
     called: set[str] = set()
     order = 0
-    waiting: list[tuple[tree.Statement, Scope, frozenset[str], Span | None, int | None]] = [
-        (branch, scope, frozenset(), None, None) for branch in reversed(body)
-    ]
+    waiting: list[tuple[tree.Statement, Scope, frozenset[str], Span | None, int | None]]
+    waiting = [(node, scope, frozenset(), None, None) for node in reversed(body)]
     while waiting:
         node, own, locked, call, loop = waiting.pop()
         order += 1
@@ -241,10 +224,9 @@ def _walk(body: Sequence[tree.Statement], scope: Scope, symbols: Symbols) -> Ite
         if loop is None and isinstance(node, tree.While | tree.Repeat | tree.For):
             loop = order
         # The branches of an inner COBEGIN are checked there.
-        waiting += [(inner, own, locked, call, loop) for inner in reversed(child_statements(node))]
-        if isinstance(node, tree.Call) and node.name.key not in called:
+        waiting += [(child, own, locked, call, loop) for child in reversed(child_statements(node))]
+        if isinstance(node, tree.Call) and node.name.key in symbols.procedures and node.name.key not in called:
             called.add(node.name.key)
-            procedure = symbols.procedures.get(node.name.key)
-            if procedure is not None:
-                callee, site = symbols.scope(node.name.key), call or node.span
-                waiting += [(inner, callee, locked, site, loop) for inner in reversed(procedure.node.body.statements)]
+            callee, site = symbols.scope(node.name.key), call or node.span
+            statements = symbols.procedures[node.name.key].node.body.statements
+            waiting += [(child, callee, locked, site, loop) for child in reversed(statements)]

@@ -2,7 +2,7 @@
 
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.state import FlowState
-from armwright.program.language.diagnostic import Label
+from armwright.program.language.diagnostic import labels
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any_element, is_arm
 from armwright.program.semantics.expression_types import expression_text
@@ -39,65 +39,33 @@ def require_indices(state: FlowState, *nodes: object) -> None:
             require_value(state, *node.indices)
 
 
-def _kind(state: FlowState, node: tree.Expression) -> VariableKind | None:
-    key = node.name.key if isinstance(node, tree.Index) else getattr(node, "key", "")
-    kind = state.now.scope.type(key)
-    return None if kind is None or kind.kind is VariableKind.EVENT else kind.kind
-
-
 def _require_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
     name = state.variable(node)
     if name is None or is_any_element(name) or is_arm(name):
         return
-    if state.table.may_be_assigned[name]:
-        divergence = state.table.definitely_assigned[name]
-        if isinstance(divergence, Divergence) and state.conditions <= divergence.depth:
-            _warn_of_divergence(state, node, name, divergence)
+    is_assigned, divergence = state.table.may_be_assigned[name], state.table.definitely_assigned[name]
+    if is_assigned and not isinstance(divergence, Divergence):
         return
-    head = node.name if isinstance(node, tree.Index) else node
-    scope, kind = state.now.scope, _kind(state, node)
-    slot = state.slot_of(head.key)
-    if slot is None or kind is None or scope.is_poisoned(head.key) or not state.is_first_report(slot):
+    key, text = node.name.key if isinstance(node, tree.Index) else node.key, expression_text(node)
+    scope, slot, kind = state.now.scope, state.slot_of(key), state.now.scope.type(key)
+    is_frame = kind is not None and kind.kind is VariableKind.FRAME
+    if is_assigned and isinstance(divergence, Divergence):
+        # Where the use is conditional too, there is no warning: the condition may be the same.
+        is_certain = state.conditions <= divergence.depth and not (is_frame and state.cell is None)
+        if is_certain and state.is_first_report(name):
+            here, message = labels(divergence.span, divergence.message), f"`{text}` may have no value here"
+            state.report("W207", message, node.span, "needs a value", secondary=here, advice=divergence.advice)
         return
-    secondary = scope.declaration_labels(head.key)
-    if kind is VariableKind.FRAME:
-        _report_no_pose(state, node, secondary, from_cell=slot == head.key and head is node)
+    if slot is None or scope.is_poisoned(key) or not state.is_first_report(slot):
         return
-    text = f"`{expression_text(node)}` is used before it has a value"
-    advice = (
-        f"write `{expression_text(node)} = {'100' if kind is VariableKind.SCALAR else '( twelve numbers )'} ;` before"
-    )
-    state.report("E303", text, node.span, "no value here", secondary=secondary, advice=advice)
-
-
-def _warn_of_divergence(state: FlowState, node: tree.Name | tree.Index, name: str, divergence: Divergence) -> None:
-    """Warn of a variable that is assigned on some of the paths to here only.
-
-    Where the use is conditional too, there is no warning: the condition may be the same.
-    """
-    open_cell = state.cell is None and _kind(state, node) is VariableKind.FRAME
-    if open_cell or not state.is_first_report(name):
-        return
-    text = f"`{expression_text(node)}` may have no value here"
-    state.report(
-        "W207",
-        text,
-        node.span,
-        "needs a value",
-        secondary=(Label(divergence.span, divergence.message),),
-        advice=divergence.advice,
-    )
-
-
-def _report_no_pose(
-    state: FlowState, node: tree.Name | tree.Index, secondary: tuple[Label, ...], *, from_cell: bool
-) -> None:
-    """Report a frame without a value; a cell file may give one to the frames of the program, and to no others."""
-    code, note = "E304", ""
-    if state.cell is None and from_cell:
+    code, note, advice, here = "E304", "", "", scope.declaration_labels(key)
+    if not is_frame:
+        value = "100" if kind and kind.kind is VariableKind.SCALAR else "( twelve numbers )"
+        code, advice = "E303", f"write `{text} = {value} ;` before"
+    elif state.cell is None and slot == key and isinstance(node, tree.Name):
+        # A cell file may give a value to the frames of the program, and to no others.
         code, note = "W204", "no cell was given; a cell file may give it one"
     elif state.table.is_empty:
-        note = "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
-        secondary = ()
-    text = f"frame `{expression_text(node)}` is used before it has a value"
-    state.report(code, text, node.span, "no value here", secondary=secondary, note=note)
+        here, note = (), "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
+    message = f"{'frame ' * is_frame}`{text}` is used before it has a value"
+    state.report(code, message, node.span, "no value here", secondary=here, note=note, advice=advice)

@@ -13,8 +13,7 @@ from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import expression_text
 from armwright.program.syntax import tree
 
-# ---- the gripper
-# ------------------------------------------------------------------------------------------------------
+# ---- the gripper -----------------------------------------------------------------------------------------------------
 
 
 def open_(state: FlowState, node: tree.Open) -> None:
@@ -33,31 +32,31 @@ def grasp(state: FlowState, node: tree.Grasp) -> None:
     if node.arm is not None and not isinstance(node.arm, tree.ArmName):
         return
     if arm is None:
-        help_ = f"write `GRASP {state.some_arm()}`"
+        advice = f"write `GRASP {state.some_arm()}`"
         if state.symbols.std is Standard.RLO_83:
-            help_ = f"name an arm before, as in `OPEN {state.some_arm()}`"
+            advice = f"name an arm before, as in `OPEN {state.some_arm()}`"
         text = "GRASP names no arm, and no arm has been used before"
-        state.report("E307", text, node.span, "which arm?", advice=help_)
+        state.report("E307", text, node.span, "which arm?", advice=advice)
         return
     state.record(node, None if arm == UNKNOWN else arm)
     if arm == UNKNOWN:
         state.forget_arms(grasps=True)
         return
     state.note_arm_use(arm, node.span)
-    _closed_on_arrival(state, arm)
+    _note_closed_on_arrival(state, arm)
     state.table.close(arm, node.span)
 
 
-def _closed_on_arrival(state: FlowState, arm: str) -> None:
+def _note_closed_on_arrival(state: FlowState, arm: str) -> None:
     """Note a gripper that arrives at its object with closed fingers."""
-    hand = state.table.grippers[arm]
-    opened_late = hand.arrived_open is None and hand.opened is not None
-    never_opened = hand.arrived_open is False and hand.opened is None
-    if hand.arrival is None or hand.at is None or not (opened_late or never_opened):
+    gripper = state.table.grippers[arm]
+    opened_late = gripper.arrived_open is None and gripper.opened is not None
+    never_opened = gripper.arrived_open is False and gripper.opened is None
+    if gripper.arrival is None or gripper.at is None or not (opened_late or never_opened):
         return
-    text = f"{arm} {'may come' if opened_late else 'comes'} to `{state.name(hand.at)}` with closed fingers"
-    here, advice = labels(hand.opened, "they open here"), f"write `OPEN {arm}` before this MOVE"
-    state.report("L301", text, hand.arrival, "it arrives here", secondary=here, advice=advice)
+    text = f"{arm} {'may come' if opened_late else 'comes'} to `{state.name(gripper.at)}` with closed fingers"
+    here, advice = labels(gripper.opened, "they open here"), f"write `OPEN {arm}` before this MOVE"
+    state.report("L301", text, gripper.arrival, "it arrives here", secondary=here, advice=advice)
 
 
 # ---- tools and sensors -----------------------------------------------------------------------------------------------
@@ -76,17 +75,16 @@ def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
     """Read frames from the camera."""
     for target in node.targets:
         if isinstance(target, tree.Poison):
-            for name in sorted(target.names):
-                if not is_arm(name):
-                    state.table.forget(name)
+            for name in sorted(name for name in target.names if not is_arm(name)):
+                state.table.forget(name)
             continue
         require_indices(state, target)
         frame = state.frame(target)
         if frame is None or frame == WORLD:
             continue
         visions = state.cell.visions if state.cell else None
-        own = "'" in frame or "[" in frame
-        if visions is not None and not own and frame not in visions and state.is_first_report(frame):
+        is_local = "'" in frame or "[" in frame
+        if visions is not None and not is_local and frame not in visions and state.is_first_report(frame):
             near = closest(expression_text(target), visions)
             text = f"the camera of the cell has no answer for `{expression_text(target)}`"
             state.report("W601", text, target.span, "will not be found", advice=did_you_mean(near))
@@ -96,17 +94,12 @@ def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
 def operate(state: FlowState, node: tree.Operate) -> None:
     """Switch a device on or off."""
     device, devices = node.device, state.cell.devices if state.cell else None
-    if not isinstance(device, tree.Name) or devices is None:
-        return
-    known = {name.upper() for name in devices}
-    if device.key in known:
-        return
-    near = closest(device.text, known)
-    listed = ", ".join(sorted(known)) or "none"
-    text = f"the cell has no device `{device.text}`"
-    state.report(
-        "R602", text, device.span, "no such device", note=f"devices of the cell: {listed}", advice=did_you_mean(near)
-    )
+    known = {name.upper() for name in devices or ()}
+    if isinstance(device, tree.Name) and devices is not None and device.key not in known:
+        listed = ", ".join(sorted(known)) or "none"
+        text, note = f"the cell has no device `{device.text}`", f"devices of the cell: {listed}"
+        advice = did_you_mean(closest(device.text, known))
+        state.report("R602", text, device.span, "no such device", note=note, advice=advice)
 
 
 STEPS: Steps = {

@@ -1,5 +1,7 @@
 """AFFIX, UNFIX and assignments: values of variables and parents of frames."""
 
+from itertools import takewhile
+
 from armwright.program.flow_analysis import plausibility, poses
 from armwright.program.flow_analysis.context import Steps, of_state
 from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
@@ -18,15 +20,13 @@ def assign(state: FlowState, node: tree.Assign) -> None:
     require_value(state, node.value)
     require_indices(state, node.target)
     target = node.target
-    frame = state.frame(target)
-    if frame is not None:
+    if (frame := state.frame(target)) is not None:
         plausibility.check_lengths(state, node.value)
         pose = poses.constant_pose(state, node.value)
         set_pose(state, frame, target, node.span)
         state.table.set_world_pose(frame, pose)
         plausibility.check_placement(state, frame, node.value)
-        return
-    if (name := state.variable(target, VariableKind.SCALAR)) is not None:
+    elif (name := state.variable(target, VariableKind.SCALAR)) is not None:
         state.set_number(name, state.number(node.value), node.span)
     elif (name := state.variable(target, VariableKind.TRANS)) is not None:
         plausibility.check_lengths(state, node.value)
@@ -40,10 +40,10 @@ def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) ->
     """Record the pose of a frame; report one that is rigidly affixed to an arm or WORLD."""
     if is_arm(frame) or frame == WORLD:
         return
-    leader = frame if is_any_element(frame) else state.table.rigid_root(frame)
-    if leader is not None and leader != frame and (is_arm(leader) or leader == WORLD):
+    root = frame if is_any_element(frame) else state.table.rigid_root(frame)
+    if root is not None and root != frame and (is_arm(root) or root == WORLD):
         name, here = expression_text(node), state.table.affix_labels(frame, "rigidly attached here")
-        text = f"`{name}` is rigidly attached to {state.name(leader)}, which an assignment cannot move"
+        text = f"`{name}` is rigidly attached to {state.name(root)}, which an assignment cannot move"
         advice = f"remove RIGIDLY, or write `UNFIX {name}` before this"
         state.report("E310", text, node.span, "cannot be assigned a pose", secondary=here, advice=advice)
         return
@@ -62,8 +62,7 @@ def affix(state: FlowState, node: tree.Affix) -> None:
         require_value(state, node.child)
     else:
         require_indices(state, node.child)
-        require_value(state, node.at)
-    require_value(state, node.parent)
+    require_value(state, node.at, node.parent)
     if child is None or is_arm(child) or child == WORLD:
         return
     if parent is None:
@@ -91,15 +90,11 @@ def warn_of_implicit_unfix(state: FlowState, child: str, parent: str, span: Span
     if link is None or link.parent is None or link.parent == parent or _may_alias(state, parent, link.parent):
         return
     name, old = state.name(child), state.name(link.parent)
-    state.report(
-        "W203",
-        f"`{name}` is still attached to `{old}`",
-        span,
-        f"from here on it is attached to {state.name(parent)}",
-        secondary=labels(link.span, f"affixed to {old} here"),
-        note="" if link.span else f"in the cell it is attached to {old}",
-        advice=f"write `UNFIX {name} FROM {old}` before to make this explicit",
-    )
+    text, label = f"`{name}` is still attached to `{old}`", f"from here on it is attached to {state.name(parent)}"
+    here = labels(link.span, f"affixed to {old} here")
+    note = "" if link.span else f"in the cell it is attached to {old}"
+    advice = f"write `UNFIX {name} FROM {old}` before to make this explicit"
+    state.report("W203", text, span, label, secondary=here, note=note, advice=advice)
 
 
 def _may_alias(state: FlowState, name: str, other: str) -> bool:
@@ -112,19 +107,14 @@ def _may_alias(state: FlowState, name: str, other: str) -> bool:
 
 def _report_cycle(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
     name = state.name
-    chain = []
-    for below in (parent, *state.table.ancestors(parent)):
-        if below == child:
-            break
-        link = state.table.links[below]
-        if link and link.span and link.parent:
-            chain.append(Label(link.span, f"{name(below)} is attached to {name(link.parent)}"))
-    on = "itself" if child == parent else name(parent)
-    text = "this AFFIX would close a cycle"
+    chain: tuple[Label, ...] = ()
+    for frame in takewhile(lambda frame: frame != child, (parent, *state.table.ancestors(parent))):
+        link = state.table.links[frame]
+        if link and link.parent:
+            chain += labels(link.span, f"{name(frame)} is attached to {name(link.parent)}")
+    label = f"{name(child)} cannot be attached to {'itself' if child == parent else name(parent)}"
     note = "frames form a tree with the root WORLD; each is attached to one parent"
-    state.report(
-        "E305", text, node.link, f"{name(child)} cannot be attached to {on}", secondary=tuple(chain), note=note
-    )
+    state.report("E305", "this AFFIX would close a cycle", node.link, label, secondary=chain, note=note)
 
 
 def _note_late_affix(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
@@ -148,28 +138,27 @@ def unfix(state: FlowState, node: tree.Unfix) -> None:
     child, table = state.frame(node.child), state.table
     if child is None or is_arm(child) or child == WORLD:
         return
-    parent = None if node.parent is None else state.frame(node.parent)
-    if parent is not None and not is_any_element(child):
+    parent = state.frame(node.parent)
+    if node.parent is not None and parent is not None and not is_any_element(child):
         link = table.links[child]
-        above = WORLD if link is None else link.parent
-        if above not in (None, parent) and not _may_alias(state, parent, above or WORLD):
-            _report_not_affixed(state, node, child)
+        actual = WORLD if link is None else link.parent
+        if actual is not None and actual != parent and not _may_alias(state, parent, actual):
+            _report_not_affixed(state, child, node.parent)
             return
     if node.parent is None or parent == WORLD:
         require_value(state, node.child)
     table.unfix(child)
 
 
-def _report_not_affixed(state: FlowState, node: tree.Unfix, child: str) -> None:
-    assert node.parent is not None  # noqa: S101 - it has a name in the frame table
+def _report_not_affixed(state: FlowState, child: str, parent: tree.Mobile) -> None:
     link, name = state.table.links[child], state.name(child)
-    text = f"`{name}` is not affixed to `{expression_text(node.parent)}`"
+    text = f"`{name}` is not affixed to `{expression_text(parent)}`"
     if link is None or link.parent is None:
-        state.report("E306", text, node.parent.span, f"{name} has no parent", advice="remove this UNFIX")
+        state.report("E306", text, parent.span, f"{name} has no parent", advice="remove this UNFIX")
         return
-    parent = state.name(link.parent)
-    here, advice = labels(link.span, f"{name} was affixed to {parent} here"), f"write `UNFIX {name} FROM {parent}`"
-    state.report("E306", text, node.parent.span, "not its parent", secondary=here, advice=advice)
+    actual = state.name(link.parent)
+    here, advice = labels(link.span, f"{name} was affixed to {actual} here"), f"write `UNFIX {name} FROM {actual}`"
+    state.report("E306", text, parent.span, "not its parent", secondary=here, advice=advice)
 
 
 STEPS: Steps = {tree.Assign: of_state(assign), tree.Affix: of_state(affix), tree.Unfix: of_state(unfix)}

@@ -44,14 +44,11 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
     state.note_arms(node.moved)
     require_indices(state, node.moved)
     moved = state.frame(node.moved)
-    implied = False
-    if moved is not None and is_arm(moved):
-        arm: str | None = moved
-    else:
-        arm, implied = _arm_of_frame(state, node, moved)
+    arm, implied = (moved, False) if moved is not None and is_arm(moved) else _arm_of_frame(state, node, moved)
     state.record(node, arm, implied=implied)
-    require_value(state, *_targets(node))
-    plausibility.check_lengths(state, *_targets(node))
+    targets = _targets(node)
+    require_value(state, *targets)
+    plausibility.check_lengths(state, *targets)
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
             _check_speed(state, clause.value)
@@ -73,7 +70,7 @@ def _end_move(state: FlowState, node: tree.Move, arm: str | None, *, halted: boo
     Args:
         state: the abstract state.
         node: the MOVE.
-        arm: as ``_begin`` gave it.
+        arm: that moves; None where it is unknown.
         halted: whether an action may have ended the motion meanwhile.
     """
     moved = state.frame(node.moved)
@@ -131,26 +128,21 @@ def _arm_of_frame(state: FlowState, node: tree.Move, moved: str | None) -> tuple
     if (arm := state.table.carrying_arm(moved)) is not None:
         return arm, False
     holder = state.table.holding_arm(moved)
-    if holder == UNKNOWN:
-        return None, False
     if holder is None:
         _report_not_carried(state, node, moved)
-    else:
-        _imply_affix(state, node, moved, holder)
-    return holder, holder is not None
+    if holder in (None, UNKNOWN):
+        return None, False
+    _imply_affix(state, node, moved, holder)
+    return holder, True
 
 
 def _imply_affix(state: FlowState, node: tree.Move, moved: str, arm: str) -> None:
     name, grip = state.name(moved), state.table.grips[arm]
-    state.report(
-        "W201",
-        f"`{name}` is moved, but no AFFIX attaches it to {arm}",
-        node.span,
-        f"`AFFIX {name} TO {arm}` is implied",
-        secondary=labels(grip.span if grip else None, f"{arm} grasped it here"),
-        advice=f"write `AFFIX {name} TO {arm}` after GRASP",
-        severity=Severity.ERROR if state.strict else Severity.WARNING,
-    )
+    text, implied = f"`{name}` is moved, but no AFFIX attaches it to {arm}", f"`AFFIX {name} TO {arm}`"
+    here, advice = labels(grip.span if grip else None, f"{arm} grasped it here"), f"write {implied} after GRASP"
+    severity = Severity.ERROR if state.strict else Severity.WARNING
+    label = f"{implied} is implied"
+    state.report("W201", text, node.span, label, secondary=here, advice=advice, severity=severity)
     warn_of_implicit_unfix(state, moved, arm, node.span)
     state.table.affix(moved, arm, node.span)
 

@@ -46,15 +46,13 @@ def check_lengths(state: FlowState, *nodes: tree.Expression | None) -> None:
         for numbers in () if node is None else _typed_lengths(node):
             away = math.hypot(*(convert(number.value, number.unit, units) * units.metres for number in numbers))
             if away > _FAR * reach:
-                what = (
-                    "this position is {} from its origin"
-                    if isinstance(node, tree.Matrix)
-                    else "this translation is {} long"
-                )
+                what = f"this translation is {_length(away)} long"
+                if isinstance(node, tree.Matrix):
+                    what = f"this position is {_length(away)} from its origin"
                 advice = f"write the lengths in {LENGTHS[units.length]}"
                 if units.length == "M":
                     advice = "write `UNITS MM ;` before BEGIN if they are in millimetres, or write each with its unit"
-                _warn(state, what.format(_length(away)), numbers, reach, advice)
+                _warn(state, what, numbers, reach, advice)
 
 
 def _typed_lengths(node: tree.Expression) -> Iterator[list[tree.Number]]:

@@ -52,8 +52,11 @@ class SideEffects:
         """Return the union of two side effects."""
         if self is NOTHING or other is NOTHING:
             return other if self is NOTHING else self
-        merged = {name: getattr(self, name) | getattr(other, name) for name in _FIELDS}
-        return _limited(SideEffects(**merged))
+        merged = SideEffects(**{name: getattr(self, name) | getattr(other, name) for name in _FIELDS})
+        count = sum(map(len, (merged.posed, merged.affixed, merged.moved, merged.values)))
+        if merged.everything or count > _MAX_EFFECTS:
+            return attrs.evolve(ANYTHING, halts=merged.halts, retries=merged.retries)
+        return merged
 
     @property
     def names(self) -> frozenset[str]:
@@ -66,23 +69,13 @@ NOTHING = SideEffects()
 ANYTHING = SideEffects(arms=frozenset({ANY_ARM}), grasps=True, everything=True)
 
 
-def _limited(effects: SideEffects) -> SideEffects:
-    if (
-        effects.everything
-        or sum(map(len, (effects.posed, effects.affixed, effects.moved, effects.values))) > _MAX_EFFECTS
-    ):
-        return attrs.evolve(ANYTHING, halts=effects.halts, retries=effects.retries)
-    return effects
-
-
 def written_name(node: tree.Expression, scope: Scope) -> str | None:
     """Return the name of a variable, or of an element: ``SLOT[1,2]``, or ``SLOT[]`` where an index is computed."""
     if isinstance(node, tree.ArmName):
         return node.key
     if isinstance(node, tree.Index):
-        child = ",".join(f"{index.value:.12g}" for index in node.indices if isinstance(index, tree.Number))
-        literal = all(isinstance(index, tree.Number) for index in node.indices)
-        return f"{qualified(node.name.key, scope)}[{child if literal else ''}]"
+        literals = [f"{index.value:.12g}" for index in node.indices if isinstance(index, tree.Number)]
+        return f"{qualified(node.name.key, scope)}[{','.join(literals) if len(literals) == len(node.indices) else ''}]"
     return qualified(node.key, scope) if isinstance(node, tree.Name) else None
 
 
@@ -100,13 +93,10 @@ class SideEffectAnalysis:
         self._symbols = symbols
         self._known: dict[int, SideEffects] = {}
         self._procedures: dict[str, SideEffects] = {}
-        bodies = (program.statements, *(node.body.statements for node in program.procedures))
-        self.rigid = any(
-            isinstance(statement, tree.Affix) and statement.rigid
-            for body in bodies
-            for statement in walk_statements(body)
-        )
-        self._solve_procedures(program)
+        bodies = (*program.statements, *(node.body for node in program.procedures))
+        # Whether any frame is affixed rigidly.
+        self.rigid = any(isinstance(node, tree.Affix) and node.rigid for node in walk_statements(bodies))
+        self._solve_procedures()
 
     def effects_of(self, statement: tree.Statement, scope: Scope) -> SideEffects:
         """Return the side effects of a statement and all inside it."""
@@ -133,36 +123,25 @@ class SideEffectAnalysis:
         arguments = dict(zip(procedure.parameters, call.arguments, strict=False))
         return _in_names_of_caller(effects, call.name.key, arguments, scope)
 
-    def _solve_procedures(self, program: tree.Program) -> None:
+    def _solve_procedures(self) -> None:
         """Compute the side effects of procedures, through all that they call, by fixed-point iteration."""
         calls: dict[str, list[tree.Call]] = {}
-        for node in program.procedures:
-            key = node.name.key
-            procedure = self._symbols.procedures.get(key)
-            if procedure is None or procedure.node is not node:
-                continue
-            scope, child = self._symbols.scope(key), list(walk_statements(node.body.statements))
-            calls[key] = [
-                statement
-                for statement in child
-                if isinstance(statement, tree.Call) and statement.name.key in self._symbols.procedures
-            ]
-            self._procedures[key] = union(
-                self._own_effects(statement, scope)
-                for statement in child
-                if not isinstance(statement, tree.Call | tree.Retry)
-            )
-        order = _callees_first({key: [statement.name.key for statement in several] for key, several in calls.items()})
+        for key, procedure in self._symbols.procedures.items():
+            scope, nodes = self._symbols.scope(key), list(walk_statements(procedure.node.body.statements))
+            calls[key] = [node for node in nodes if isinstance(node, tree.Call)]
+            others = (node for node in nodes if not isinstance(node, tree.Call | tree.Retry))
+            self._procedures[key] = union(self._own_effects(node, scope) for node in others)
+        order = _callees_first({key: [call.name.key for call in several] for key, several in calls.items()})
         for _ in range(_MAX_ROUNDS):
-            news = {}
+            changed = {}
             for key in order:
                 scope, old = self._symbols.scope(key), self._procedures[key]
                 new = union((old, *(self.effects_of_call(call, scope) for call in calls[key])))
                 if new != old:
-                    news[key] = self._procedures[key] = new
-            if not news:
+                    changed[key] = self._procedures[key] = new
+            if not changed:
                 return
-        self._procedures.update(dict.fromkeys(news, ANYTHING))
+        self._procedures.update(dict.fromkeys(changed, ANYTHING))
 
     def _own_effects(self, statement: tree.Statement, scope: Scope) -> SideEffects:
         """Return the side effects of one statement without those inside it."""
@@ -182,13 +161,8 @@ def _effects_of_assign(scope: Scope, node: tree.Assign) -> SideEffects:
 
 def _effects_of_affix(scope: Scope, node: tree.Affix) -> SideEffects:
     affixed = _names(scope, node.child)
-    return SideEffects(
-        affixed=affixed, posed=affixed if node.at is not None else frozenset(), arms=_arms(scope, node.parent)
-    )
-
-
-def _effects_of_unfix(scope: Scope, node: tree.Unfix) -> SideEffects:
-    return SideEffects(affixed=_names(scope, node.child), arms=_arms(scope, node.parent))
+    posed = affixed if node.at is not None else frozenset[str]()
+    return SideEffects(affixed=affixed, posed=posed, arms=_arms(scope, node.parent))
 
 
 def _effects_of_poison(scope: Scope, node: tree.Poison) -> SideEffects:
@@ -200,13 +174,11 @@ def _effects_of_poison(scope: Scope, node: tree.Poison) -> SideEffects:
 _OWN_EFFECTS: Mapping[type, Callable[..., SideEffects]] = {
     tree.Assign: _effects_of_assign,
     tree.Affix: _effects_of_affix,
-    tree.Unfix: _effects_of_unfix,
+    tree.Unfix: lambda scope, node: SideEffects(affixed=_names(scope, node.child), arms=_arms(scope, node.parent)),
     tree.Open: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
     tree.ReadSystem: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
     tree.Grasp: lambda scope, node: SideEffects(arms=_arms(scope, node.arm) or frozenset({ANY_ARM}), grasps=True),
-    tree.ReadVisions: lambda scope, node: SideEffects(
-        posed=frozenset[str]().union(*(_names(scope, target) for target in node.targets))
-    ),
+    tree.ReadVisions: lambda scope, node: SideEffects(posed=_names(scope, *node.targets)),
     tree.Move: lambda scope, node: SideEffects(moved=_names(scope, node.moved), arms=_arms(scope, node.moved)),
     tree.For: lambda scope, node: SideEffects(values=_names(scope, node.variable)),
     tree.Halt: lambda _scope, _node: SideEffects(halts=True),
@@ -244,12 +216,15 @@ def child_statements(statement: tree.Statement) -> tuple[tree.Statement, ...]:
     return () if children is None else children(statement)
 
 
-def _names(scope: Scope, node: tree.Expression) -> frozenset[str]:
-    """Return the variable that a node names, or all names of skipped tokens; no arms."""
-    if isinstance(node, tree.Poison):
-        return frozenset(qualified(key, scope) for key in node.names if not is_arm(key))
-    name = written_name(node, scope)
-    return frozenset() if name is None or is_arm(name) else frozenset({name})
+def _names(scope: Scope, *nodes: tree.Expression) -> frozenset[str]:
+    """Return the variables that nodes name, or all names of skipped tokens; no arms."""
+    names: set[str] = set()
+    for node in nodes:
+        if isinstance(node, tree.Poison):
+            names.update(qualified(key, scope) for key in node.names)
+        elif (name := written_name(node, scope)) is not None:
+            names.add(name)
+    return frozenset(name for name in names if not is_arm(name))
 
 
 def _arms(scope: Scope, node: tree.Expression | None) -> frozenset[str]:
@@ -271,19 +246,15 @@ def _callees_first(calls: Mapping[str, list[str]]) -> list[str]:
     """Return procedures in an order in which callees come first, as far as recursion allows."""
     order: dict[str, None] = {}
     visited: set[str] = set()
-    for first in calls:
-        way = [(first, iter(calls[first]))] if first not in visited else []
-        visited.add(first)
-        while way:
-            key, others = way[-1]
-            callee = next((other for other in others if other not in visited), None)
-            if callee is None:
-                order[key] = None
-                way.pop()
-            else:
-                visited.add(callee)
-                way.append((callee, iter(calls[callee])))
-    return list(order)
+    stack = list(calls)
+    while stack:
+        key = stack[-1]
+        callees = [] if key in visited else [callee for callee in calls.get(key, ()) if callee not in visited]
+        visited.add(key)
+        stack += callees
+        if not callees:
+            order[stack.pop()] = None
+    return [key for key in order if key in calls]
 
 
 def _in_names_of_caller(
@@ -305,25 +276,18 @@ def _in_names_of_caller(
         return f"{passed}{bracket}{indices}" if passed else ""
 
     def frames(names: frozenset[str]) -> frozenset[str]:
-        return frozenset(visited for name in names if (visited := caller_name(name)) and not is_arm(visited))
+        return frozenset(outer for name in names if (outer := caller_name(name)) and not is_arm(outer))
 
     def may_be_arm(name: str) -> bool:
         return name == ANY_ARM or is_arm(name) or _is_parameter(name, scope)
 
-    return SideEffects(
-        posed=frames(effects.posed),
-        affixed=frames(effects.affixed),
-        moved=frames(effects.moved),
-        values=frozenset(visited for name in effects.values if (visited := caller_name(name, value=True))),
-        arms=frozenset(visited for name in effects.arms if (visited := caller_name(name)) and may_be_arm(visited)),
-        grasps=effects.grasps,
-        everything=effects.everything,
-        halts=effects.halts,
-    )
+    posed, affixed, moved = map(frames, (effects.posed, effects.affixed, effects.moved))
+    values = frozenset(outer for name in effects.values if (outer := caller_name(name, value=True)))
+    arms = frozenset(filter(may_be_arm, map(caller_name, effects.arms)))
+    return attrs.evolve(effects, posed=posed, affixed=affixed, moved=moved, values=values, arms=arms, retries=False)
 
 
 def _is_parameter(name: str, scope: Scope) -> bool:
+    owner, _, key = name.partition(".")
     procedure = scope.procedure
-    if procedure is None:
-        return False
-    return any(name == f"{procedure.node.name.key}.{key}" for key in procedure.parameters)
+    return procedure is not None and owner == procedure.node.name.key and key in procedure.parameters

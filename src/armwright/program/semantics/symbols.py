@@ -1,6 +1,7 @@
 """Symbol tables of a program and its procedures: the type of each name, and where it was declared."""
 
 from collections.abc import Mapping
+from typing import TypeAlias
 
 import attrs
 
@@ -70,13 +71,6 @@ class Symbols(SymbolTable):
         return Scope(symbols=self, procedure=None if procedure is None else self.procedures[procedure])
 
 
-def scoped_bodies(program: tree.Program, symbols: Symbols) -> "list[tuple[Scope, tuple[tree.Statement, ...]]]":
-    """Return the statements of the main program and of each procedure, with the names that they see."""
-    procedures = symbols.procedures.items()
-    inside = [(symbols.scope(key), procedure.node.body.statements) for key, procedure in procedures]
-    return [(symbols.scope(None), program.statements), *inside]
-
-
 @attrs.frozen(kw_only=True)
 class Scope:
     """The names that statements see: a procedure's own hide those of the program.
@@ -92,6 +86,10 @@ class Scope:
     def is_local(self, key: str) -> bool:
         """Whether a name is a parameter or own variable of the procedure."""
         return self.procedure is not None and key in self.procedure.types
+
+    def is_parameter(self, key: str) -> bool:
+        """Whether a name is a parameter of the procedure."""
+        return self.procedure is not None and self.is_local(key) and key in self.procedure.parameters
 
     def table(self, key: str) -> SymbolTable:
         """Return the names among which a name is looked up."""
@@ -113,3 +111,13 @@ class Scope:
     def is_poisoned(self, key: str) -> bool:
         """Whether a name was reported, so that it gives no second message."""
         return key in self.table(key).poisoned
+
+
+ScopedBody: TypeAlias = tuple[Scope, tuple[tree.Statement, ...]]
+
+
+def scoped_bodies(program: tree.Program, symbols: Symbols) -> list[ScopedBody]:
+    """Return the statements of the main program and of each procedure, with the names that they see."""
+    procedures = symbols.procedures.items()
+    inside = [(symbols.scope(key), procedure.node.body.statements) for key, procedure in procedures]
+    return [(symbols.scope(None), program.statements), *inside]
