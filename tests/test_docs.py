@@ -315,7 +315,7 @@ def test_energy_of_the_picture() -> None:
 
     assert found.status is Status.FINISHED
     assert found.at_rest()
-    assert np.abs(found.imbalance).max() < 2e-10
+    assert np.abs(found.energy_imbalance).max() < 2e-10
     height = found.energy[0] - found.potential.min()
     heat, impact = found.heat[-1].sum(), found.impact[-1]
     assert f"Of its {height:.1f} J of potential energy" in text

@@ -253,7 +253,7 @@ def _built(kind: Callable[..., Any], fields: Mapping[str, Any]) -> Any:
 def _plain(value: ArrayLike, what: str) -> Array:
     """Return real numbers of any kind as float64."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise InvalidValueError(f"{what}: masked entries have no value; fill them or omit them")
+        raise InvalidValueError(f"{what}: masked entries have no value; fill them or remove them")
     try:
         array = np.array(value, order="C")  # the memory layout must not affect results
     except (TypeError, ValueError) as error:

@@ -255,7 +255,7 @@ FAULTS = {
     "arms that differ in leading zeros": (
         ARM + "[arms.ARM_01]\njoint_positions = [0,0,0.3,0,0,0]\n",
         4,
-        "arms, ARM_01: ARM_1 occurs twice; case, - or _ and leading zeros do not distinguish arms",
+        "arms, ARM_01: ARM_1 occurs twice; case, - and _, and leading zeros are ignored",
     ),
     "unknown model": (
         '[arms.ARM_1]\nmodel = "pumma560"\n',

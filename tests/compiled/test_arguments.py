@@ -83,7 +83,7 @@ def test_masked_entries(fast: CompiledArm, mask: Any) -> None:
     q = np.ma.array(np.zeros(6), mask=mask)
     for function in (fast.forward, compile_arm(PUMA).link_poses):
         for given in (q, np.ma.stack([q, q])):
-            with pytest.raises(InvalidValueError, match="q: masked entries have no value; fill them or omit them"):
+            with pytest.raises(InvalidValueError, match="q: masked entries have no value; fill them or remove them"):
                 function(given)
 
 

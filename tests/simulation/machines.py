@@ -56,7 +56,7 @@ def lift(**motor: float) -> Arm:
 def balanced(found: Simulation) -> None:
     assert found.status is Status.FINISHED
     scale = max(1.0, np.abs(found.energy).max(), found.heat.max(), found.work.max())
-    assert np.abs(found.imbalance).max() < BALANCE * scale
+    assert np.abs(found.energy_imbalance).max() < BALANCE * scale
 
 
 def lawful(arm: Arm, found: Simulation) -> None:

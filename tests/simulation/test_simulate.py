@@ -247,7 +247,7 @@ def test_puma_released() -> None:
 
     lawful(arm, found)
     assert found.status is Status.FINISHED
-    assert np.abs(found.imbalance).max() < 1e-5 * found.heat.sum(axis=1).max()
+    assert np.abs(found.energy_imbalance).max() < 1e-5 * found.heat.sum(axis=1).max()
     start = found.state[0]
     assert (start[np.abs(weight) > dry] == JointState.MOVES).all()
     assert found.at_rest()

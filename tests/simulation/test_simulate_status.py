@@ -115,6 +115,6 @@ def test_everything_at_once(seed: int) -> None:
         assert (found.q >= arm.limits.lower - 1e-11).all()
         assert (found.q <= arm.limits.upper + 1e-11).all()
         scale = max(1.0, np.abs(found.energy).max(), found.heat.max(), found.impact.max())
-        assert np.abs(found.imbalance).max() < 1e-6 * scale
+        assert np.abs(found.energy_imbalance).max() < 1e-6 * scale
     assert [event[1:] for event in fixed.events] == [event[1:] for event in adaptive.events]
     np.testing.assert_allclose(fixed.q, adaptive.q, atol=1e-4)

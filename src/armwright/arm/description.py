@@ -30,21 +30,21 @@ _DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
 def tables(model: Arm) -> Iterator[ResultTable]:
     """Yield the tables of an arm [deg, mm]; a title without columns states that there are no data."""
     if any(joint.name or link.name for joint, link in zip(model.joints, model.links, strict=True)):
-        yield _names(model)
-    yield _geometry(model)
+        yield _joint_name_table(model)
+    yield _dh_table(model)
     if any(joint.fixed is not None for joint in model.joints):
-        yield _fixed(model)
-    yield _limits(model)
+        yield _fixed_joint_table(model)
+    yield _limit_table(model)
     if unknown := [f"link {i}: {link.unknown}" for i, link in enumerate(model.links, 1) if link.unknown]:
         title = f"Mass and inertia are unknown, so there is no dynamics. {'; '.join(unknown)}"
         yield ResultTable(title=title, heads=(), rows=())
     if any(link.mass or link.inertia.any() for link in model.links):
-        yield _links(model)
-        yield _inertia(model)
+        yield _mass_table(model)
+        yield _inertia_table(model)
     else:
         yield ResultTable(title="Links: no masses or inertias are known", heads=(), rows=())
     if any(any(getattr(motor, name) for name in _DRIVE) for motor in model.motors):
-        yield _motors(model)
+        yield _drive_table(model)
     else:
         yield ResultTable(title="Drives: no inertia or friction is known", heads=(), rows=())
 
@@ -78,7 +78,7 @@ def as_data(model: Arm) -> dict[str, Any]:
     return attrs.asdict(model, value_serializer=plain)
 
 
-def _fixed(model: Arm) -> ResultTable:
+def _fixed_joint_table(model: Arm) -> ResultTable:
     title = "Fixed transforms, after theta and d and before a and alpha"
     rows = []
     for i, joint in enumerate(model.joints, 1):
@@ -88,12 +88,12 @@ def _fixed(model: Arm) -> ResultTable:
     return ResultTable(title=title, heads=("joint", "x mm", "y mm", "z mm", "roll", "pitch", "yaw"), rows=rows)
 
 
-def _names(model: Arm) -> ResultTable:
+def _joint_name_table(model: Arm) -> ResultTable:
     rows = [(str(i), j.name, k.name) for i, (j, k) in enumerate(zip(model.joints, model.links, strict=True), 1)]
     return ResultTable(title="Names", heads=("number", "joint", "link"), rows=rows)
 
 
-def _geometry(model: Arm) -> ResultTable:
+def _dh_table(model: Arm) -> ResultTable:
     rows = []
     for i, joint in enumerate(model.joints, 1):
         theta, d = _angle(joint.theta), _length(joint.d)
@@ -106,7 +106,7 @@ def _geometry(model: Arm) -> ResultTable:
     return ResultTable(title="Denavit-Hartenberg, standard", heads=heads, rows=rows)
 
 
-def _limits(model: Arm) -> ResultTable:
+def _limit_table(model: Arm) -> ResultTable:
     rows = []
     for i, joint in enumerate(model.joints, 1):
         limits = joint.limits
@@ -117,21 +117,21 @@ def _limits(model: Arm) -> ResultTable:
     return ResultTable(title="Limits", heads=("joint", "from", "to", "speed", "acceleration", "effort"), rows=rows)
 
 
-def _links(model: Arm) -> ResultTable:
+def _mass_table(model: Arm) -> ResultTable:
     title = "Links: mass, and centre of mass in the frame of the link"
     masses = enumerate(model.links, 1)
     rows = [(str(i), f"{link.mass:g}", *(f"{x * 1e3:z.6g}" for x in link.com)) for i, link in masses]
     return ResultTable(title=title, heads=("link", "kg", "x mm", "y mm", "z mm"), rows=rows)
 
 
-def _inertia(model: Arm) -> ResultTable:
+def _inertia_table(model: Arm) -> ResultTable:
     entries = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
     links = enumerate(model.links, 1)
     rows = [(str(i), *(f"{link.inertia[entry]:z.4g}" for entry in entries.values())) for i, link in links]
     return ResultTable(title="Inertia about the centre of mass, kg m²", heads=("link", *entries), rows=rows)
 
 
-def _motors(model: Arm) -> ResultTable:
+def _drive_table(model: Arm) -> ResultTable:
     rows = []
     for i, (motor, joint) in enumerate(zip(model.motors, model.joints, strict=True), 1):
         forward, backward, units = motor.coulomb_forward, motor.coulomb_backward, joint.units

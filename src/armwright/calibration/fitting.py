@@ -221,7 +221,7 @@ def calibrate(
     selected, errors, noise = _select_and_fit(model, measured, first, allowed, robust=robust, progress=progress)
     if robust and selected.fitted:
         # Each outlier, though its weight is small, still pulls as hard as a usual reading, and many pull together.
-        errors = _fit(model, measured, list(selected.fitted), errors, noise, robust=True, strict=True)
+        errors = _fit(model, measured, list(selected.fitted), errors, noise, robust=True, reject_outliers=True)
     return _with_covariance(model, selected, measured, errors, robust=robust)
 
 
@@ -311,9 +311,9 @@ def _fit(
     noise: Noise,
     *,
     robust: bool,
-    strict: bool = False,
+    reject_outliers: bool = False,
 ) -> Array:
-    """Return (k,) the errors by iteratively reweighted least squares; if strict, without outliers.
+    """Return (k,) the errors by iteratively reweighted least squares, on request without outliers.
 
     The cost is the sum of the squares of the weighted residuals and of the prior residuals, errors by their prior
     sigmas, all scaled to lengths with the standard deviation of the noise.
@@ -337,11 +337,15 @@ def _fit(
 
     for _ in range(_REWEIGHTINGS):
         if robust:
-            weights = scales * robust_weights(residuals_at(errors[fitted].tobytes()), noise, strict=strict)
+            weights = scales * robust_weights(
+                residuals_at(errors[fitted].tobytes()), noise, reject_outliers=reject_outliers
+            )
         errors[fitted] = least_squares(cost_residuals, errors[fitted].copy(), cost_jacobian, **_SOLVER_OPTIONS).x
         if not robust:
             break
-        reweighted = scales * robust_weights(residuals_at(errors[fitted].tobytes()), noise, strict=strict)
+        reweighted = scales * robust_weights(
+            residuals_at(errors[fitted].tobytes()), noise, reject_outliers=reject_outliers
+        )
         if np.all(np.abs(reweighted - weights) <= _WEIGHT_TOLERANCE * scales):
             break
     return errors

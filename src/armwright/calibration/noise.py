@@ -51,14 +51,14 @@ def standard_deviations(residuals: Residuals, noise: Noise) -> Array:
     return np.where(residuals.is_rotation, noise.angle, noise.length)
 
 
-def robust_weights(residuals: Residuals, noise: Noise, *, strict: bool) -> Array:
+def robust_weights(residuals: Residuals, noise: Noise, *, reject_outliers: bool) -> Array:
     """Return (r,) the square roots of the soft-L1 weights of readings; all numbers of a reading have one weight.
 
-    If strict, outliers have weight 0.
+    With ``reject_outliers`` those beyond the chi-square limit have weight 0.
     """
     square, size = _squares_by_reading(residuals.reading, residuals.values / standard_deviations(residuals, noise))
     root = (1 + square / _chi2_limit(size)) ** -0.25
-    if strict:
+    if reject_outliers:
         root[_is_outlier(square, size)] = 0.0
     return np.asarray(root[residuals.reading], dtype=np.float64)
 

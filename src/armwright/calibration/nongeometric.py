@@ -274,7 +274,7 @@ def _cross_validate_selection(data: _FoldedReadings, report: Callable[[str], Non
     held = HeldOutErrors.unknown(len(data.measured))
     for fold, rows in enumerate(data.folds):
         left_out = frozenset({fold})
-        report(f"nested cross-validation, part {fold + 1} of {len(data.folds)}")
+        report(f"nested cross-validation, fold {fold + 1} of {len(data.folds)}")
         try:
             selection = _select(data, left_out, lambda _: None)
         except (ContradictionError, InvalidValueError):

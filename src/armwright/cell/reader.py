@@ -119,7 +119,9 @@ def _read_arms(table: Table, folder: Path) -> dict[str, CellArm]:
             raise table.error(key, "expected the name of an arm, such as ARM_1")
         name = arm_name(match[1])
         if name in arms:
-            raise table.error(key, f"{name} occurs twice; case, - or _ and leading zeros do not distinguish arms")
+            raise table.error(
+                key, f"{name} occurs twice; case, - and _, and leading zeros are ignored"
+            )
         arms[name] = _read_arm(table.table(key), folder)
         for other in arms:
             distance = float(np.linalg.norm(arms[name].base[:3, 3] - arms[other].base[:3, 3]))

@@ -60,7 +60,7 @@ def explain(
     if console.is_terminal:
         _show(console, page, diagnostics, source)
     else:
-        print("\n".join(_plain(page, diagnostics, source)))
+        print("\n".join(_plain_text_lines(page, diagnostics, source)))
 
 
 def _list(*, as_json: bool) -> None:
@@ -81,7 +81,7 @@ def _list(*, as_json: bool) -> None:
             print(f"  {code}  {find_page(code).title}")
 
 
-def _plain(page: "Page", diagnostics: "Sequence[Diagnostic]", source: "Source") -> Iterator[str]:
+def _plain_text_lines(page: "Page", diagnostics: "Sequence[Diagnostic]", source: "Source") -> Iterator[str]:
     """Return a page as lines of plain text."""
     from armwright.program.diagnostics.render import render
 

@@ -105,10 +105,10 @@ class Heading(NamedTuple):
     """A column of a file.
 
     Attributes:
-        cell_index: which cell of a row is in it, from 0.
-        column: what it is.
-        unit: of its numbers; may be empty.
-        text: its name for messages: as it is written, and what it was mapped to.
+        cell_index: index of its cell in every row, from 0.
+        column: the quantity that it holds.
+        unit: unit of its numbers; may be empty.
+        text: its name in messages, as it is written, with the name that it is mapped to.
     """
 
     cell_index: int

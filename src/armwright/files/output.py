@@ -237,7 +237,7 @@ def _staging_parent(folder: Path) -> Path:
 
 
 def _resolve(path: Path) -> Path:
-    """Return where a path leads: links stay, and what they lead to is replaced."""
+    """Return the target of a path: symbolic links are kept, and their target is replaced."""
     try:
         return path.resolve()
     except (OSError, RuntimeError, ValueError) as error:

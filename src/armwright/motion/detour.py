@@ -189,7 +189,7 @@ def _by_via(
 ) -> Detour | None:
     """Return the fastest path by one of the nearest via poses; None where none is found."""
     solver = solver_of(arm)
-    if _is_too_weak_to_begin(solver, q):
+    if _exceeds_efforts_at_start(solver, q):
         return None
     ways: list[Detour] = []
     for ring in chain(_rings(line, obstacle.fraction), _on_joint_moves(solver, q, line.poses[-1])):
@@ -214,7 +214,7 @@ def _by_via(
     return min(ways, key=lambda way: way.price.time, default=None)
 
 
-def _is_too_weak_to_begin(solver: Solver, q: Array) -> bool:
+def _exceeds_efforts_at_start(solver: Solver, q: Array) -> bool:
     """Whether gravity alone takes more than a joint may give where a motion begins, so that none keeps the efforts."""
     limits = solver.arm.limits.effort
     if not np.isfinite(limits).any():
@@ -359,5 +359,5 @@ def _missing(X: Array, X_asked: Array) -> Array:
 
 
 def _turn(X_from: Array, X_to: Array) -> Array:
-    """Return the rotation vector from one orientation to another, in base axes."""
+    """Return the rotation vector from one orientation to another, expressed in the base frame."""
     return np.asarray(rotation_vector(X_to[:3, :3] @ X_from[:3, :3].T))

@@ -31,7 +31,7 @@ from armwright.motion.obstruction import MAX_SLOWDOWN, PathError, check_ends
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import COARSE, coarse_line
-from armwright.motion.timing_law import Timed, timed
+from armwright.motion.timing_law import TimedPath, timed
 from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
 from armwright.motion.tool_path import tool_path
 from armwright.motion.tracking import Task, Tracking, track
@@ -180,7 +180,7 @@ def rounded_move(
     half = np.minimum(legs.lengths[:-1], legs.lengths[1:]) / 2
     widths = np.minimum(half, np.inf if blend is None else blend)
     if corner is not None:
-        widths = _widths(legs, half, corner, line_deviation)
+        widths = _blend_widths(legs, half, corner, line_deviation)
     miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (legs.bend, legs.twist))
     bound = Tolerance(line_deviation + miss, ROTATION_PER_METRE * line_deviation + twist)
     if corner is not None:
@@ -246,7 +246,7 @@ def _legs(arm: Arm, path: Path, corners: list[int], speed: float) -> _Legs:
     return _Legs(X, corners, lengths, speeds, bend, twist)
 
 
-def _widths(legs: _Legs, half: Array, corner: float, line_deviation: float) -> Array:
+def _blend_widths(legs: _Legs, half: Array, corner: float, line_deviation: float) -> Array:
     """Return the half-widths (k - 2,) of the widest blends that keep what is asked of corners and of middle thirds.
 
     Args:
@@ -289,7 +289,7 @@ def _tightened(task: _Task, most: float) -> tuple[CertifiedMotion, float]:
     raise last
 
 
-def _certificate(task: _Task, widths: Array, tracking: Tracking, run: Timed) -> Certificate:
+def _certificate(task: _Task, widths: Array, tracking: Tracking, run: TimedPath) -> Certificate:
     """Return what a run keeps of its straight legs."""
     legs = task.legs
     distance = farthest_from_legs(solver_of(task.arm), tracking.trajectory, legs.poses[:, :3, 3], legs.times)
@@ -307,7 +307,7 @@ def _certificate(task: _Task, widths: Array, tracking: Tracking, run: Timed) -> 
     )
 
 
-def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, Timed]:
+def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, TimedPath]:
     """Return the joints along the rounded path over the time at full speed, and their run."""
     legs, solver = task.legs, solver_of(task.arm)
     top, times = float(legs.speeds.max()), legs.times

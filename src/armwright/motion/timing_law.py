@@ -51,7 +51,7 @@ _HAIR = 1e-9
 _BINDS = 0.95
 
 
-class Timed(NamedTuple):
+class TimedPath(NamedTuple):
     """A run along a path.
 
     Attributes:
@@ -137,7 +137,7 @@ class _Run(NamedTuple):
         return float(self.times[-1]) * max(1.0, float(self.uses.max()))
 
 
-def timed(arm: Arm, path: Trajectory, caps: Array) -> Timed:
+def timed(arm: Arm, path: Trajectory, caps: Array) -> TimedPath:
     """Return a run along a path, from rest to rest, inside the limits of speed and acceleration of the joints.
 
     Args:
@@ -161,7 +161,7 @@ def timed(arm: Arm, path: Trajectory, caps: Array) -> Timed:
     law[:, 0] += run.path.times[run.intervals]
     progress = Trajectory(times=run.times, coefficients=law[..., None]).slowed(over)
     because = _binding(arm.n, run) if factor > 1 else None
-    return Timed(trajectory, factor, because, progress, speed / over, acceleration / over**2)
+    return TimedPath(trajectory, factor, because, progress, speed / over, acceleration / over**2)
 
 
 def _allowed(shortest: float) -> float:

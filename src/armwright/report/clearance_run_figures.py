@@ -35,7 +35,7 @@ def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
     path = f"The path without play and the path taken, its error magnified {magnification(run):g} times"
     for name, draw, caption in (
         ("path", _draw_path, path),
-        ("bearings", _draw_bearings, "Middles of the journals in their bearings; circles: walls"),
+        ("bearings", _draw_bearings, "Centres of the journals in their bearings; circles: clearances"),
         ("error", _draw_error, "Error of the tip over time"),
         ("spectrum", _draw_spectrum, "Amplitudes of the error: mean removed, up to 200 Hz"),
         ("forces", _draw_forces, "Forces between journals and bearings; a gap in a curve: the journal flies"),

@@ -44,7 +44,7 @@ def table(result: ResultTable) -> str:
 
 
 def card(title: str, content: str, *, remark: str = "") -> str:
-    """Return a section of a page with its title, and a remark to the right of it."""
+    """Return a section of a page with its title, and a remark to the right of the title."""
     name, aside = html.escape(title), f'<span class="quiet">{html.escape(remark)}</span>' if remark else ""
     head = f'<div class="card-head"><h2>{name}</h2>{aside}</div>'
     return f'<section class="card" aria-label="{name}">{head}\n{content}</section>'

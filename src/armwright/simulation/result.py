@@ -140,7 +140,7 @@ class Simulation:
         return self.kinetic + self.potential
 
     @property
-    def imbalance(self) -> Array:
+    def energy_imbalance(self) -> Array:
         """Energy that the ledger cannot explain, (m,) [J]: the error of the integration."""
         return np.asarray(self.energy - self.energy[0] - self.work.sum(-1) + self.heat.sum(-1) + self.impact)
 
@@ -161,7 +161,7 @@ class Simulation:
             "work_of_drives": float(self.work[-1].sum()),
             "heat_of_friction": float(self.heat[-1].sum()),
             "lost_at_stops": float(self.impact[-1]),
-            "imbalance": float(abs(self.imbalance).max()),
+            "imbalance": float(abs(self.energy_imbalance).max()),
         }
 
     def as_data(self) -> dict[str, str | float]:

@@ -46,7 +46,7 @@ def inverse(X_AB: ArrayLike) -> Array:
 
 
 def position_text(p: Array) -> str:
-    """Return a position (3,) seen from the base of an arm in words, in millimetres."""
+    """Return the text of a position (3,) in the base frame, in millimetres."""
     x, y, z = p * 1e3
     return f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
 

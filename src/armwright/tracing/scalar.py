@@ -1,4 +1,4 @@
-"""Functions of an abstract scalar: a float, an array with one value per configuration, or a node of a graph."""
+"""Functions of an abstract scalar: a float, an array of a value per configuration, or a node of an expression graph."""
 
 import math
 from collections.abc import Callable

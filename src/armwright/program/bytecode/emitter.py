@@ -70,7 +70,7 @@ class Emitter:
         """
         match node:
             case tree.Number() | tree.Name() | tree.ArmName():
-                operand = self.number(node) if isinstance(node, tree.Number) else node.key
+                operand = self.literal_value(node) if isinstance(node, tree.Number) else node.key
             case tree.Index(name=name, indices=indices):
                 operand = self._operation(Op.ELEM, self.passing(), name.key, *map(self.value, indices), node=node)
             case tree.Binary():
@@ -93,8 +93,8 @@ class Emitter:
         self.emit(op, to, *operands, span=node.span)
         return to
 
-    def number(self, node: tree.Number) -> float:
-        """Return what a number counts in the units of the program."""
+    def literal_value(self, node: tree.Number) -> float:
+        """Return the value of a number literal in the units of the program."""
         return float(convert(node.value, node.unit, self.units))
 
     def _chain(self, node: tree.Binary, into: str | None) -> Operand:

@@ -11,7 +11,7 @@ def assign(context: Context, node: tree.Assign) -> None:
     """Generate the value, and let the last instruction stand for the whole statement."""
     out, to = context.out, str(context.out.value(node.target))
     if isinstance(node.value, tree.Number):
-        out.emit(Op.LOADS, to, out.constant(out.number(node.value)), span=node.span)
+        out.emit(Op.LOADS, to, out.constant(out.literal_value(node.value)), span=node.span)
         return
     out.value(node.value, to)
     out.instructions[-1] = attrs.evolve(out.instructions[-1], span=node.span, comment="")

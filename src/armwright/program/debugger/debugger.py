@@ -40,7 +40,7 @@ class Debugger:
     """A program in a simulated cell, step by step.
 
     Attributes:
-        stop: why the run stands still; None while it goes on, and before it has begun.
+        stop: why the run is paused; None while it runs, and before it has begun.
         execution: the run itself, with its breakpoints, watches and statements.
     """
 

@@ -170,7 +170,7 @@ def _select_improving(
 
 
 def _message_id(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:
-    """Return what a message says and of which line, by which it is known again after other lines have changed."""
+    """Return a key, the message and the text of its line, that identifies it after other lines have changed."""
     return diagnostic.message, source.line_text(source.line(diagnostic.span.start))
 
 

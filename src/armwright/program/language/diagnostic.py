@@ -1,4 +1,4 @@
-"""What the translator has to say about a program: one type, with places, advice and, where certain, a cure."""
+"""Diagnostics of the compiler: messages with locations, advice and, where certain, a fix."""
 
 import enum
 from collections import Counter

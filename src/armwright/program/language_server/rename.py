@@ -35,15 +35,15 @@ def renameable_occurrence(analysis: Analysis, offset: int) -> Occurrence:
         raise InvalidValueError(f"{subject}; only variables and procedures can be renamed")
     text = analysis.text[occurrence.start : occurrence.end]
     if occurrence.kind in _NOT_RENAMEABLE:
-        raise InvalidValueError(f"`{text}` is {_NOT_RENAMEABLE[occurrence.kind]}, and cannot be renamed")
+        raise InvalidValueError(f"`{text}` is {_NOT_RENAMEABLE[occurrence.kind]} and cannot be renamed")
     undeclared = occurrence.kind is NameKind.UNKNOWN or analysis.declaration(occurrence) is None
     if undeclared or (occurrence.kind is NameKind.VARIABLE and occurrence.owner is None):
         if occurrence.key in analysis.compiled.symbols.imported:
-            raise InvalidValueError(f"`{text}` is imported, and cannot be renamed here")
+            raise InvalidValueError(f"`{text}` is imported and cannot be renamed here")
         if occurrence.key in PREDECLARED:
-            raise InvalidValueError(f"`{text}` is predeclared, and cannot be renamed")
+            raise InvalidValueError(f"`{text}` is predeclared and cannot be renamed")
         if undeclared:
-            raise InvalidValueError(f"`{text}` is not declared, and cannot be renamed")
+            raise InvalidValueError(f"`{text}` is not declared and cannot be renamed")
         source = _cell_source(analysis, occurrence.key)
         if source is not None:
             raise InvalidValueError(f"`{text}` {source} by this name; rename it there first")

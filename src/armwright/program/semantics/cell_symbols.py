@@ -1,4 +1,4 @@
-"""What is known of the cell while a program is checked: names, and what hangs on what; no numbers."""
+"""The cell as the compiler sees it: names and parents of frames, without numbers."""
 
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
@@ -17,7 +17,7 @@ class KnownCell:
 
     Attributes:
         arms: such as ``ARM_1``.
-        frames: that have a value from the start, each with the frame it hangs on.
+        frames: that have a value from the start, each with its parent.
         devices: that can be operated; None when any will do.
         visions: frames that the camera has an answer for; None when nothing is known of the camera.
         reach: of the arm that reaches farthest [m]; None when that is not known.
@@ -32,10 +32,10 @@ class KnownCell:
 
 @attrs.frozen(kw_only=True)
 class ImportedFrames:
-    """What an IMPORT brings.
+    """The frames of an IMPORT.
 
     Attributes:
-        frames: each with the frame it hangs on, in upper case, like those of a cell.
+        frames: each with its parent, in upper case, like those of a cell.
         cell: the cell that the file describes; None for a file of frames alone.
     """
 
@@ -43,12 +43,12 @@ class ImportedFrames:
     cell: Cell | None = None
 
 
-# How a checker gets at the file of an IMPORT; it raises an ArmwrightError when the file cannot be read.
+# Reads the file of an IMPORT; it raises an ArmwrightError when the file cannot be read.
 ReadImport: TypeAlias = Callable[[str], ImportedFrames]
 
 
 def known_cell(cell: Cell) -> KnownCell:
-    """Return what the checker has to know of a cell."""
+    """Return the symbols of a cell."""
     return KnownCell(
         arms=frozenset(cell.arms),
         frames={name: node.parent for name, node in cell.frames.items()},

@@ -170,7 +170,7 @@ def _array_size(tokens: TokenStream, wants: str, where: str) -> tree.Number:
 
 
 def _end_declaration(tokens: TokenStream) -> None:
-    if tokens.accept_semicolon("after the declaration", once=False):
+    if tokens.accept_semicolon("after the declaration", report_once=False):
         return
     words = tokens.vocabulary
     if not tokens.matches("BEGIN", *words.headers, *words.statements) and tokens.peek().key not in (",", ":", "="):

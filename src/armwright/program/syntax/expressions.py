@@ -302,7 +302,7 @@ def _list_without_opening(
 
 
 def _insert_missing_comma(tokens: TokenStream) -> bool:
-    """Put a comma in between two values; whether it was missing."""
+    """Insert a missing comma between two values; return whether it was missing."""
     token = tokens.current
     if token.kind not in _OPERANDS or token.damaged or tokens.previous.damaged:
         return False

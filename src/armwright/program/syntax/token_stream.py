@@ -321,16 +321,16 @@ class TokenStream:
         fixes = (Fix(gap, f" {key}" if key[0].isalpha() else key),) if alone else ()
         self.report_once("E112", f"missing `{key}` {what}", gap, f"expected `{key}` here", advice=advice, fixes=fixes)
 
-    def accept_semicolon(self, where: str, *, once: bool = True) -> bool:
+    def accept_semicolon(self, where: str, *, report_once: bool = True) -> bool:
         """Read ``;``, or say that it is missing; return whether it stands there.
 
         Args:
             where: the position in words, such as ``after the import``.
-            once: whether to say so only if nothing has been reported at this position, nor to report more there.
+            report_once: whether a missing one is reported only if nothing else is reported at this position.
         """
         if self.accept(";"):
             return True
-        report = self.report_once if once else self.report
+        report = self.report_once if report_once else self.report
         text, advice = f"missing `;` {where}", f"insert `;` after `{self.previous.text}`"
         report("E104", text, self.gap_span(), "expected `;` here", advice=advice, replacement=";")
         return False

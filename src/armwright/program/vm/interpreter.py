@@ -210,5 +210,5 @@ def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:
         f"{(needed / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
         span=stage.span,
         label=f"at {stage.t0 + stage.peak_time[joint]:.3f} s, in {stage.stage.kind} to {stage.goal_names[-1]}",
-        helps=(f"a speed below {stage.speed:g} reduces the effort of acceleration, but not that of gravity",),
+        helps=(f"a speed below {stage.speed:g} reduces the effort due to acceleration, but not that due to gravity",),
     )

@@ -43,7 +43,7 @@ _STEPS_PER_MOVE = 1000
 
 def move(machine: Machine, process: Process, step: Instruction) -> None:
     """Plan a MOVE and begin its first stage; in the action of a MOVE, when that one has come to rest."""
-    if process.motion is not None and not _finish_outer_move(machine, process, process.motion, step.span):
+    if process.motion is not None and not _finish_enclosing_move(machine, process, process.motion, step.span):
         return
     request = move_request(machine, process, step)
     moved = machine.resolve_name(process, request.begin.operands[0])
@@ -111,7 +111,7 @@ def _stop_motion(machine: Machine, process: Process, motion: Motion, span: Span)
     motion.early_end = EarlyEnd.HALTED
 
 
-def _finish_outer_move(machine: Machine, process: Process, motion: Motion, span: Span) -> bool:
+def _finish_enclosing_move(machine: Machine, process: Process, motion: Motion, span: Span) -> bool:
     """Whether the MOVE around an action is over, so that another can begin; its arm is brought to rest before."""
     if motion.early_end is EarlyEnd.HALTED:
         _finish_move(machine, process, motion)

@@ -116,7 +116,7 @@ def obstacle_warning(run: RunStage) -> Diagnostic | None:
         return Diagnostic(
             code="W403",
             severity=Severity.WARNING,
-            message=f"{run.arm} stops at every frame on its path to `{goal}`: it cannot follow rounded corners",
+            message=f"{run.arm} stops at every frame on the way to `{goal}`: it cannot follow rounded corners",
             span=run.span,
             label=begun,
             notes=(f"without stops the path is infeasible at {where}",),
