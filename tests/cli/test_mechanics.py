@@ -205,7 +205,7 @@ def test_kernel() -> None:
     assert data["total"] == sum(data["operations"].values())
     assert "def rows(" in data["source"]
     compile(data["source"], "kernel", "exec")
-    assert "def one(" in armwright("kernel", "stanford-jpl", "forward", "--single").stdout
+    assert "def single(" in armwright("kernel", "stanford-jpl", "forward", "--single").stdout
     assert "operations per configuration" in armwright("kernel", "ur5", "jacobian", "--count").stdout
     wrong = armwright("kernel", "ur5", "jacobain")
     assert (wrong.returncode, "Did you mean 'jacobian'?" in wrong.stderr) == (2, True)

@@ -186,3 +186,13 @@ def test_long_work_is_called_off(threads: int) -> None:
         signal.signal(signal.SIGINT, before)
 
     assert sorted(ended) == [i * LANES for i in range(threads)]
+
+
+@pytest.mark.parametrize("shape", [(1,), (3, 1)])
+def test_plain_arrays_need_no_checks(shape: tuple[int, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once compiled, a function goes from plain arrays straight to its kernel, for one configuration and for many."""
+    square = Kernel(emitted=emit("square", lambda x: [[x[0] * x[0]]], {"x": 1})).function("square")
+    square(np.ones(shape))
+    monkeypatch.setitem(square.__globals__, "careful", None)
+
+    np.testing.assert_array_equal(square(np.full(shape, 3.0)), np.full(shape, 9.0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.arm.gravity import in_world
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
-from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
@@ -21,9 +21,7 @@ Around: TypeAlias = Literal["via", "damped"]
 
 
 def _as_configuration(value: ArrayLike) -> Array:
-    q = floats(value, "start")
-    q.setflags(write=False)
-    return q
+    return read_only(floats(value, "start"))
 
 
 def _as_gravity(value: ArrayLike) -> Array:

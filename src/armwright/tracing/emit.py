@@ -85,7 +85,7 @@ def rows(first, last, {arguments}):
 _SINGLE = """
 SIGNATURE = int64({signature})
 
-def one({arguments}):
+def single({arguments}):
     if {misfit}:
         return 1
 {body}
@@ -121,7 +121,7 @@ class Emitted:
     Attributes:
         title: what it computes, in words.
         rows: source of ``rows(first, last, *inputs, *outputs)``, for arrays of (N, *shape).
-        single: source of ``one(*inputs, *outputs)``, for arrays of (*shape).
+        single: source of ``single(*inputs, *outputs)``, for arrays of (*shape).
         inputs: shape of one value of each input, by its name.
         angles: the names of inputs that hold a number whose sine is taken.
         outputs: shape of one value of each output.

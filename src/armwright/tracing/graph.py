@@ -12,8 +12,6 @@ from typing import Any, NamedTuple, TypeAlias
 
 _COMMUTE = frozenset({"add", "multiply"})
 
-Key: TypeAlias = tuple[Any, ...]
-
 
 class Node(NamedTuple):
     """One operation and the numbers of the nodes it takes; a constant has its value, an input its index."""
@@ -29,7 +27,7 @@ class Graph:
     def __init__(self) -> None:
         """Begin empty."""
         self.nodes: list[Node] = []
-        self._known: dict[Key, int] = {}
+        self._known: dict[tuple[Any, ...], int] = {}
 
     def inputs(self, count: int) -> list["Traced"]:
         """Return the next ``count`` inputs."""

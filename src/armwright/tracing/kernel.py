@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache, cached_property, reduce
 from itertools import pairwise
 from operator import or_
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import attrs
 import numpy as np
@@ -19,7 +19,6 @@ from armwright.tracing.assignments import LARGEST_ANGLE
 from armwright.tracing.cache import compiled
 from armwright.tracing.emit import LANES, MEANINGLESS, UNUSUAL, Emitted, Shape
 
-T = TypeVar("T")
 # One number, which is 0 until work in progress is to end without a result.
 CalledOff: TypeAlias = npt.NDArray[np.int64]
 
@@ -37,11 +36,11 @@ def call({inputs}, *, threads=None, out=None):
         elif {first}.ndim == {axes}:
             if out is None:
                 {allocations}
-                if not one({inputs}, {outputs}):
+                if not single({inputs}, {outputs}):
                     return {outputs}
             else:
                 {unpack}
-                if {fits} and not one({inputs}, {outputs}):
+                if {fits} and not single({inputs}, {outputs}):
                     return out
         elif {all_rows} and (len({first}) < {few} or threads == 1):
             rows_asked = len({first})
@@ -76,7 +75,7 @@ class Kernel:
     @cached_property
     def single(self) -> Callable[..., int]:
         """The function of one configuration, for calls from other compiled code: see ``Emitted``."""
-        return compiled(self.emitted.single, "one", self.emitted.title)
+        return compiled(self.emitted.single, "single", self.emitted.title)
 
     @cached_property
     def rows(self) -> Callable[..., int]:
@@ -103,21 +102,18 @@ class Kernel:
         outputs = [f"out{i}" for i in range(len(self._kinds))]
         known: dict[str, Any] = {"empty": np.empty, "array": np.ndarray, "careful": self._careful, "foreign": _FOREIGN}
 
-        def allocations(before: str) -> str:
-            shapes = (f"({before}{', '.join(map(str, shape))},), {kind.__name__}" for shape, kind in self._kinds)
-            return "; ".join(f"{out} = empty({shape})" for out, shape in zip(outputs, shapes, strict=True))
-
-        def shape_checks(before: str) -> str:
-            return " and ".join(
-                f"{out}.shape == ({before}{', '.join(map(str, shape))},)"
-                for out, (shape, _) in zip(outputs, self._kinds, strict=True)
-            )
+        def for_outputs(statement: str, separator: str, lead: str) -> str:
+            """Write a statement for every output: its name, its shape behind a leading axis, and its type go in."""
+            shapes = ((f"({lead}{', '.join(map(str, shape))},)", kind.__name__) for shape, kind in self._kinds)
+            return separator.join(statement.format(out, *shape) for out, shape in zip(outputs, shapes, strict=True))
 
         def compiled_when_called(part: str) -> Callable[..., int]:
             def compile_and_call(*arrays: Array) -> int:
                 # Compiled when it is first needed, and from then on called directly.
                 known[part] = getattr(self, part)
-                known["foreign"] = (*_FOREIGN, _refused_by_numba())
+                from numba.core.errors import NumbaError  # noqa: PLC0415 - loaded by now
+
+                known["foreign"] = (*_FOREIGN, NumbaError)
                 try:
                     return int(known[part](*arrays))
                 except known["foreign"]:
@@ -125,7 +121,7 @@ class Kernel:
 
             return compile_and_call
 
-        known |= {part: compiled_when_called(part) for part in ("one", "rows")}
+        known |= {part: compiled_when_called(part) for part in ("single", "rows")}
         text = _CALL.format(
             inputs=", ".join(inputs),
             # Numba takes a masked array for its numbers, once it has met an array of another class.
@@ -135,11 +131,11 @@ class Kernel:
             # A compiled function takes long to find out that one of its inputs has too few axes.
             all_rows=" and ".join(f"{x}.ndim == {len(shape) + 1}" for x, shape in inputs.items()),
             few=2 * _ROWS_PER_THREAD,
-            allocations=allocations(""),
-            allocations_of_many=allocations("rows_asked, "),
+            allocations=for_outputs("{} = empty({}, {})", "; ", ""),
+            allocations_of_many=for_outputs("{} = empty({}, {})", "; ", "rows_asked, "),
             unpack=f"{', '.join(outputs)} = out",
-            fits=shape_checks(""),
-            fits_many=shape_checks("rows_asked, "),
+            fits=for_outputs("{}.shape == {}", " and ", ""),
+            fits_many=for_outputs("{}.shape == {}", " and ", "rows_asked, "),
             outputs=", ".join(outputs),
         )
         exec(text, known)  # noqa: S102 - numbers, and names that are identifiers
@@ -203,18 +199,15 @@ class Kernel:
         shapes = self.emitted.inputs.values()
         flat = [_rows(x, lead, shape) for x, shape in zip(arrays, shapes, strict=True)]
         flat += results if len(lead) == 1 else [x.reshape(rows, *x.shape[len(lead) :]) for x in results]
-        most = max(rows // _ROWS_PER_THREAD, 1)
-        return reduce(or_, on_cores(lambda a, b: self.rows(a, b, *flat), rows, threads, most=most))
+        parts = _parts(rows, threads, max(rows // _ROWS_PER_THREAD, 1))
+        if len(parts) == 1:
+            return self.rows(0, rows, *flat)
+        jobs = [_pool().submit(self.rows, first, last, *flat) for first, last in parts]
+        return reduce(or_, (job.result() for job in jobs))
 
 
 # What the shortest way meets in arrays of other numbers; with Numba loaded, its own error too.
 _FOREIGN = (AttributeError, TypeError, ValueError)
-
-
-def _refused_by_numba() -> type[Exception]:
-    from numba.core.errors import NumbaError  # noqa: PLC0415 - loaded by now
-
-    return NumbaError
 
 
 def _input(value: ArrayLike, shape: Shape, name: str) -> Array:
@@ -234,22 +227,6 @@ def _rows(array: Array, lead: Shape, shape: Shape) -> Array:
     return array if array.flags.c_contiguous else np.ascontiguousarray(array)
 
 
-def on_cores(work: Callable[[int, int], T], rows: int, threads: int | None, *, most: int | None = None) -> list[T]:
-    """Return what ``work(first, last)`` gives for parts of many rows, cut between blocks of lanes.
-
-    Args:
-        work: does rows ``first`` to ``last`` without holding the interpreter.
-        rows: how many there are.
-        threads: how many cores to use; all when None.
-        most: no more than this are worth it; as many as there are blocks when left out.
-    """
-    parts = _parts(rows, threads, most)
-    if len(parts) == 1:
-        return [work(0, rows)]
-    jobs = [_pool().submit(work, a, b) for a, b in parts]
-    return [job.result() for job in jobs]
-
-
 def on_cores_for_long(work: Callable[[int, int, CalledOff], object], rows: int, threads: int | None) -> None:
     """Do parts of many rows whose work takes long, so that a signal is heard meanwhile: it is waited for, not done.
 
@@ -260,7 +237,7 @@ def on_cores_for_long(work: Callable[[int, int, CalledOff], object], rows: int, 
         threads: how many cores to use; all when None.
     """
     called_off = np.zeros(1, dtype=np.int64)
-    jobs = [_pool().submit(work, a, b, called_off) for a, b in _parts(rows, threads, None)]
+    jobs = [_pool().submit(work, first, last, called_off) for first, last in _parts(rows, threads, rows)]
     try:
         for job in jobs:
             job.result()
@@ -270,10 +247,10 @@ def on_cores_for_long(work: Callable[[int, int, CalledOff], object], rows: int, 
         raise
 
 
-def _parts(rows: int, threads: int | None, most: int | None) -> list[tuple[int, int]]:
+def _parts(rows: int, threads: int | None, max_count: int) -> list[tuple[int, int]]:
     """Cut rows into parts for the cores between blocks of lanes: where each begins and ends."""
     blocks = -(-rows // LANES)
-    count = max(1, min(cores() if threads is None else threads, blocks if most is None else most))
+    count = max(1, min(cores() if threads is None else threads, blocks, max_count))
     return list(pairwise(min(round(blocks * i / count) * LANES, rows) for i in range(count + 1)))
 
 
