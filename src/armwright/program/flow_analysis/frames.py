@@ -119,10 +119,10 @@ def _report_cycle(state: FlowState, node: tree.Affix, child: str, parent: str) -
 
 def _note_late_affix(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:
     """Note a parent that moved after the child got its pose and before it was affixed."""
-    above, below = state.table.assigned[parent], state.table.assigned[child]
-    if above is None or below is None or not above.moved or above.order < below.order:
+    moved, posed = state.table.assigned[parent], state.table.assigned[child]
+    if moved is None or posed is None or not moved.moved or moved.order < posed.order:
         return
-    name, here = state.name(child), labels(above.span, f"{state.name(child)} did not follow this")
+    name, here = state.name(child), labels(moved.span, f"{state.name(child)} did not follow this")
     text = f"`{state.name(parent)}` was moved before `{name}` was attached to it"
     advice = "write the AFFIX before the assignment, or specify the transformation with AT"
     state.report("L303", text, node.link, f"{name} follows only from here on", secondary=here, advice=advice)

@@ -1,4 +1,4 @@
-"""Laying a program out: every program that says the same in the same words looks the same."""
+"""The formatter: programs of the same tokens are formatted alike."""
 
 from armwright.errors import ExitStatus, InvalidValueError
 from armwright.program.api import pause_garbage_collection
@@ -20,24 +20,24 @@ _NOT_NUMBERED = (",", ";", ")")
 
 
 class UnformattableError(InvalidValueError):
-    """A program cannot be laid out, because its syntax is wrong.
+    """A program cannot be formatted, because its syntax is wrong.
 
     Attributes:
         source: the program.
-        first: the first thing that is wrong.
+        first: the first error.
     """
 
     exit_status = ExitStatus.PROGRAM_ERRORS
 
     def __init__(self, source: Source, first: Diagnostic) -> None:
-        """Say what is wrong first, and where."""
+        """State the first error and its position."""
         self.source, self.first = source, first
         line, column = source.line(first.span.start), source.column(first.span.start)
         super().__init__(f"{source.name}:{line}:{column}: cannot be formatted: {first.message} ({first.code})")
 
 
 def formatted(source: Source, *, std: Standard = Standard.RLO_2, numbers: int | None = None, width: int = WIDTH) -> str:
-    """Return a program as it should be laid out.
+    """Return a program formatted.
 
     Words of the language are in upper case, names spelt as they are declared, arms ``ARM_1``; each statement has a
     line of its own, and each clause of a MOVE that is longer than a line. Comments, blank lines (one in a row),
@@ -50,7 +50,7 @@ def formatted(source: Source, *, std: Standard = Standard.RLO_2, numbers: int | 
         width: how long a line may be [characters], if it can be broken somewhere.
 
     Raises:
-        UnformattableError: the syntax is wrong; the text states what is wrong first.
+        UnformattableError: the syntax is wrong; the text states the first error.
         InvalidValueError: ``numbers`` or ``width`` is below 1.
     """
     for what, value in (("numbers", numbers), ("width", width)):
@@ -64,10 +64,10 @@ def formatted(source: Source, *, std: Standard = Standard.RLO_2, numbers: int | 
 def _lines(source: Source, std: Standard, width: int) -> list[str]:
     text, _ = blank_line_numbers(source)
     scanned = scan(source, text, std)
-    program, slips = parse(source, scanned.tokens, std)
-    wrong = sort_diagnostics(diagnostic for diagnostic in (*scanned.diagnostics, *slips) if diagnostic.is_error)
-    if wrong:
-        raise UnformattableError(source, wrong[0])
+    program, diagnostics = parse(source, scanned.tokens, std)
+    errors = sort_diagnostics(diagnostic for diagnostic in (*scanned.diagnostics, *diagnostics) if diagnostic.is_error)
+    if errors:
+        raise UnformattableError(source, errors[0])
     pieces = pieces_of(text, scanned, program)
     set_blanks(pieces)
     return lines_of(rows_of(program, pieces, width), width)

@@ -1,4 +1,4 @@
-"""Laying out what can be laid out of a program with mistakes: the statements around them, and never their words."""
+"""Formatting of a program with errors of syntax: the statements around them are formatted, no token is changed."""
 
 from collections.abc import Iterator
 
@@ -10,16 +10,16 @@ from armwright.program.syntax.lexer import TokenKind, scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
 
-# Comments around what is laid out by itself; no program has them.
+# Comments around statements that are formatted by themselves; no program has them.
 _FROM, _TO = "//<<armwright", "//armwright>>"
 
 
 def formatted_around(source: Source, *, std: Standard = Standard.RLO_2, width: int = WIDTH) -> str:
-    """Return a program laid out as far as its syntax is right.
+    """Return a program formatted as far as its syntax is right.
 
-    A program without mistakes is laid out whole. Of any other the declarations and the statements of the main program
-    are laid out that hold no mistake and share no line with one that does; everything else stays as it is. Words,
-    their order and comments are the same afterwards.
+    A program without errors is formatted whole. Of any other the statements of the main program are formatted that
+    contain no error and share no line with one that does; everything else stays as it is. Tokens, their order and
+    comments are the same afterwards.
 
     Args:
         source: the program.
@@ -27,7 +27,7 @@ def formatted_around(source: Source, *, std: Standard = Standard.RLO_2, width: i
         width: how long a line may be [characters].
 
     Raises:
-        UnformattableError: nothing of it can be laid out; the text states what is wrong first.
+        UnformattableError: nothing of it can be formatted; the text states the first error.
     """
     try:
         return formatted(source, std=std, width=width)
@@ -40,28 +40,28 @@ def formatted_around(source: Source, *, std: Standard = Standard.RLO_2, width: i
 
 
 def _around(source: Source, std: Standard, width: int) -> str | None:
-    """Return the text with the right stretches of it laid out; None where there are no such stretches."""
+    """Return the text with its correct statements formatted; None where there are none."""
     text, _ = blank_line_numbers(source)
     if text != source.text:
         # Numbers of lines would no longer be in order.
         return None
     scanned = scan(source, text, std)
-    program, slips = parse(source, scanned.tokens, std)
-    wrong = [diagnostic.span for diagnostic in (*scanned.diagnostics, *slips) if diagnostic.is_error]
+    program, diagnostics = parse(source, scanned.tokens, std)
+    errors = [diagnostic.span for diagnostic in (*scanned.diagnostics, *diagnostics) if diagnostic.is_error]
     begin = next((token for token in scanned.tokens if token.key == "BEGIN" and _is_main(token.start, program)), None)
     end = next((token for token in reversed(scanned.tokens) if token.key == "END"), None)
     if begin is None or end is None or not program.statements or end.start < program.statements[-1].span.end:
         return None
     head = source.text[: begin.start]
-    head_wrong = any(diagnostic.start <= begin.end for diagnostic in wrong)
-    pieces, done, has_tail = [], 0, False
-    for span in _stretches(source, program, Span(begin.end, end.start), wrong):
-        laid = _formatted_alone("" if head_wrong else head, source.slice(span), std, width)
-        if laid is not None and laid != source.slice(span):
-            pieces += [source.text[done : span.start], laid]
+    head_has_error = any(diagnostic.start <= begin.end for diagnostic in errors)
+    pieces, done, is_formatted = [], 0, False
+    for span in _correct_spans(source, program, Span(begin.end, end.start), errors):
+        formatted_text = _formatted_alone("" if head_has_error else head, source.slice(span), std, width)
+        if formatted_text is not None and formatted_text != source.slice(span):
+            pieces += [source.text[done : span.start], formatted_text]
             done = span.end
-        has_tail = has_tail or laid is not None
-    return "".join((*pieces, source.text[done:])) if has_tail else None
+        is_formatted = is_formatted or formatted_text is not None
+    return "".join((*pieces, source.text[done:])) if is_formatted else None
 
 
 def _is_main(start: int, program: tree.Program) -> bool:
@@ -70,31 +70,31 @@ def _is_main(start: int, program: tree.Program) -> bool:
     return start >= behind and (not program.statements or start < program.statements[0].span.start)
 
 
-def _stretches(source: Source, program: tree.Program, body: Span, wrong: list[Span]) -> Iterator[Span]:
-    """Give stretches of whole lines that hold statements of the main program without a mistake."""
+def _correct_spans(source: Source, program: tree.Program, body: Span, errors: list[Span]) -> Iterator[Span]:
+    """Yield spans of whole lines with statements of the main program that contain no error."""
     starts = [statement.span.start for statement in program.statements]
     ends = [*starts[1:], body.end]
     first, last = -1, body.start
     for statement, start, end in zip(program.statements, starts, ends, strict=True):
         line, next_line = (source.text.rfind("\n", 0, index) + 1 for index in (start, end))
-        wrong_here = any(diagnostic.start <= end and diagnostic.end >= start for diagnostic in wrong)
-        if isinstance(statement, tree.Poison) or wrong_here:
+        has_error = any(diagnostic.start <= end and diagnostic.end >= start for diagnostic in errors)
+        if isinstance(statement, tree.Poison) or has_error:
             if last > first >= 0:
                 yield Span(first, last)
             first = -1
             continue
         if first < 0 and line >= body.start and not source.text[line:start].strip():
             first = last = line
-        # Where the next statement shares a line with this one, both are laid out, or neither.
+        # Where the next statement shares a line with this one, both are formatted, or neither.
         if first >= 0 and next_line > start and not source.text[next_line:end].strip():
             last = next_line
     if last > first >= 0:
         yield Span(first, last)
 
 
-def _formatted_alone(head: str, stretch: str, std: Standard, width: int) -> str | None:
-    """Return statements laid out as those of a program of their own; None where they are none."""
-    program = f"{head}BEGIN\n{_FROM}\n{stretch}{_TO}\nEND.\n"
+def _formatted_alone(head: str, statements: str, std: Standard, width: int) -> str | None:
+    """Return statements formatted as those of a program of their own; None where that has errors."""
+    program = f"{head}BEGIN\n{_FROM}\n{statements}{_TO}\nEND.\n"
     try:
         lines = formatted(Source("", program), std=std, width=width).split("\n")
     except UnformattableError:
@@ -102,8 +102,8 @@ def _formatted_alone(head: str, stretch: str, std: Standard, width: int) -> str 
     marks = [index for index, line in enumerate(lines) if line.strip() in (_FROM, _TO)]
     if len(marks) != 2:
         return None
-    laid = "\n".join((*lines[marks[0] + 1 : marks[1]], ""))
-    return laid if _words(laid, std) == _words(stretch, std) else None
+    formatted_text = "\n".join((*lines[marks[0] + 1 : marks[1]], ""))
+    return formatted_text if _words(formatted_text, std) == _words(statements, std) else None
 
 
 def _words(text: str, std: Standard) -> tuple[list[tuple[TokenKind, str]], list[list[str]]]:

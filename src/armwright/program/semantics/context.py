@@ -1,4 +1,4 @@
-"""What the checks of all statements share: the names of the program, its calls, and where a statement stands."""
+"""The context of the checks: the names of the program, its calls, and the part of it that contains a statement."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
@@ -17,14 +17,14 @@ Checks: TypeAlias = Mapping[type, Check]
 
 @attrs.define
 class Context:
-    """Where statements are checked.
+    """The walk over the statements of a program or procedure.
 
     Attributes:
         checks: of each kind of statement.
-        names: of the program, and what is wrong so far.
-        calls: of procedures.
-        procedure: in which the statements stand; None for the main program.
-        recovering: whether they stand in a RECOVER part, whose TRY can be started again.
+        names: of the program, and the diagnostics so far.
+        calls: the checks of calls.
+        procedure: the one that contains the statements; None for the main program.
+        recovering: whether a RECOVER part contains them, so that RETRY can restart its TRY.
     """
 
     checks: Checks

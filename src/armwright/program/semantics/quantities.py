@@ -1,4 +1,4 @@
-"""Numbers as they are written: units that measure what is asked for, and values in range."""
+"""Literal numbers: units of the dimension that is required, and values in range."""
 
 from armwright.program.language.units import Dimension, dimension
 from armwright.program.semantics.scopes import NameResolver
@@ -13,11 +13,11 @@ _DIMENSION_PHRASES: dict[Dimension, str] = {
 
 
 def check_unit(names: NameResolver, node: tree.Expression, expected: Dimension | None, what: str) -> bool:
-    """Whether a number, if the expression is one, has no unit or one of the right dimension; say so if not.
+    """Report a number with a unit of another dimension than is required; return whether the expression is right.
 
     Args:
-        names: for what is found.
-        node: any expression; only of numbers something is asked.
+        names: the names, and where errors are reported.
+        node: any expression; only literal numbers are checked.
         expected: what it has to measure; None for a pure number.
         what: the first half of the message, such as ``XYZ takes three lengths``.
     """
@@ -29,12 +29,12 @@ def check_unit(names: NameResolver, node: tree.Expression, expected: Dimension |
 
 
 def check_range(names: NameResolver, node: tree.Expression, what: str, *, zero: bool) -> None:
-    """Say that a number, if the expression is one, is negative, or zero where that has no meaning either.
+    """Report a number that is negative, or zero where that has no meaning either.
 
     Args:
-        names: for what is found.
-        node: any expression; only of numbers something is asked.
-        what: is in a range, such as ``a duration``.
+        names: the names, and where errors are reported.
+        node: any expression; only literal numbers are checked.
+        what: the quantity, such as ``a duration``.
         zero: whether it may be zero.
     """
     # A number that was reported before is NaN, and neither positive nor negative.
