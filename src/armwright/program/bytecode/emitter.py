@@ -131,5 +131,5 @@ class Emitter:
         if not all(isinstance(item, tree.Number) for item in node.items):
             return self._operation(Op.MATX, to, *map(self.value, node.items), node=node)
         numbers, metres = pose_literals.pose_numbers(node), self.units.metres
-        shift = [self.number(item) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
+        shift = [self.literal_value(item) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
         return self._operation(Op.LOADM, to, self.constant((*numbers[:9], *shift)), node=node)
