@@ -269,7 +269,9 @@ class TestRefused:
 
     def test_axes_that_do_not_fit(self, y1: Scenario) -> None:
         """Four clearances and three frictions make no table."""
-        with pytest.raises(ShapeError, match=r"leading axes must broadcast together, got \(4,\) and \(3,\)"):
+        with pytest.raises(
+            ShapeError, match=r"clearances and frictions: leading axes must broadcast together, got \(4, 3\), \(3,\)"
+        ):
             simulate(y1, np.full((4, 3), 5e-4), frictions=np.zeros(3))
 
     def test_negative_friction(self, y1: Scenario) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterator
+from itertools import compress
 from typing import Any
 
 import attrs
@@ -107,7 +108,7 @@ class ClearanceRun:
         deep = (np.max(self.depths[rows], axis=0) / self.simulation.clearances) > _MAX_INDENTATION
         if np.any(deep):
             pins = self.simulation.scenario.linkage.pins
-            names = ", ".join(pin.name for pin, is_deep in zip(pins, deep, strict=True) if is_deep)
+            names = ", ".join(pin.name for pin in compress(pins, deep))
             notes.append(f"{names}: indentation above a tenth of the clearance, where Hertz's contact law is a guess")
         return notes
 

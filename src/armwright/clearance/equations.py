@@ -257,7 +257,7 @@ def _accelerations(
         i: force[i] - sum(_entry(M, i, j) * prescribed[j] for j in prescribed if (max(i, j), min(i, j)) in M)
         for i in free
     }
-    solved = solve({i: n for n, i in enumerate(free)}, inner, right)
+    solved = solve(inner, right)
     qdd = [prescribed[i] if i in prescribed else solved[i] for i in range(len(force))]
     # A carried body comes after its carrier, on which its drive's counter-effort acts.
     moving = {i: k for k, i in enumerate(linkage.driven) if i in prescribed}
@@ -274,19 +274,14 @@ def _entry(M: Mapping[tuple[int, int], Scalar], i: int, j: int) -> Scalar:
     return M[max(i, j), min(i, j)]
 
 
-def solve(
-    order: Mapping[int, int], M: Mapping[tuple[int, int], Scalar], right: Mapping[int, Scalar]
-) -> dict[int, Scalar]:
+def solve(M: Mapping[tuple[int, int], Scalar], right: Mapping[int, Scalar]) -> dict[int, Scalar]:
     """Solve a symmetric positive definite system by LDLᵀ, skipping the entries that are 0.
 
     Args:
-        order: the unknowns, in the order in which they are eliminated.
         M: entries on and below the diagonal.
-        right: the right side.
+        right: the right side; its unknowns are eliminated in their order.
     """
-    names = sorted(order, key=order.__getitem__)
-    work = dict(M)
-    x = dict(right)
+    names, work, x = list(right), dict(M), dict(right)
     factors: dict[tuple[int, int], Scalar] = {}
     for a, i in enumerate(names):
         inverse = 1.0 / work[i, i]

@@ -17,7 +17,6 @@ with an impact in it, or -1.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.clearance.lane_layout import (
@@ -30,6 +29,7 @@ from armwright.clearance.lane_layout import (
     RK4,
     STAGES,
     STATES,
+    Integers,
     N,
     rates,
 )
@@ -45,12 +45,12 @@ def resolve_impacts(
     depths: Array,
     done: Array,
     part: Array,
-    hit: npt.NDArray[np.int64],
+    hit: Integers,
     table: Array,
     lengths: Array,
     step: int,
-    counts: npt.NDArray[np.int64],
-    row: npt.NDArray[np.int64],
+    counts: Integers,
+    row: Integers,
     runs: int,
 ) -> None:
     """Repeat the step before ``step`` for the lanes with impacts, and count the impacts of the first runs."""
@@ -135,9 +135,7 @@ def crossing_fraction(d0: float, r0: float, d1: float, r1: float) -> float:
     return fraction
 
 
-def find_impacts(
-    x: Array, y: Array, depths: Array, done: Array, part: Array, hit: npt.NDArray[np.int64], h: float
-) -> int:
+def find_impacts(x: Array, y: Array, depths: Array, done: Array, part: Array, hit: Integers, h: float) -> int:
     """Find the first impact of each lane since ``done``, and its fraction of the step; return how many lanes have one.
 
     ``depths`` (2 · PINS · LANES,) are the depths, and their rates, that the pins had then.
@@ -168,7 +166,7 @@ def locate_impacts(
     depths: Array,
     done: Array,
     part: Array,
-    hit: npt.NDArray[np.int64],
+    hit: Integers,
     table: Array,
     step: int,
     h: float,
@@ -202,7 +200,7 @@ def locate_impacts(
                 state[i * LANES + k] = after[i * LANES + k]
 
 
-def correct(y: Array, done: Array, part: Array, hit: npt.NDArray[np.int64], h: float) -> None:
+def correct(y: Array, done: Array, part: Array, hit: Integers, h: float) -> None:
     """Correct the parts by one Newton step on the depth at their ends."""
     for k in range(LANES):
         if hit[k] >= 0:

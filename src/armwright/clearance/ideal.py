@@ -142,10 +142,8 @@ def _block_motion(
     A = _closure(_place_bodies(linkage, q), by_tip)
     qd = _solve(A, np.concatenate([*still, speeds], axis=-1))
     moving = _place_bodies(linkage, q, qd)
-    bias = [_gap(moving, i).bias for i in range(len(linkage.pins))] + (
-        [moving.point(linkage.tip).bias] if by_tip else []
-    )
-    biases = [x for pair in bias for x in pair] + [0.0] * (0 if by_tip else len(linkage.drives))
+    points = [_gap(moving, i) for i in range(len(linkage.pins))] + ([moving.point(linkage.tip)] if by_tip else [])
+    biases = [x for point in points for x in point.bias] + [0.0] * (0 if by_tip else len(linkage.drives))
     qdd = _solve(A, np.concatenate([*still, accelerations], axis=-1) - _stack(lead, biases))
     efforts, reactions = inverse_dynamics(linkage, q, qd, qdd)
     return q, qd, qdd, efforts, reactions

@@ -8,10 +8,17 @@ those of the smallest linkage there is, one coordinate and one pin driven by an 
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
 from armwright.arrays import Array
 from armwright.clearance.equations import WORKS, Contact
 from armwright.tracing.emit import LANES as LANES  # noqa: PLC0414 - part of the layout
 
+# Numbers of pins, runs, impacts and samples.
+Integers: TypeAlias = npt.NDArray[np.int64]
 # Numbers of the state: coordinates, their velocities, bristle deflections, works. Coordinates alone; pins.
 N, PINS = 1, 1
 STATES = 2 * N + len(WORKS)

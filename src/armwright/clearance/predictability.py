@@ -80,9 +80,7 @@ def simulate_with_predictability(
         with contextlib.suppress(InvalidValueError):
             again = prepare_scenario(scenario.linkage, scenario.path, settings, guess=scenario.ideal.q[0])
             smaller_steps.append(simulate(again, rows, frictions=friction, threads=threads).error[:, : len(own.time)])
-    complete = len(smaller_steps) == len(STEP_DIVISORS) and all(
-        error.shape == own.error.shape for error in smaller_steps
-    )
+    complete = [error.shape for error in smaller_steps] == [own.error.shape] * len(STEP_DIVISORS)
     finer = np.concatenate(smaller_steps) if complete else None
     return select_run(own, 0), _predictability(own.time, own.error, finer)
 
@@ -115,18 +113,12 @@ def last_time_together(time: Array, errors: Array, within: float) -> Array:
 
 def _predictability(time: Array, own: Array, finer: Array | None) -> Predictability:
     """Return the predictability of the first of r runs (r, s, 2), compared with the others and with smaller steps."""
-    until, all_of_them = last_time_together(time, own, MAX_DISTANCE), own
+    until, repetitions = float(last_time_together(time, own, MAX_DISTANCE)), own
     if finer is not None:
-        all_of_them = np.concatenate([own, finer])
-        until = np.minimum(
-            until, last_time_together(time, np.concatenate([own[:1], finer]), MAX_DISTANCE / DISTANCE_DIVISOR)
-        )
+        repetitions = np.concatenate([own, finer])
+        compared = np.concatenate([own[:1], finer])
+        until = min(until, float(last_time_together(time, compared, MAX_DISTANCE / DISTANCE_DIVISOR)))
     with np.errstate(invalid="ignore", over="ignore"):
-        mean, spread = all_of_them.mean(axis=0), all_of_them.std(axis=0)
-    return Predictability(
-        until=float(until),
-        mean=np.asarray(mean, dtype=np.float64),
-        spread=np.asarray(spread, dtype=np.float64),
-        to_the_end=float(until) == float(time[-1]),
-        finer=finer is not None,
-    )
+        mean, spread = (np.asarray(x, dtype=np.float64) for x in (repetitions.mean(axis=0), repetitions.std(axis=0)))
+    to_the_end = until == float(time[-1])
+    return Predictability(until=until, mean=mean, spread=spread, to_the_end=to_the_end, finer=finer is not None)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from armwright.clearance.linkage import (
     GRAVITY,
@@ -22,6 +23,7 @@ from armwright.clearance.linkage import (
 from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.files.document import Document, Table
 
+_Part = TypeVar("_Part")
 _CATALOGUE = Path(__file__).parent / "catalogue"
 
 
@@ -57,11 +59,11 @@ def read_linkage(path: Path) -> Linkage:
     top = Document.read(path).root
     fields: dict[str, Any] = {
         "ground": Body(name=GROUND, points=_points(top.table("ground", required=True))),
-        "bodies": [_body(table) for table in top.tables("body", "bodies")],
-        "joints": [_joint(table) for table in top.tables("joint", "bodies")],
-        "pins": [_clearance_pin(table) for table in top.tables("play", "bodies")],
-        "drives": [_drive(table) for table in top.tables("drive", "bodies")],
-        "loads": [_load(table) for table in (top.tables("load", "bodies") if "load" in top else ())],
+        "bodies": _read_each(top, "body", _body),
+        "joints": _read_each(top, "joint", _joint),
+        "pins": _read_each(top, "play", _clearance_pin),
+        "drives": _read_each(top, "drive", _drive),
+        "loads": _read_each(top, "load", _load) if "load" in top else (),
         "material": _material(top.table("material")),
         "name": top.text("name", default=path.stem),
         "zero": math.radians(top.number("zero_deg", default=0.0)),
@@ -74,6 +76,15 @@ def read_linkage(path: Path) -> Linkage:
         return Linkage(**fields)
     except ArmwrightError as error:
         raise top.error(None, str(error)) from error
+
+
+def _read_each(top: Table, key: str, read: Callable[[Table], _Part]) -> list[_Part]:
+    """Read the tables of a kind, each of which holds the keys that are read and no others."""
+    parts = []
+    for table in top.tables(key, "bodies"):
+        parts.append(read(table))
+        table.refuse_unknown_keys()
+    return parts
 
 
 def _body_point(table: Table, key: str) -> BodyPoint:
@@ -101,32 +112,26 @@ def _body(table: Table) -> Body:
 def _joint(table: Table) -> Pin | Guide:
     kind = table.choice("kind", ("pin", "guide"))
     body, point, on = table.text("body"), table.text("point"), _body_point(table, "on")
-    joint: Pin | Guide = Pin(body=body, point=point, on=on)
-    if kind == "guide":
-        direction, angle = (math.radians(table.number(key, default=0.0)) for key in ("direction_deg", "angle_deg"))
-        joint = Guide(body=body, point=point, on=on, direction=direction, angle=angle)
-    table.refuse_unknown_keys()
-    return joint
+    if kind == "pin":
+        return Pin(body=body, point=point, on=on)
+    direction, angle = (math.radians(table.number(key, default=0.0)) for key in ("direction_deg", "angle_deg"))
+    return Guide(body=body, point=point, on=on, direction=direction, angle=angle)
 
 
 def _clearance_pin(table: Table) -> ClearancePin:
     name, bearing, journal = table.text("name"), _body_point(table, "bearing"), _body_point(table, "journal")
     clearance = table.number("clearance_mm", lower=0.0) * 1e-3
     radius = table.positive("journal_radius_mm") * 1e-3
-    table.refuse_unknown_keys()
     return ClearancePin(name=name, bearing=bearing, journal=journal, clearance=clearance, journal_radius=radius)
 
 
 def _drive(table: Table) -> Drive:
     body, kind = table.text("body"), table.choice("kind", ("effort", "motion"), default="effort")
-    table.refuse_unknown_keys()
     return Drive(body=body, kind="motion" if kind == "motion" else "effort")
 
 
 def _load(table: Table) -> Load:
-    load = Load(point=_body_point(table, "at"), force=table.vector("force", 2))
-    table.refuse_unknown_keys()
-    return load
+    return Load(point=_body_point(table, "at"), force=table.vector("force", 2))
 
 
 def _assembly(table: Table) -> dict[str, float]:

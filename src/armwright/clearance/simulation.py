@@ -12,18 +12,18 @@ from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
-import numpy.typing as npt
 
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arrays import Array, ArrayLike, floats, leading_axes
 from armwright.clearance.contact import damping
 from armwright.clearance.equations import WORKS
 from armwright.clearance.ideal import pin_gaps, tip_position
 from armwright.clearance.kernel import Integrator, Layout, emit_simulation
+from armwright.clearance.lane_layout import Integers
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.scenario import Scenario
 from armwright.clearance.settings import check_step, contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError
 from armwright.tracing.cache import compiled
 from armwright.tracing.kernel import on_cores_for_long
 
@@ -69,9 +69,9 @@ class Simulation:
     error: Array
     forces: Array
     works: Mapping[str, Array]
-    impacts: npt.NDArray[np.int64]
+    impacts: Integers
     peaks: Array
-    status: npt.NDArray[np.int64]
+    status: Integers
 
     @property
     def distance(self) -> Array:
@@ -94,7 +94,7 @@ class Record(NamedTuple):
     """The arrays that the compiled simulation fills; one row per run."""
 
     samples: Array
-    impacts: npt.NDArray[np.int64]
+    impacts: Integers
     peaks: Array
 
 
@@ -158,10 +158,7 @@ def _broadcast_parameters(
     mu = floats(linkage.material.friction if frictions is None else frictions, "frictions")
     if np.any(mu < 0):
         raise InvalidValueError(f"frictions: expected none below 0, got {mu.min():g}")
-    try:
-        lead = np.broadcast_shapes(c.shape[:-1], mu.shape)
-    except ValueError as error:
-        raise ShapeError(f"leading axes must broadcast together, got {c.shape[:-1]} and {mu.shape}") from error
+    lead = leading_axes("clearances and frictions", [c, mu], [c.shape[:-1], mu.shape])
     return np.broadcast_to(c, (*lead, c.shape[-1])), np.broadcast_to(mu, lead)
 
 

@@ -7,7 +7,6 @@ A run keeps its bits whatever runs beside it: no lane reads another. The functio
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.clearance.event_location import resolve_impacts
@@ -29,6 +28,7 @@ from armwright.clearance.lane_layout import (
     RK4,
     STAGES,
     STATES,
+    Integers,
     N,
     rates,
 )
@@ -45,11 +45,11 @@ def simulate(
     gains: Array,
     table: Array,
     lengths: Array,
-    sample_at: npt.NDArray[np.int64],
+    sample_at: Integers,
     samples: Array,
-    counts: npt.NDArray[np.int64],
+    counts: Integers,
     peaks: Array,
-    called_off: npt.NDArray[np.int64],
+    called_off: Integers,
 ) -> None:
     """Simulate runs ``first`` to ``last``.
 
@@ -110,13 +110,13 @@ def simulate(
 def begin_lanes(
     begin: int,
     last: int,
-    row: npt.NDArray[np.int64],
+    row: Integers,
     x: Array,
     state: Array,
     start: Array,
     contacts: Array,
     gains: Array,
-    counts: npt.NDArray[np.int64],
+    counts: Integers,
     peaks: Array,
 ) -> None:
     """Load the lanes with the runs from ``begin`` on; lanes that are left over run the last run once more."""
@@ -147,14 +147,7 @@ def begin_stage(stage: int, step: int, now: int, h: float, x: Array, y: Array, s
 
 
 def remember(
-    step: int,
-    begin: int,
-    last: int,
-    row: npt.NDArray[np.int64],
-    x: Array,
-    y: Array,
-    counts: npt.NDArray[np.int64],
-    peaks: Array,
+    step: int, begin: int, last: int, row: Integers, x: Array, y: Array, counts: Integers, peaks: Array
 ) -> None:
     """Remember the pins in contact and their impact speeds, count the impacts and update the largest forces."""
     for i in range(PINS):
@@ -170,9 +163,7 @@ def remember(
                 peaks[row[k], i] = normal
 
 
-def take_sample(
-    sample: int, begin: int, last: int, row: npt.NDArray[np.int64], state: Array, y: Array, samples: Array
-) -> None:
+def take_sample(sample: int, begin: int, last: int, row: Integers, state: Array, y: Array, samples: Array) -> None:
     """Store the states and the normal force of each pin as one sample."""
     for k in range(min(LANES, last - begin)):
         for i in range(STATES):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -165,8 +166,7 @@ def assess_rest(linkage: Linkage, measured: RestMeasurement, noise: float | None
         )
     notes += [
         f"{name} is indistinguishable from 0 mm: it is less than its standard deviation"
-        for name, at_bound in zip(estimate.names, estimate.at_bound, strict=True)
-        if at_bound
+        for name in compress(estimate.names, estimate.at_bound)
     ]
     identifiable = dict(zip(estimate.names, estimate.identifiable(largest), strict=True))
     return EstimateAssessment(

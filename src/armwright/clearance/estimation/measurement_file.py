@@ -7,6 +7,7 @@ of a file in the same unit; time in s or ms.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -93,9 +94,7 @@ class RestMeasurement:
             )
         labels = [f"{axis} of {name}" for name in self.names for axis in "xy"]
         residuals = zip(labels, estimate.standardised.ravel().tolist(), strict=True)
-        bounds = [
-            f"{name} at 0" for name, is_at_bound in zip(estimate.names, estimate.at_bound, strict=True) if is_at_bound
-        ]
+        bounds = [f"{name} at 0" for name in itertools.compress(estimate.names, estimate.at_bound)]
         refuse_contradiction(float(estimate.misfit), residuals, bounds)
         return estimate
 
@@ -230,9 +229,8 @@ def _refuse_large_errors(table: UnitTable, row: int, name: str, errors: Array) -
     """Refuse errors (s, 2) of the tip that no clearance explains [m]."""
     worst = float(np.hypot(errors[:, 0], errors[:, 1]).max())
     if worst > _MAX_ERROR:
-        raise table.error(
-            row,
-            name,
+        text = (
             f"the tip is {worst * 1e3:.4g} mm from its commanded position; are the units right, and is it in the axes "
-            f"of the ground? More than {_MAX_ERROR * 1e3:g} mm is no clearance",
+            f"of the ground? More than {_MAX_ERROR * 1e3:g} mm is no clearance"
         )
+        raise table.error(row, name, text)

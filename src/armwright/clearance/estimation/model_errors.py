@@ -21,7 +21,7 @@ from armwright.arrays import Array, ArrayLike
 from armwright.clearance.estimation.misfit import CONTRADICTION
 from armwright.clearance.estimation.static_estimate import Estimate, closed_at_poses, rest_matrix
 from armwright.clearance.ideal import close_pins
-from armwright.clearance.linkage import Body, Linkage, Load
+from armwright.clearance.linkage import Body, Linkage
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError
@@ -109,9 +109,8 @@ def model_errors(
             continue
         limit = np.inf
         if np.isfinite(least) and remainder(slope) > _NEGLIGIBLE * full:
-            limit = kind.size * _detection_limit(
-                lambda change: remainder(shift(change)), least / remainder(slope), least
-            )
+            linear = least / remainder(slope)
+            limit = kind.size * _detection_limit(lambda change: remainder(shift(change)), linear, least)
         shifts = np.linalg.lstsq(B, slope / kind.size, rcond=None)[0]
         errors.append(ModelError(kind.name, kind.unit, limit, np.asarray(shifts, dtype=np.float64)))
     return tuple(errors)
@@ -175,56 +174,41 @@ def resting_tips(wrong: Linkage, nominal: Linkage, q: Array, zeros: Array, clear
 def error_kinds(linkage: Linkage) -> Iterator[ErrorKind]:
     """Give all kinds of errors that a model may have."""
     exact = np.zeros(len(linkage.drives))
+
+    def part_error(name: str, field: str, number: int, attribute: str) -> ErrorKind:
+        return ErrorKind(name, "1", 1.0, partial(_scale_part, linkage, field, number, attribute), exact)
+
     for i, load in enumerate(linkage.loads):
         if np.any(load.force):
-            yield ErrorKind(
-                f"load at {load.point}", "1", 1.0, partial(_alter_part, linkage, "loads", i, _scale_force), exact
-            )
+            yield part_error(f"load at {load.point}", "loads", i, "force")
     for i, body in enumerate(linkage.bodies):
-        yield ErrorKind(
-            f"mass of {body.name}", "1", 1.0, partial(_alter_part, linkage, "bodies", i, _scale_mass), exact
-        )
-        if _body_length(body) > 0:
-            yield ErrorKind(
-                f"length of {body.name}",
-                "m",
-                _body_length(body),
-                partial(_alter_part, linkage, "bodies", i, _scale_points),
-                exact,
-            )
-    ground = linkage.ground
-    if _body_length(ground) > 0:
-        yield ErrorKind(
-            "distances on the ground",
-            "m",
-            _body_length(ground),
-            lambda change: attrs.evolve(linkage, ground=_scale_points(ground, change)),
-            exact,
-        )
+        yield part_error(f"mass of {body.name}", "bodies", i, "mass")
+        if (length := _body_length(body)) > 0:
+            yield part_error(f"length of {body.name}", "bodies", i, "points")._replace(unit="m", size=length)
+    if (length := _body_length(linkage.ground)) > 0:
+        yield ErrorKind("distances on the ground", "m", length, partial(_scale_ground, linkage), exact)
     for drive, number, zeros in zip(linkage.drives, linkage.driven, np.eye(len(exact)), strict=True):
         unit = "rad" if linkage.coordinates[number].kind == "angle" else "m"
         yield ErrorKind(f"zero of {drive.body}", unit, 1.0, lambda _: linkage, zeros)
 
 
-def _alter_part(
-    linkage: Linkage, field: str, number: int, altered: Callable[[Any, float], Any], change: float
-) -> Linkage:
-    """Return a linkage one of whose bodies or loads is altered."""
+def _scale_part(linkage: Linkage, field: str, number: int, attribute: str, change: float) -> Linkage:
+    """Return a linkage with the force of a load, or the mass or the points of a body, larger by a part of it."""
     parts: dict[str, Any] = {field: list(getattr(linkage, field))}
-    parts[field][number] = altered(parts[field][number], change)
+    parts[field][number] = _scaled(parts[field][number], attribute, change)
     return attrs.evolve(linkage, **parts)
 
 
-def _scale_force(load: Load, change: float) -> Load:
-    return attrs.evolve(load, force=load.force * (1 + change))
+def _scale_ground(linkage: Linkage, change: float) -> Linkage:
+    """Return a linkage with the distances of the points on the ground larger by a part of them."""
+    return attrs.evolve(linkage, ground=_scaled(linkage.ground, "points", change))
 
 
-def _scale_mass(body: Body, change: float) -> Body:
-    return attrs.evolve(body, mass=body.mass * (1 + change))
-
-
-def _scale_points(body: Body, change: float) -> Body:
-    return attrs.evolve(body, points={name: point * (1 + change) for name, point in body.points.items()})
+def _scaled(part: Any, attribute: str, change: float) -> Any:
+    value = getattr(part, attribute)
+    if attribute == "points":
+        return attrs.evolve(part, points={name: point * (1 + change) for name, point in value.items()})
+    return attrs.evolve(part, **{attribute: value * (1 + change)})
 
 
 def _body_length(body: Body) -> float:

@@ -57,9 +57,9 @@ class Posterior:
 
     @property
     def bounds(self) -> Mapping[str, float]:
-        """Parameters that may lie beyond the swept range, with its end near which they are.
+        """Parameters whose estimate is near an end of the swept range and that may lie beyond it, with that end.
 
-        A coefficient of friction of 0 is a physical bound and no end of the swept range.
+        A coefficient of friction of 0 is a physical bound, not an end of the range.
         """
         ends = {}
         for i, name in enumerate(self.names):

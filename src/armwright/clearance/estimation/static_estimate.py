@@ -109,10 +109,8 @@ class Estimate:
             raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level:g}")
         from scipy.stats import norm, t  # noqa: PLC0415 - a slow import
 
-        reach = (
-            norm.ppf(0.5 + level / 2) if np.isinf(self.noise_freedom) else t.ppf(0.5 + level / 2, self.noise_freedom)
-        )
-        half = reach * self.deviations
+        distribution = norm() if np.isinf(self.noise_freedom) else t(self.noise_freedom)
+        half = distribution.ppf(0.5 + level / 2) * self.deviations
         return np.stack([np.maximum(self.values - half, 0.0), self.values + half], axis=-1)
 
     def identifiable(self, width: float) -> tuple[bool, ...]:
@@ -153,10 +151,8 @@ def rest_offsets(linkage: Linkage, poses: ArrayLike, clearances: ArrayLike) -> A
 def _offsets_at(linkage: Linkage, q: Array, clearances: Array) -> Array:
     """Return (..., k, 2) the offsets of the tip at closed coordinates (k, n) [m]; see ``rest_offsets``."""
     c = clearances[..., None, :]
-    return np.asarray(
-        find_static_equilibrium(linkage, q, c, contact_stiffness(linkage, c)).tip - tip_position(linkage, q),
-        dtype=np.float64,
-    )
+    tip = find_static_equilibrium(linkage, q, c, contact_stiffness(linkage, c)).tip
+    return np.asarray(tip - tip_position(linkage, q), dtype=np.float64)
 
 
 def estimate_at_rest(

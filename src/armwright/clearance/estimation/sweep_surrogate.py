@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -22,6 +22,8 @@ from armwright.sweep.results import load
 
 # No swept quantity has a larger number, in SI units.
 _MAX_VALUE = 1e9
+# Errors of reading results that anybody may have written.
+_MALFORMED = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, MemoryError)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -65,11 +67,11 @@ def learn_from_sweep(
     sweep = _read_sweep(folder, linkage, paths, features)
     table, finished, replicates = sweep.table, sweep.finished, sweep.replicates
     all_names = [f"{path}_{feature}" for path in paths for feature in features]
-    names = [
-        name
-        for name in all_names
-        if not (replicates and is_random(table[name][finished], table[f"{name}_spread"][finished], replicates + 1))
-    ]
+
+    def is_noise(name: str) -> bool:
+        return is_random(table[name][finished], table[f"{name}_spread"][finished], replicates + 1)
+
+    names = [name for name in all_names if not (replicates and is_noise(name))]
     if not names:
         raise InvalidValueError(
             f"{folder}: on {', '.join(paths)} all features are random: they vary more between indistinguishable runs "
@@ -92,8 +94,7 @@ def learn_from_sweep(
     )
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class _Sweep:
+class _Sweep(NamedTuple):
     """The results of a sweep: p parameters of n runs, and outputs by name, each (n,)."""
 
     parameters: tuple[str, ...]
@@ -113,9 +114,8 @@ def _read_sweep(folder: Path | str, linkage: Linkage, paths: Sequence[str], feat
             same, replicates = is_sweep_of(settings, linkage), int(settings.get("replicates", 0))
             parameters = tuple(name for name in map(str, data.coords) if name.startswith("c_") or name == "friction")
             # The two bounds of a random design, or the levels of a full factorial.
-            ranges = (
-                [_swept_range(design[name], name) for name in parameters] if set(parameters) <= set(design) else None
-            )
+            in_design = set(parameters) <= set(design)
+            ranges = [_swept_range(design[name], name) for name in parameters] if in_design else None
             outputs = [f"{path}_{feature}" for path in paths for feature in features]
             if replicates:
                 outputs += [f"{name}_spread" for name in outputs] + [f"{path}_until" for path in paths]
@@ -124,27 +124,16 @@ def _read_sweep(folder: Path | str, linkage: Linkage, paths: Sequence[str], feat
             table = {} if missing else {name: _output_values(data[name].to_numpy(), name, runs) for name in outputs}
             points = np.stack([_output_values(data[name].to_numpy(), name, runs) for name in parameters], axis=-1)
             finished = _output_values(data["status"].to_numpy(), "status", runs) == 0
-        except (
-            LookupError,
-            ValueError,
-            TypeError,
-            AttributeError,
-            ArithmeticError,
-            RecursionError,
-            MemoryError,
-        ) as error:
+        except _MALFORMED as error:
             path = Path(folder) / RESULTS
             why = shown(error) if str(error) else "its attributes cannot be read"
             raise FileFormatError(path, None, "", f"not the results of a sweep of clearances: {why}") from error
     if not same:
         raise InvalidValueError(f"{folder}: the sweep is of another linkage than {linkage.name}; sweep this one")
     if missing:
-        raise InvalidValueError(
-            f"{folder}: the sweep has no path {', '.join(missing)}; sweep the paths that were measured"
-        )
-    return _Sweep(
-        parameters=parameters, points=points, finished=finished, table=table, replicates=replicates, ranges=ranges
-    )
+        names = ", ".join(missing)
+        raise InvalidValueError(f"{folder}: the sweep has no path {names}; sweep the paths that were measured")
+    return _Sweep(parameters, points, finished, table, replicates, ranges)
 
 
 def _output_values(values: npt.NDArray[Any], name: str, runs: int) -> Array:
