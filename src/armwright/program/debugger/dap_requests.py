@@ -10,10 +10,9 @@ from typing import Any
 from armwright.errors import ArmwrightError
 from armwright.files.inputs import regular_file
 from armwright.program.debugger.dap_messages import Arguments, RequestError
-from armwright.program.debugger.dap_session import CODE_SOURCE_REFERENCE, EditorSession, LaunchRequest
+from armwright.program.debugger.dap_session import CODE_SOURCE_REFERENCE, EditorSession, FrameReference, LaunchRequest
 from armwright.program.debugger.debugger import Command
 from armwright.program.debugger.expressions import visible_names
-from armwright.program.debugger.history import ProcessPath
 from armwright.program.debugger.variables import ArrayElements, Variable
 from armwright.program.diagnostics.render import render
 from armwright.program.language.position_codec import UTF_16, PositionCodec
@@ -180,8 +179,7 @@ def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[s
     debugger = session.stopped_debugger
     try:
         if arguments.get(int, "variablesReference", 0):
-            group, _, _ = session.variables(arguments)
-            slot = _slot_named(group, name)
+            slot = _slot_named(session.variables(arguments)[0], name)
         else:
             slot = debugger.evaluate(name, *session.frame(arguments)).slot
     except ArmwrightError as error:
@@ -245,23 +243,20 @@ def scopes(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``scopes``: locals, variables, frames, arms, the run."""
     debugger = session.stopped_debugger
     arguments.get(int, "frameId")  # must be there
-    path, level = session.frame(arguments)
-    answers = []
-    for scope in debugger.scopes(path, level):
-        reference = _add_reference(session, scope, path, level)
-        answers.append({"name": scope.name, "variablesReference": reference, "expensive": False})
-    return {"scopes": answers}
+    frame = session.frame(arguments)
+    names = {scope.name: _add_reference(session, scope, frame) for scope in debugger.scopes(*frame)}
+    return {"scopes": [{"name": name, "variablesReference": names[name], "expensive": False} for name in names]}
 
 
 def variables(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``variables``: what is inside of something."""
     session.launched_debugger  # noqa: B018 - there must be a program
-    group, path, level = session.variables(arguments)
+    group, frame = session.variables(arguments)
     if arguments.get(str, "filter", "") == ("named" if isinstance(group, ArrayElements) else "indexed"):
         group = ()
     first, count = arguments.get(int, "start", 0), arguments.get(int, "count", 0) or _MAX_ELEMENTS
     listed = group[first : first + count]
-    return {"variables": [{"name": line.name, **_variable_body(session, line, path, level)} for line in listed]}
+    return {"variables": [{"name": line.name, **_variable_body(session, line, frame)} for line in listed]}
 
 
 def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
@@ -270,38 +265,32 @@ def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     In the console ``hit = 7`` gives a value, as it does in a program; for a comparison one writes ``(hit = 7)``.
     """
     debugger = session.stopped_debugger
-    path, level = session.frame(arguments)
+    frame = session.frame(arguments)
     text = arguments.get(str, "expression").strip().rstrip(";")
     assignment = _ASSIGNMENT.fullmatch(text) if arguments.get(str, "context", "") == "repl" else None
     if assignment is None:
-        variable = debugger.evaluate(text, path, level)
+        answer = _variable_body(session, debugger.evaluate(text, *frame), frame)
     else:
-        slot = debugger.evaluate(assignment[1], path, level).slot
-        if slot is None:
-            raise RequestError(f"`{assignment[1]}` cannot be assigned a value; for a comparison write `({text})`")
-        variable = debugger.assign(slot, assignment[2], path, level)
-    answer = _variable_body(session, variable, path, level)
+        refusal = f"`{assignment[1]}` cannot be assigned a value; for a comparison write `({text})`"
+        slot = debugger.evaluate(assignment[1], *frame).slot
+        answer = _assign(session, frame, slot, assignment[2], refusal)
     return {"result": answer.pop("value"), **answer}
 
 
 def set_variable(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setVariable``: give what is shown another value."""
-    name, debugger = arguments.get(str, "name"), session.stopped_debugger
-    group, path, level = session.variables(arguments)
-    slot = _slot_named(group, name)
-    if slot is None:
-        raise RequestError(f"{name} cannot be assigned a value")
-    return _variable_body(session, debugger.assign(slot, arguments.get(str, "value"), path, level), path, level)
+    session.stopped_debugger  # noqa: B018 - the program must stand still
+    name, (group, frame) = arguments.get(str, "name"), session.variables(arguments)
+    slot, value = _slot_named(group, name), arguments.get(str, "value")
+    return _assign(session, frame, slot, value, f"{name} cannot be assigned a value")
 
 
 def set_expression(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setExpression``: the same for what an expression names."""
     debugger = session.stopped_debugger
-    path, level = session.frame(arguments)
-    slot = debugger.evaluate(arguments.get(str, "expression"), path, level).slot
-    if slot is None:
-        raise RequestError("only variables, frames and elements can be assigned a value")
-    return _variable_body(session, debugger.assign(slot, arguments.get(str, "value"), path, level), path, level)
+    frame = session.frame(arguments)
+    slot, value = debugger.evaluate(arguments.get(str, "expression"), *frame).slot, arguments.get(str, "value")
+    return _assign(session, frame, slot, value, "only variables, frames and elements can be assigned a value")
 
 
 def completions(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
@@ -350,18 +339,25 @@ def _slot_named(group: Iterable[Variable], name: str) -> str | None:
     return next((variable.slot for variable in group if variable.name == name), None)
 
 
-def _add_reference(session: EditorSession, variable: Variable, path: ProcessPath, level: int) -> int:
+def _assign(session: EditorSession, frame: FrameReference, slot: str | None, text: str, refusal: str) -> dict[str, Any]:
+    """Give what is kept somewhere the value of an expression; what is kept nowhere is refused."""
+    if slot is None:
+        raise RequestError(refusal)
+    return _variable_body(session, session.stopped_debugger.assign(slot, text, *frame), frame)
+
+
+def _add_reference(session: EditorSession, variable: Variable, frame: FrameReference) -> int:
     """Return the number under which a variable can be opened; 0 where there is nothing in it."""
     if variable.children is None:
         return 0
-    session.variable_references.append((variable, path, level))
+    session.variable_references.append((variable, frame))
     return len(session.variable_references)
 
 
-def _variable_body(session: EditorSession, variable: Variable, path: ProcessPath, level: int) -> dict[str, Any]:
+def _variable_body(session: EditorSession, variable: Variable, frame: FrameReference) -> dict[str, Any]:
     answer = {"value": variable.value, "type": variable.type}
     optional = {"indexedVariables": variable.element_count, "evaluateName": variable.expression}
-    reference = _add_reference(session, variable, path, level)
+    reference = _add_reference(session, variable, frame)
     return {**answer, "variablesReference": reference, **{key: value for key, value in optional.items() if value}}
 
 

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import attrs
 
@@ -59,6 +59,8 @@ class MissingCellError(ArmwrightError, ValueError):
     exit_status = ExitStatus.USAGE
 
 
+# A stack frame: the process, and the level of its stack.
+FrameReference: TypeAlias = tuple[ProcessPath, int]
 Load = Callable[[LaunchRequest], LoadedProgram]
 # Writes what a run leaves; returns a line that says so.
 Save = Callable[[LaunchRequest, LoadedProgram, Recording], str]
@@ -105,8 +107,8 @@ class EditorSession:
         self.ids = itertools.count(1)
         self._thread_ids: dict[ProcessPath, int] = {(): 1}
         self._running_threads: set[int] = set()
-        self.frame_references: list[tuple[ProcessPath, int]] = []
-        self.variable_references: list[tuple[Variable, ProcessPath, int]] = []
+        self.frame_references: list[FrameReference] = []
+        self.variable_references: list[tuple[Variable, FrameReference]] = []
 
     # ---- the program -----------------------------------------------------------------------------------------------
 
@@ -289,7 +291,7 @@ class EditorSession:
         end = {"endLine": end_line + self.first_line, "endColumn": end_column + self.first_column}
         return start | end if full else start
 
-    def frame(self, arguments: Arguments) -> tuple[ProcessPath, int]:
+    def frame(self, arguments: Arguments) -> FrameReference:
         """Return the process and the level of the stack frame of a request; without one those of the program.
 
         Raises:
@@ -302,8 +304,8 @@ class EditorSession:
             raise RequestError(f"there is no stack frame {number}")
         return self.frame_references[number - 1]
 
-    def variables(self, arguments: Arguments) -> tuple[Sequence[Variable], ProcessPath, int]:
-        """Return the variables inside of the one that a request names, with its process and level.
+    def variables(self, arguments: Arguments) -> tuple[Sequence[Variable], FrameReference]:
+        """Return the variables inside of the one that a request names, with its stack frame.
 
         Raises:
             RequestError: there is no such variable.
@@ -311,8 +313,8 @@ class EditorSession:
         reference = arguments.get(int, "variablesReference")
         if not 0 < reference <= len(self.variable_references):
             raise RequestError(f"there is nothing to open under {reference}")
-        group, path, level = self.variable_references[reference - 1]
-        return () if group.children is None else group.children(), path, level
+        group, frame = self.variable_references[reference - 1]
+        return () if group.children is None else group.children(), frame
 
     def rebind_breakpoints(self) -> None:
         """Set the breakpoints that were asked for before there was a program."""

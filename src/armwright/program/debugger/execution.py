@@ -153,7 +153,7 @@ class Execution:
             if breakpoint_.start is None or breakpoint_.start.index != process.pc:
                 continue
             try:
-                is_due = self._is_triggered(breakpoint_, self.timeline.marks.visits.get(process.pc, 0) + 1, process)
+                is_due = self._is_triggered(breakpoint_, self.timeline.progress.visits.get(process.pc, 0) + 1, process)
             except ExpressionError as error:
                 is_due, text = True, f"the condition of this breakpoint has no value: {error}"
             if is_due and breakpoint_.log_message and not text:

@@ -66,7 +66,7 @@ class Timeline:
     def __init__(self, code: Code, cell: Cell, limits: Limits | None = None) -> None:
         """Stand in front of the first instruction."""
         self.machine = Machine(code, cell, Simulator(cell), limits)
-        self.marks = Progress()
+        self.progress = Progress()
         self.step_count = 0
         self._changes: list[tuple[int, Change]] = []
         # Whether a step failed half-done, so that the state is not that of a moment.
@@ -88,10 +88,10 @@ class Timeline:
         if process.pending_effect is not None or process.followed_motion is not None:
             return False
         step = self.machine.code.instructions[process.pc]
-        if not step.begins or process.path in self.marks.blocked:
+        if not step.begins or process.path in self.progress.blocked:
             return False
         # The first pass of a FOR follows its own beginning.
-        return step.op is not Op.FOR or self.marks.last_instructions.get(process.path) != process.pc - 1
+        return step.op is not Op.FOR or self.progress.last_instructions.get(process.path) != process.pc - 1
 
     def advance(self) -> Process:
         """Do one step.
@@ -102,7 +102,7 @@ class Timeline:
         Raises:
             RunError: something went wrong that no TRY is around; the run is over.
         """
-        machine, progress = self.machine, self.marks
+        machine, progress = self.machine, self.progress
         self._broken = True
         process = next_process(machine)
         index = process.pc
@@ -168,7 +168,7 @@ class Timeline:
 
     def _take_snapshot(self) -> _Snapshot:
         start = time.perf_counter()
-        moment = _Snapshot(self.step_count, self.machine.copy(), self.marks.copy())
+        moment = _Snapshot(self.step_count, self.machine.copy(), self.progress.copy())
         self._last_snapshot_time = time.perf_counter()
         # One that the machine was busy with something else for says little of the next.
         cost = self._last_snapshot_time - start
@@ -176,7 +176,7 @@ class Timeline:
         return moment
 
     def _restore(self, moment: _Snapshot) -> None:
-        self.machine, self.marks = moment.machine.copy(), moment.progress.copy()
+        self.machine, self.progress = moment.machine.copy(), moment.progress.copy()
         self.step_count, self._broken = moment.step_count, False
         self._last_snapshot_time = time.perf_counter()
         self._reapply_changes()
