@@ -23,6 +23,7 @@ from armwright.errors import (
 )
 from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.differential import differential_inverse
+from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations
 from armwright.kinematics.jacobians import jacobian_rate, tool_twist
 from armwright.kinematics.manipulability_index import manipulability
 from armwright.kinematics.singularity_analysis import singularity_factors
@@ -401,3 +402,44 @@ def test_a_hand_without_inertia(ask: Door) -> None:
 
     with pytest.raises(UnsupportedArmError, match=r"'light': the acceleration of joint 2 is undefined: .* Give its"):
         ask(arm)
+
+
+STANFORD = "examples/stanford_cell.toml"
+STACKING = "examples/stacking.rlo"
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: armwright.program.run(None), KindError, "program: expected the path of a file or a Source, got None"),
+        (lambda: armwright.program.compile(b"x"), KindError, "program: expected the path"),
+        (lambda: armwright.program.run(STACKING, {}), KindError, "cell: expected a Cell or the path of its file"),
+        (lambda: armwright.program.compile(STACKING, std="84"), UnknownNameError, "84"),
+        (lambda: armwright.program.run(STACKING, STANFORD, limits=5), KindError, "limits: expected Limits, got 5"),
+        (
+            lambda: armwright.program.run(armwright.program.compile(STACKING, STANFORD), STANFORD),
+            InvalidValueError,
+            "a compiled program has its cell",
+        ),
+        (lambda: armwright.arm.toml_text("puma560"), KindError, "arm: expected an Arm"),
+        (lambda: armwright.arm.urdf_text("puma560"), KindError, "arm: expected an Arm"),
+        (lambda: equivalent_configurations(PUMA, np.zeros((2, 6))), ShapeError, "expected shape"),
+    ],
+)
+def test_arguments_of_other_functions(call: Callable[[], object], error: type[Exception], message: str) -> None:
+    """Programs, arms and configurations of the wrong kind are refused by name."""
+    with pytest.raises(error, match=message):
+        call()
+
+
+def test_names_are_compiled_to_their_end() -> None:
+    """A program of which only the names were compiled runs like one that was compiled whole."""
+    names_only = armwright.program.compile(STACKING, STANFORD, names_only=True)
+    assert armwright.program.run(names_only).duration == armwright.program.run(STACKING, STANFORD).duration
+
+
+@pytest.mark.parametrize("namespace", [armwright.sweep, armwright.study])
+def test_namespaces_list_their_names(namespace: Any) -> None:
+    """A namespace lists what it has, and each of it is there."""
+    assert namespace.__all__
+    assert all(hasattr(namespace, name) for name in dir(namespace))

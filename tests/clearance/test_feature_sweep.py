@@ -21,7 +21,7 @@ from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.sweep.designs import Design, latin_hypercube
 from armwright.sweep.errors import SweepError
 from armwright.sweep.progress import Progress
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from armwright.sweep.task import Status, check_task, evaluate
 from clearance.arms import ARM_A, ARM_B, CENTRE, varied
 

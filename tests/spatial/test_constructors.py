@@ -1,11 +1,13 @@
 """Poses from positions and orientations, in each of the usual forms."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 import armwright
-from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
-from armwright.spatial import from_zyz, pose, to_rpy
+from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError
+from armwright.spatial import angle_between, between, from_zyz, homogeneous, pose, rotation_from_quaternion, to_rpy
 
 ROUNDING = 1e-14
 DOWN = np.diag((1.0, -1.0, -1.0))
@@ -70,10 +72,38 @@ def test_no_orientation() -> None:
         ({"euler": (0, 0, 0), "sequence": "ZYY"}, UnknownNameError, "ZYY"),
         ({"rpy": (0, 0)}, ShapeError, "rpy"),
         ({"rpy": (0, 0, np.nan)}, InvalidValueError, "rpy"),
+        ({"rpy": np.zeros((3, 3)), "position": np.zeros((2, 3))}, ShapeError, "rotation and position: leading axes"),
+        ({"axis": np.ones((3, 3)), "angle": (1, 2)}, ShapeError, "axis and angle: leading axes"),
     ],
     ids=str,
 )
 def test_refused(arguments: dict[str, object], error: type[Exception], message: str) -> None:
     """What is no orientation is refused, with what was expected."""
     with pytest.raises(error, match=message):
-        pose((0, 0, 0), **arguments)  # type: ignore[arg-type]
+        pose(**arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("length", [1e-300, 1e-150, 1e150, 1e300])
+def test_directions_of_any_length(length: float) -> None:
+    """An axis or a quaternion may be of any length but 0."""
+    axis, quaternion = np.array((1.0, 2.0, 2.0)), np.array((0.5, -0.5, 0.5, 0.5))
+    assert pose(axis=axis * length, angle=1.0) == pytest.approx(pose(axis=axis, angle=1.0), abs=1e-15)
+    assert pose(quaternion=quaternion * length) == pytest.approx(pose(quaternion=quaternion), abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: rotation_from_quaternion((0, 0, 0, 0)), InvalidValueError, "quaternion: expected a vector"),
+        (lambda: angle_between(np.ones((2, 3, 3)), np.ones((3, 3, 3))), ShapeError, "rotations: leading axes"),
+        (lambda: homogeneous(np.ones((2, 3, 3)), np.zeros((3, 3))), ShapeError, "rotation and position: leading axes"),
+        (lambda: between(np.eye(4), np.eye(4)[None], 0.5), ShapeError, "X_B"),
+        (lambda: between(np.eye(4), np.eye(4), "half"), KindError, "s: expected numbers"),
+        (lambda: to_rpy(np.ones((2, 3, 3))), ShapeError, "rotation: expected shape"),
+        (lambda: to_rpy("R"), KindError, "rotation: expected numbers"),
+    ],
+)
+def test_refused_by_the_other_functions(call: Callable[[], object], error: type[Exception], message: str) -> None:
+    """What has another shape or kind is refused by name."""
+    with pytest.raises(error, match=message):
+        call()

@@ -12,7 +12,7 @@ from armwright.sweep import executors
 from armwright.sweep.designs import Design, full_factorial
 from armwright.sweep.errors import SweepError
 from armwright.sweep.progress import Progress
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from armwright.sweep.task import Status
 from armwright.sweep.worker import evaluate_pickled
 from sweep_tasks import Fall, calls_of

@@ -10,7 +10,7 @@ import pytest
 
 from armwright.sweep.designs import Design
 from armwright.sweep.executors import evaluate_in_parallel
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from armwright.sweep.task import Rows, evaluate
 from sweep_tasks import Fall, Threads
 

@@ -24,7 +24,7 @@ from armwright.sweep.errors import SweepError
 from armwright.sweep.folder import lock_folder
 from armwright.sweep.progress import Progress
 from armwright.sweep.results import load
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from armwright.sweep.task import Status
 from sweep_tasks import Fall, calls_of
 
@@ -34,7 +34,7 @@ SCRIPT = """
 import sys
 from pathlib import Path
 from armwright.sweep.designs import full_factorial
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from sweep_tasks import Fall
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from scipy.io import netcdf_file
 from armwright.errors import InvalidValueError
 from armwright.sweep import results
 from armwright.sweep.designs import Design, full_factorial
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from armwright.sweep.task import check_task
 from sweep_tasks import Fall
 

@@ -17,7 +17,7 @@ from armwright.sweep.designs import Design, full_factorial, latin_hypercube
 from armwright.sweep.errors import SweepError
 from armwright.sweep.progress import Progress
 from armwright.sweep.results import load
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from armwright.sweep.task import Axis, Output, Status
 from sweep_tasks import TIMES, Fall, calls_of
 
@@ -221,7 +221,7 @@ def test_task_that_cannot_be_sent(tmp_path: Path) -> None:
 SCRIPT = """
 import sys
 from armwright.sweep.designs import full_factorial
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from sweep_tasks import Fall
 
 run(Fall(), full_factorial({"speed": range(40)}), sys.argv[1], block=8, workers=2)
@@ -274,7 +274,7 @@ import sys, tracemalloc
 from pathlib import Path
 import numpy as np
 from armwright.sweep.designs import full_factorial
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from sweep_tasks import Fall
 
 def peak(runs):
@@ -323,7 +323,7 @@ def test_missing_dask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_import_is_light() -> None:
     """What sweeps need beyond the core is loaded when a sweep is run."""
     heavy = "{'xarray', 'threadpoolctl', 'distributed', 'dask', 'pandas', 'scipy.stats', 'numba'}"
-    code = f"import sys, armwright.sweep.run; print({heavy} & set(sys.modules))"
+    code = f"import sys, armwright.sweep.runner; print({heavy} & set(sys.modules))"
 
     done = subprocess.run(
         [sys.executable, "-c", code], env={"PYTHONPATH": ":".join(sys.path)}, capture_output=True, text=True, check=True

@@ -13,6 +13,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link, Motor
+from armwright.arm.positions import known_arm
 from armwright.arm.tensors import impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import Array
@@ -25,9 +26,10 @@ def toml_text(arm: Arm) -> str:
     What is as it would be if left out is left out.
 
     Raises:
+        KindError: it is no arm.
         InvalidValueError: arm files cannot hold it: a gear ratio that is not above 0, a tensor that no body has.
     """
-    return "\n".join(_lines(arm))
+    return "\n".join(_lines(known_arm(arm)))
 
 
 def _lines(arm: Arm) -> Iterator[str]:

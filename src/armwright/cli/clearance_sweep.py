@@ -61,7 +61,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.sweep.designs import full_factorial, latin_hypercube, sobol
     from armwright.sweep.extras import check_extras
     from armwright.sweep.folder import RESULTS
-    from armwright.sweep.run import run
+    from armwright.sweep.runner import run
 
     check_extras()
     task = FeatureSweep(

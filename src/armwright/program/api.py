@@ -12,7 +12,7 @@ from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, counted
+from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, KindError, counted, one_of, shown
 from armwright.files.inputs import read_program, regular_file
 from armwright.files.limits import limit, limit_message
 from armwright.program.bytecode.assembler import assemble
@@ -137,7 +137,14 @@ def compile(  # noqa: A001 - what a translator does
 
     Raises:
         FileFormatError: a file cannot be read, or is not text, or is no cell.
+        KindError: an argument is of the wrong kind.
+        UnknownNameError: there is no such language.
     """
+    if not isinstance(program, str | Path | Source):
+        raise KindError(f"program: expected the path of a file or a Source, got {shown(program)}")
+    if not (cell is None or isinstance(cell, str | Path | Cell | KnownCell)):
+        raise KindError(f"cell: expected a Cell or the path of its file, got {shown(cell)}")
+    std = Standard(one_of("language", getattr(std, "value", std), [standard.value for standard in Standard]))
     if isinstance(program, Source):
         source = program
     else:
@@ -162,7 +169,7 @@ def run(
     """Compile a program and run it in a cell.
 
     Args:
-        program: the path of its file, its text as a ``Source``, or what ``compile`` gave.
+        program: the path of its file, its text as a ``Source``, or what ``compile`` gave, with the cell of that.
         cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
         strict: whether an AFFIX that is only implied is an error.
         std: the language it is written in.
@@ -176,13 +183,21 @@ def run(
     Raises:
         FileFormatError: a file cannot be read, or is not text, or is no cell.
         ProgramError: the program has errors.
-        InvalidValueError: there is no cell.
+        InvalidValueError: there is no cell, or one beside a compiled program.
+        KindError: an argument is of the wrong kind.
         RunError: the program could not go on; it has the recording up to there.
 
     Example:
         ``armwright.program.run("examples/stacking.rlo", "examples/stanford_cell.toml").duration``
     """
-    compiled = program if isinstance(program, Compilation) else compile(program, cell, strict=strict, std=std)
+    if not (limits is None or isinstance(limits, Limits)):
+        raise KindError(f"limits: expected Limits, got {shown(limits)}")
+    if isinstance(program, Compilation):
+        if cell is not None:
+            raise InvalidValueError("cell: a compiled program has its cell; pass the cell to `compile`")
+        compiled = program if program.flow is not None else _generate_code(analyse_flow(program))
+    else:
+        compiled = compile(program, cell, strict=strict, std=std)
     if compiled.code is None:
         raise ProgramError(compiled)
     if compiled.cell is None:

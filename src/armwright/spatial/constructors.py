@@ -7,10 +7,15 @@ from itertools import product
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from armwright.arrays import Array, ArrayLike, of_shape
+from armwright.arrays import Array, ArrayLike, leading_axes, of_shape
 from armwright.errors import InvalidValueError, one_of
 from armwright.spatial.poses import homogeneous
-from armwright.spatial.rotations import orthonormality_error, rotation_from_quaternion, rotation_from_vector
+from armwright.spatial.rotations import (
+    orthonormality_error,
+    rotation_from_quaternion,
+    rotation_from_vector,
+    unit_vectors,
+)
 
 # Entries of a typed rotation may be off by so much; more is a mistake.
 _TYPED = 1e-6
@@ -74,25 +79,18 @@ def pose(
             message = f"expected an orthonormal matrix with determinant 1, got an orthonormality error of {error:.2g}"
             raise InvalidValueError(f"rotation: {message}")
     elif quaternion is not None:
-        R = rotation_from_quaternion(_direction(quaternion, 4, "quaternion"))
+        R = rotation_from_quaternion(quaternion)
     elif rpy is not None:
         R = _euler(rpy, "xyz", "rpy")
     elif euler is not None:
         R = _euler(euler, one_of("sequence", sequence, _SEQUENCES), "Euler angles")
     elif axis is not None and angle is not None:
-        R = rotation_from_vector(_direction(axis, 3, "axis") * of_shape(angle, (), "angle")[..., None])
+        axes, angles = unit_vectors(axis, 3, "axis"), of_shape(angle, (), "angle")
+        leading_axes("axis and angle", (axes, angles), (axes.shape[:-1], angles.shape))
+        R = rotation_from_vector(axes * angles[..., None])
     else:
         R = np.eye(3)
     return homogeneous(R, of_shape(position, (3,), "position"))
-
-
-def _direction(value: ArrayLike, size: int, what: str) -> Array:
-    """Return vectors scaled to length 1."""
-    vectors = of_shape(value, (size,), what)
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    if not np.all(lengths > 0):
-        raise InvalidValueError(f"{what}: expected a vector that is not 0")
-    return np.asarray(vectors / lengths)
 
 
 def _euler(angles: ArrayLike, sequence: str, what: str) -> Array:

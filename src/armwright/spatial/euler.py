@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, of_shape
+from armwright.arrays import Array, ArrayLike, exact_shape, of_shape
 from armwright.spatial.rotations import elementary_rotation
 
 # Below this sine of theta only phi + psi, or phi - psi, is determined.
@@ -92,12 +92,13 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> Array:
     return elementary_rotation(2, yaw) @ elementary_rotation(1, pitch) @ elementary_rotation(0, roll)
 
 
-def to_rpy(R: Array) -> Array:
+def to_rpy(R: ArrayLike) -> Array:
     """Return roll, pitch and yaw (3,) of a rotation (3, 3), to the last digits also where pitch is a right angle [rad].
 
     They are rotations about the fixed axes x, then y, then z. Where pitch is a right angle, yaw and roll share an axis.
     Roll is read from the remaining rotation after removing yaw, so any yaw will do.
     """
+    R = exact_shape(R, (3, 3), "rotation")
     level = math.hypot(R[0, 0], R[1, 0])
     c, s = (R[0, 0] / level, R[1, 0] / level) if level else (1.0, 0.0)
     tilted = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0))) @ R

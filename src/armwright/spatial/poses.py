@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, exact_shape, of_shape
+from armwright.arrays import Array, ArrayLike, exact_shape, floats, leading_axes, of_shape
 from armwright.errors import InvalidValueError
 from armwright.spatial.rotations import orthonormality_error, rotation_from_vector, rotation_vector
 
@@ -28,9 +28,9 @@ def one_pose(value: ArrayLike, what: str = "pose") -> Array:
 
 
 def homogeneous(R: ArrayLike, p: ArrayLike) -> Array:
-    """Join a rotation (..., 3, 3) and a position (..., 3) [m] to a pose (..., 4, 4)."""
+    """Join a rotation (..., 3, 3) and a position (..., 3) [m] to a pose (..., 4, 4); leading axes are broadcast."""
     R, p = of_shape(R, (3, 3), "rotation"), of_shape(p, (3,), "position")
-    lead = np.broadcast_shapes(R.shape[:-2], p.shape[:-1])
+    lead = leading_axes("rotation and position", (R, p), (R.shape[:-2], p.shape[:-1]))
     X = np.zeros((*lead, 4, 4))
     X[..., :3, :3] = R
     X[..., :3, 3] = p
@@ -84,7 +84,7 @@ def between(X_A: ArrayLike, X_B: ArrayLike, s: ArrayLike) -> Array:
     Returns:
         (..., 4, 4).
     """
-    X_A, X_B, s = of_shape(X_A, (4, 4), "pose"), of_shape(X_B, (4, 4), "pose"), np.asarray(s, dtype=np.float64)
+    X_A, X_B, s = exact_shape(X_A, (4, 4), "X_A"), exact_shape(X_B, (4, 4), "X_B"), floats(s, "s")
     rotation = rotation_vector(X_A[:3, :3].T @ X_B[:3, :3])
     R = X_A[:3, :3] @ rotation_from_vector(s[..., None] * rotation)
     p = X_A[:3, 3] + s[..., None] * (X_B[:3, 3] - X_A[:3, 3])

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, of_shape
+from armwright.arrays import Array, ArrayLike, leading_axes, of_shape
+from armwright.errors import InvalidValueError
 
 # Below this angle sin(angle)/angle is 1 to the last bit, so the axis needs no division by the angle.
 _TINY_ANGLE = 1e-12
@@ -133,9 +134,26 @@ def skew_matrix(w: Array) -> Array:
 
 
 def angle_between(R_A: ArrayLike, R_B: ArrayLike) -> Array:
-    """Return the angle of the rotation from R_A to R_B, (...) [rad]."""
-    R_AB = np.swapaxes(of_shape(R_A, (3, 3), "rotation"), -1, -2) @ of_shape(R_B, (3, 3), "rotation")
+    """Return the angle of the rotation from R_A to R_B, (...) [rad]; leading axes are broadcast."""
+    R_A, R_B = of_shape(R_A, (3, 3), "rotation"), of_shape(R_B, (3, 3), "rotation")
+    leading_axes("rotations", (R_A, R_B), (R_A.shape[:-2], R_B.shape[:-2]))
+    R_AB = np.swapaxes(R_A, -1, -2) @ R_B
     return np.asarray(np.linalg.norm(rotation_vector(R_AB), axis=-1))
+
+
+def unit_vectors(value: ArrayLike, size: int, what: str) -> Array:
+    """Return vectors (..., size) of length 1 in the directions of others, however long these are.
+
+    Raises:
+        InvalidValueError: a vector is 0.
+    """
+    vectors = of_shape(value, (size,), what)
+    largest = np.abs(vectors).max(axis=-1, keepdims=True, initial=0.0)
+    if not np.all(largest > 0):
+        raise InvalidValueError(f"{what}: expected a vector that is not 0")
+    # A power of two changes no digit, and no square overflows or vanishes.
+    scaled = np.ldexp(vectors, -np.frexp(largest)[1])
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True))
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
@@ -146,8 +164,10 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
 
     Returns:
         (..., 3, 3).
+
+    Raises:
+        InvalidValueError: a quaternion is 0.
     """
-    typed = of_shape(quaternion, (4,), "quaternion")
-    unit = typed / np.linalg.norm(typed, axis=-1, keepdims=True)
+    unit = unit_vectors(quaternion, 4, "quaternion")
     V = skew_matrix(unit[..., 1:])
     return np.asarray(np.eye(3) + 2 * (unit[..., 0, None, None] * V + V @ V))

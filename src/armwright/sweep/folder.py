@@ -93,7 +93,7 @@ class Folder:
     design: Design
     sweep: Mapping[str, Any]
     block: int
-    provenance: Mapping[str, str]
+    provenance: dict[str, str]
 
     @cached_property
     def blocks(self) -> list[range]:

@@ -44,12 +44,10 @@ def load(folder: Path | str) -> "xarray.Dataset":
     if not path.exists():
         state = "is not finished; run it again to resume" if path.with_name(MANIFEST).exists() else "does not exist"
         raise SweepError(f"'{folder}': the sweep {state}")
-    damage, expected, actual = "", recorded_hashes(path.parent).get(RESULTS), sha256(regular_file(path))
-    if expected is None:
-        damage = f"it cannot be verified: its folder has no {RECORD} with its checksum"
-    elif expected != actual:
-        damage = f"damaged: its checksum does not match {RECORD}"
-    if damage:
+    expected = recorded_hashes(path.parent).get(RESULTS)
+    if expected != sha256(regular_file(path)):
+        missing = f"it cannot be verified: its folder has no {RECORD} with its checksum"
+        damage = f"damaged: its checksum does not match {RECORD}" if expected else missing
         advice = "move or delete it and run the sweep again: it is generated from the blocks"
         raise FileFormatError(path, None, "", f"{damage}; it is not changed; {advice}")
     # Units such as "hours" are those of a quantity, not of a calendar.
@@ -73,7 +71,7 @@ def write_results(folder: Folder) -> None:
     def write(partial: Path) -> None:
         _write_blocks(folder, partial)
         # The record comes first: results without it could not be checked, and one without results harms nobody.
-        text = record_text({RESULTS: sha256(partial) or ""}, {"versions": dict(folder.provenance)})
+        text = record_text({RESULTS: sha256(partial) or ""}, {"versions": folder.provenance})
         write_whole(folder.path / RECORD, lambda record: record.write_text(text, encoding="utf-8"))
 
     write_whole(folder.path / RESULTS, write)
@@ -140,7 +138,7 @@ def _netcdf_bytes(folder: Folder, start: int, rows: Rows, letters: int) -> bytes
         "title": task.name,
         "source": f"armwright {folder.provenance['armwright']}",
         "date_created": folder.provenance["date"],
-        "versions": json.dumps(dict(folder.provenance), ensure_ascii=False),
+        "versions": json.dumps(folder.provenance, ensure_ascii=False),
         "settings": json.dumps(folder.sweep["settings"], ensure_ascii=False),
         "design": json.dumps(folder.sweep["design"], ensure_ascii=False),
     }

@@ -16,7 +16,7 @@ from armwright.errors import FileFormatError, InvalidValueError
 from armwright.files.output import record_text, sha256
 from armwright.sweep.designs import sobol
 from armwright.sweep.results import load
-from armwright.sweep.run import run
+from armwright.sweep.runner import run
 from clearance.conftest import RANGE
 
 pytest.importorskip("sklearn")

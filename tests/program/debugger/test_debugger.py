@@ -327,6 +327,16 @@ def test_conditions_that_make_no_sense() -> None:
     assert run(debugger, "continue").reason == "end"
 
 
+def test_lines_and_values_out_of_range() -> None:
+    """A line below 1 stops nothing, and a number beyond the language's is not assigned."""
+    debugger = load(LOOP)
+
+    assert debugger.add_breakpoint(0).message == "lines are numbered from 1, got 0"
+    assert debugger.add_breakpoint(-5).start is None
+    with pytest.raises(ExpressionError, match="exceeds 1e\\+100"):
+        debugger.assign("N", "1e101")
+
+
 def test_a_condition_without_a_value_stops() -> None:
     """Where the condition of a breakpoint has no value, the run stops and says so."""
     debugger = load("VAR i, n : SCALAR ;\nBEGIN\n  i = 1 ;\n  n = 2 ;\n  PRINT(n, i)\nEND.")

@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Limits, Link, Motor
+from armwright.arm.positions import known_arm
 from armwright.arm.urdf.robot import NO_LIMIT
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError
@@ -35,10 +36,11 @@ def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
             when left out.
 
     Raises:
+        KindError: it is no arm.
         InvalidValueError: its name has characters that XML cannot hold.
         ShapeError: there are not as many tilts as joints.
     """
-    tilts = (0.0,) * arm.n if tilts is None else tilts
+    tilts = (0.0,) * known_arm(arm).n if tilts is None else tilts
     if len(tilts) != arm.n:
         raise ShapeError(f"tilts: expected {arm.n} of them, one for each joint, got {len(tilts)}")
     parts = [*(joint.name for joint in arm.joints), *(link.name for link in arm.links)]

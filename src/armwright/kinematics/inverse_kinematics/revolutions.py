@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.arm.positions import known_arm
+from armwright.arrays import Array, ArrayLike, joint_array, one_per_joint
 from armwright.kinematics.inverse_kinematics.solution import violations
 
 _TURN = 2 * math.pi
@@ -45,7 +46,7 @@ def equivalent_configurations(arm: Arm, q: ArrayLike) -> Array:
     A joint without limits has endless equivalents; it stays where it is. Where limits leave room for very many, those
     nearest to the configuration are returned, some thousand.
     """
-    values = joint_array(q, arm.n).tolist()
+    values = one_per_joint(q, known_arm(arm).n).tolist()
     rows = np.stack(np.meshgrid(*_few(_equivalents(arm, q, values), values), indexing="ij"), axis=-1).reshape(-1, arm.n)
     inside = [row for row in rows if not violations(arm, row)]
     return np.array(inside).reshape(len(inside), arm.n)

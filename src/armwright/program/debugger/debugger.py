@@ -23,6 +23,7 @@ from armwright.program.debugger.variables import Variable
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_arm
 from armwright.program.vm.machine import Limits, Machine, RunError
+from armwright.program.vm.operators import MAX_NUMBER
 from armwright.program.vm.process import ElementReference, Process
 from armwright.program.vm.recording import Effect
 
@@ -183,7 +184,8 @@ class Debugger:
         Returns:
             The breakpoint; one without a ``start`` stops nothing, and its ``message`` says why.
         """
-        start, message = self.execution.statements.find(line, column), "no statement begins on this line or below"
+        start = self.execution.statements.find(line, column) if line >= 1 else None
+        message = "no statement begins on this line or below" if line >= 1 else f"lines are numbered from 1, got {line}"
         if start is not None:
             try:
                 self._check(condition, hit_condition, self.execution.statements.procedure_at(start.index))
@@ -315,6 +317,8 @@ class Debugger:
         if moving is not None and not is_arm(slot):
             raise ExpressionError(f"`{view.spelling(slot)}` is being moved; it can be assigned a pose after the MOVE")
         value = expressions.evaluate_as(view, frame, text, kind.kind)
+        if isinstance(value, float) and abs(value) > MAX_NUMBER:
+            raise ExpressionError(f"`{text}` exceeds {MAX_NUMBER:g}, the largest number")
 
         def change(machine: Machine) -> None:
             assert not isinstance(value, ElementReference)  # noqa: S101 - elements have been read

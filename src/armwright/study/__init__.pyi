@@ -1,0 +1,1 @@
+from .study import STUDIES as STUDIES, Study as Study, run_study as run_study
