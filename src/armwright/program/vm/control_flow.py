@@ -58,8 +58,9 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
         if key in procedure.parameters:
             operand = step.operands[1 + procedure.parameters.index(key)]
             by_value = not kind.sizes and kind.kind in (VariableKind.SCALAR, VariableKind.TRANS)
-            if not by_value and machine.names_variable(process, operand):
-                bindings[key] = machine.resolve_name(process, operand)
+            argument = None if by_value else machine.variable_name(process, operand)
+            if argument is not None:
+                bindings[key] = argument
                 continue
             if by_value:
                 read = machine.read_number if kind.kind is VariableKind.SCALAR else machine.read_pose

@@ -123,18 +123,18 @@ class Machine:
 
     def resolve_name(self, process: Process, operand: Operand) -> str:
         """Return what an operand names: where a variable or element is kept, an arm, a device."""
-        assert isinstance(operand, str)  # noqa: S101 - the translator names what is written
-        if operand.startswith("%"):
-            element = process.activation.temporaries[operand]
-            assert isinstance(element, ElementReference)  # noqa: S101 - only elements are written in passing
-            return element.name
-        return process.activation.bindings.get(operand, operand)
+        name = self.variable_name(process, operand)
+        assert name is not None  # noqa: S101 - the translator names what is written
+        return name
 
-    def names_variable(self, process: Process, operand: Operand) -> bool:
-        """Whether an operand stands for something that can be written."""
+    def variable_name(self, process: Process, operand: Operand) -> str | None:
+        """Return what an operand names, as ``resolve_name`` does; None for the value of an expression."""
         if not isinstance(operand, str):
-            return False
-        return not operand.startswith("%") or isinstance(process.activation.temporaries[operand], ElementReference)
+            return None
+        if operand.startswith("%"):
+            value = process.activation.temporaries[operand]
+            return value.name if isinstance(value, ElementReference) else None
+        return process.activation.bindings.get(operand, operand)
 
     def type_of(self, name: str) -> VariableType:
         """Return what a kept name holds; of an element, what the element holds."""
@@ -152,10 +152,8 @@ class Machine:
         if not isinstance(operand, str):
             assert isinstance(operand, float | int)  # noqa: S101 - nothing else has a value
             return float(operand)
-        if operand.startswith("%"):
-            value = process.activation.temporaries[operand]
-            return self.slot_value(process, value.name, span) if isinstance(value, ElementReference) else value
-        return self.slot_value(process, process.activation.bindings.get(operand, operand), span)
+        name = self.variable_name(process, operand)
+        return process.activation.temporaries[operand] if name is None else self.slot_value(process, name, span)
 
     def slot_value(self, process: Process, name: str, span: Span) -> Value:
         """Return what a kept name holds."""
@@ -205,9 +203,10 @@ class Machine:
 
     def operand_text(self, process: Process, operand: Operand) -> str:
         """Return what an operand is called in the trace: as the program writes it."""
-        if isinstance(operand, str) and not self.names_variable(process, operand):
-            return " ".join(self.code.source.slice(process.activation.temporary_spans[operand]).split())
-        return self.spelling(self.resolve_name(process, operand))
+        name = self.variable_name(process, operand)
+        if name is None:
+            return " ".join(self.code.source.slice(process.activation.temporary_spans[str(operand)]).split())
+        return self.spelling(name)
 
     def spelling(self, name: str) -> str:
         """Return a kept name as the program writes it."""

@@ -61,7 +61,7 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
         X_HM=machine.state.tree.relation(moved, arm),
         span=step.span,
         text=f"{subject} MOVE: {stages_text(request.form).replace(' / ', '; ')} {speed_text}",
-        goal=_goal_name(machine, process, request),
+        goal=machine.variable_name(process, request.begin.operands[1]) or request.form.goal,
         implied_affix=implied,
         stages=stages,
         speed=request.speed,
@@ -134,11 +134,6 @@ def release_locks(machine: Machine, process: Process, keep_count: int) -> None:
 
 
 # ---- planning ------------------------------------------------------------------------------------------------------
-
-
-def _goal_name(machine: Machine, process: Process, request: MoveRequest) -> str:
-    goal = request.begin.operands[1]
-    return machine.resolve_name(process, goal) if machine.names_variable(process, goal) else request.form.goal
 
 
 def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction) -> tuple[str, bool]:
@@ -245,9 +240,8 @@ def _fail_move(
 ) -> NoReturn:
     label = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
     goal, kind = request.goals[label], stage.kind.value
-    secondary = []
-    if machine.names_variable(process, goal.operand):
-        secondary = machine.origin_labels(machine.resolve_name(process, goal.operand), f"`{label}` got its pose here")
+    frame = machine.variable_name(process, goal.operand)
+    secondary = machine.origin_labels(frame, f"`{label}` got its pose here") if frame else []
     raise machine.error(
         process,
         CODES[obstacle.cause],
