@@ -22,7 +22,8 @@ def public(namespace: str) -> Iterator[tuple[str, Any]]:
         if callable(value):
             yield name, value
         if inspect.isclass(value):
-            methods = [key for key in vars(value) if not key.startswith("_") and callable(getattr(value, key))]
+            methods = [key for key in vars(value) if callable(getattr(value, key))]
+            methods = [key for key in methods if not key.startswith("_") or key == "__init__"]
             yield from ((f"{name}.{key}", getattr(value, key)) for key in methods)
 
 
@@ -34,7 +35,7 @@ def test_signatures_are_short(namespace: str) -> None:
             signature = str(inspect.signature(value))
         except ValueError:  # some builtin types have none
             continue
-        assert len(signature) <= 200, f"{namespace}.{name}{signature}"
+        assert len(signature.replace("self, ", "")) <= 200, f"{namespace}.{name}{signature}"
 
 
 def test_shortened_signatures_keep_names_and_annotations() -> None:

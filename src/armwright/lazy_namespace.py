@@ -1,11 +1,14 @@
 """Lazy namespaces of packages: a public name listed in the stub beside a package is imported at its first use."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import lazy_loader
 
 from armwright.errors import closest
+
+if TYPE_CHECKING:
+    from inspect import Signature
 
 MAX_SIGNATURE_LENGTH = 200
 MAX_DEFAULT_LENGTH = 40
@@ -43,19 +46,26 @@ def with_short_signature(value: Any) -> Any:
     """
     import inspect  # noqa: PLC0415 - not needed to import the package
 
-    is_class = inspect.isclass(value)
-    if not inspect.isfunction(value) and not (is_class and "__init__" in vars(value)):
-        return value
-    signature = inspect.signature(value.__init__ if is_class else value)
-    parameters = list(signature.parameters.values())[is_class:]
-    if len(str(signature.replace(parameters=parameters))) > MAX_SIGNATURE_LENGTH:
-        value.__signature__ = inspect.Signature(
-            [
-                p.replace(annotation=p.empty, default=_OmittedDefault() if _is_long(p.default, p.empty) else p.default)
-                for p in parameters
-            ]
-        )
+    if inspect.isclass(value):
+        methods = [method for name, method in vars(value).items() if name == "__init__" or not name.startswith("_")]
+        for method in filter(inspect.isfunction, methods):
+            _shorten(method, inspect.signature(method))
+        if "__init__" in vars(value):
+            signature = inspect.signature(value.__init__)
+            _shorten(value, signature.replace(parameters=[*signature.parameters.values()][1:]))
+    elif inspect.isfunction(value):
+        _shorten(value, inspect.signature(value))
     return value
+
+
+def _shorten(value: Any, signature: "Signature") -> None:
+    """Set the signature that help prints of a function or class, if its own is too long."""
+    if len(str(signature)) > MAX_SIGNATURE_LENGTH:
+        parameters = [
+            p.replace(annotation=p.empty, default=_OmittedDefault() if _is_long(p.default, p.empty) else p.default)
+            for p in signature.parameters.values()
+        ]
+        value.__signature__ = signature.replace(parameters=parameters, return_annotation=signature.empty)
 
 
 def _is_long(default: Any, empty: Any) -> bool:
