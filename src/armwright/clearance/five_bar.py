@@ -70,9 +70,9 @@ class FiveBar:
         Raises:
             InvalidValueError: it is no five-bar; the text says why.
         """
-        parts = five_bar_links(linkage)
-        lengths = [link.length for link in parts.links]
-        return cls(motors=parts.motors, cranks=[lengths[0], lengths[3]], rods=lengths[1:3])
+        motors, links = five_bar_links(linkage)
+        lengths = [link.length for link in links]
+        return cls(motors=motors, cranks=[lengths[0], lengths[3]], rods=lengths[1:3])
 
     @property
     def half_width(self) -> float:

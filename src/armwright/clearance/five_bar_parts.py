@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, of_shape
@@ -37,8 +36,7 @@ class Link(NamedTuple):
         return math.atan2(*(self.end - self.start)[::-1])
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class FiveBarLinks:
+class FiveBarLinks(NamedTuple):
     """The links of a five-bar.
 
     Attributes:
@@ -66,19 +64,17 @@ def five_bar_links(linkage: Linkage) -> FiveBarLinks:
     if motors[0][0] > motors[1][0]:
         loop, motors = loop[::-1], motors[::-1]
     _check_motors(linkage, (loop[1].body, loop[8].body))
-    joined = loop[4:6]
-    if not any(
-        linkage.tip.body == end.body and np.array_equal(linkage.point(linkage.tip), linkage.point(end))
-        for end in joined
-    ):
-        raise _not_five_bar_error(linkage, f"its tip is {linkage.tip}, not {joined[0]}, where the rods are joined")
+    tip, joined = linkage.tip, loop[4:6]
+    at_tip = (end for end in joined if np.array_equal(linkage.point(tip), linkage.point(end)))
+    if tip.body not in {end.body for end in at_tip}:
+        raise _not_five_bar_error(linkage, f"its tip is {tip}, not {joined[0]}, where the rods are joined")
     # Each link starts at the pin nearer to its motor, so that those of the right arm run against the loop.
     ends = ((loop[1], loop[2]), (loop[3], loop[4]), (loop[6], loop[5]), (loop[8], loop[7]))
     links = tuple(Link(start.body, linkage.point(start), linkage.point(end)) for start, end in ends)
     for link in links:
         if link.length == 0:
             raise _not_five_bar_error(linkage, f"both pins of body {link.body} are at one point")
-    return FiveBarLinks(motors=np.stack(motors), links=links)
+    return FiveBarLinks(np.stack(motors), links)
 
 
 def five_bar_coordinates(linkage: Linkage, angles: ArrayLike) -> Array:
@@ -143,9 +139,8 @@ def _check_motors(linkage: Linkage, cranks: tuple[str, str]) -> None:
     driven = [drive.body for drive in linkage.drives]
     if set(driven) != set(cranks):
         names = ", ".join(driven) or "nothing"
-        raise _not_five_bar_error(
-            linkage, f"its drives move {names}, not {cranks[0]} and {cranks[1]}, which are on the ground"
-        )
+        why = f"its drives move {names}, not {cranks[0]} and {cranks[1]}, which are on the ground"
+        raise _not_five_bar_error(linkage, why)
     for body in cranks:
         joint = linkage.joint(body)
         if joint is None or joint.on.body != GROUND:

@@ -139,21 +139,17 @@ def close_pins_along(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bo
     Raises:
         InvalidValueError: the path leaves what can be reached, or passes a singular configuration.
     """
-
-    def closed_at(start: Array, goal: Array) -> Array:
-        return close_pins(linkage, start, tip=goal) if by_tip else close_pins(linkage, start, drives=goal)
-
     picks = np.unique(np.linspace(0, len(goals) - 1, min(_COARSE, len(goals))).astype(int))
-    coarse = [closed_at(guess, goals[0])]
+    coarse = [_close(linkage, guess, goals[0], by_tip=by_tip)]
     for pick in picks[1:]:
         # The last step is extrapolated, then corrected.
         ahead = 2 * coarse[-1] - coarse[-2] if len(coarse) > 1 else coarse[-1]
-        coarse.append(closed_at(ahead, goals[pick]))
+        coarse.append(_close(linkage, ahead, goals[pick], by_tip=by_tip))
     known = np.array(coarse)
     if len(picks) == 1:
         return known
     between = [np.interp(np.arange(len(goals)), picks, known[:, i]) for i in range(known.shape[1])]
-    q = closed_at(np.stack(between, axis=-1), goals)
+    q = _close(linkage, np.stack(between, axis=-1), goals, by_tip=by_tip)
     jumps = np.abs(np.diff(q, axis=0)).max(axis=-1)
     # Between neighbouring times a body moves about as far as on average; to another assembly it jumps.
     if jumps.max() > _JUMP + 50 * jumps.mean():
@@ -162,6 +158,11 @@ def close_pins_along(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bo
             f"{len(goals)}, at which the linkage changes to another assembly"
         )
     return q
+
+
+def _close(linkage: Linkage, guess: Array, goal: Array, *, by_tip: bool) -> Array:
+    """Return closed coordinates for positions of the tip, or of the drives; see ``close_pins``."""
+    return close_pins(linkage, guess, **{"tip" if by_tip else "drives": goal})
 
 
 def _split_at_jumps(
@@ -185,8 +186,8 @@ def _split_at_jumps(
         moment = path.evaluate(times, np.broadcast_to(piece[:, None], times.shape))
         by_tip = path.follower == "tip"
         near = np.broadcast_to(q[number[parts], None], (*times.shape, q.shape[1]))
-        there = close_pins(linkage, near, **{"tip" if by_tip else "drives": moment.position})
-        ideal = ideal_motion(linkage, there, moment.velocity, moment.acceleration, by_tip=by_tip)
+        closed = _close(linkage, near, moment.position, by_tip=by_tip)
+        ideal = ideal_motion(linkage, closed, moment.velocity, moment.acceleration, by_tip=by_tip)
         rows[parts] = _drive_commands(linkage, settings, ideal)
     return rows, lengths, marks
 

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 from scipy.optimize import least_squares, minimize
 
@@ -87,8 +86,7 @@ class ParameterRow(NamedTuple):
     standard_error: float | None
 
 
-@attrs.frozen(kw_only=True, eq=False)
-class BoardMeasurement:
+class BoardMeasurement(NamedTuple):
     """Measurements of the points of a board.
 
     Attributes:
@@ -129,7 +127,7 @@ def measure_board(attitude: str, *, noise: float = NOISE, seed: int = 0) -> Boar
     rng = np.random.default_rng([seed, list(ATTITUDES).index(attitude)])
     points = board(attitude)
     q = configurations(truth(), points)
-    return BoardMeasurement(q=q, points=points + noise * rng.standard_normal(points.shape))
+    return BoardMeasurement(q, points + noise * rng.standard_normal(points.shape))
 
 
 def configurations(errors: Array, points: Array) -> Array:
@@ -174,8 +172,7 @@ def thesis_fit(data: BoardMeasurement) -> Array:
 @cache
 def full_fit(attitudes: tuple[str, ...]) -> Calibration:
     """Return a calibration of all errors that are identifiable by boards in these orientations."""
-    data = [measure_board(attitude) for attitude in attitudes]
-    q, points = (np.concatenate([getattr(board_data, key) for board_data in data]) for key in ("q", "points"))
+    q, points = map(np.concatenate, zip(*map(measure_board, attitudes), strict=True))
     return calibrate_points(chain().arm, q, points, base=np.eye(4))
 
 

@@ -17,7 +17,7 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.pose import pose_repeatability
-from armwright.arrays import Array
+from armwright.arrays import Array, ArrayLike
 from armwright.clearance.correction import Correction, correct_nodes, tip_errors
 from armwright.clearance.equations import FrictionModel
 from armwright.clearance.estimation.kriging import Surrogate, check_extra, fit_surrogate, solve_features
@@ -251,16 +251,20 @@ def run_of(name: str, path: str, settings: Settings = SETTINGS) -> Simulation:
     return simulate(prepare_scenario(arm(), named_path(path), settings), ARMS[name])
 
 
-def target_errors(path: Path, clearances: tuple[float, ...] | Array) -> tuple[float, ...]:
+def target_errors(path: Path, clearances: ArrayLike) -> tuple[float, ...]:
     """Return the distances of the tip from the three targets on a commanded path [mm]."""
-    run = simulate(_ready(path), clearances)
-    goals = np.array(PickAndPlace().nodes)
-    return tuple(float(distance) * 1e3 for distance in np.linalg.norm(tip_errors(run, goals), axis=-1))
+    errors = tip_errors(simulated(path, clearances), PickAndPlace().nodes)
+    return tuple(float(distance) * 1e3 for distance in np.linalg.norm(errors, axis=-1))
+
+
+def simulated(path: Path, clearances: ArrayLike) -> Simulation:
+    """Return the run of the arm with some clearances on a path [m]."""
+    return simulate(_scenario(path), clearances)
 
 
 @lru_cache(maxsize=8)
-def _ready(path: Path) -> Scenario:
-    """Return the scenario of a path, which several arms share."""
+def _scenario(path: Path) -> Scenario:
+    """Return the scenario of a path, which several arms share: it takes ten times as long as a run."""
     return prepare_scenario(arm(), path, SETTINGS)
 
 

@@ -11,9 +11,9 @@ from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.correction import Correction
 from armwright.clearance.features import WINDOW, spectrum
 from armwright.clearance.ideal import tip_position
-from armwright.clearance.paths import Path, PickAndPlace, named_path
-from armwright.clearance.scenario import Scenario, prepare_scenario
-from armwright.clearance.simulation import Simulation, simulate
+from armwright.clearance.paths import PickAndPlace, named_path
+from armwright.clearance.scenario import Scenario
+from armwright.clearance.simulation import Simulation
 from armwright.report.clearance_figures import paths, spectrum_figure, surface
 from armwright.report.clearance_run_figures import clearance_run_figures
 from armwright.report.figures import curves
@@ -95,7 +95,7 @@ def _corrected(correction: Correction) -> dict[str, str | bytes]:
     """Draw figures 5.10 to 5.13: the path as it is and corrected, what arm A makes of it, drives, speeds."""
     both = {"path as it is": PickAndPlace().path(), "path corrected": correction.path}
     targets = np.array(PickAndPlace().nodes) * 1e3
-    runs = {name: _simulated(path, study.ARMS["A"]) for name, path in both.items()}
+    runs = {name: study.simulated(path, study.ARMS["A"]) for name, path in both.items()}
     wanted = tip_position(study.arm(), runs["path as it is"].scenario.ideal.q) * 1e3
     told = {name: tip_position(study.arm(), run.scenario.ideal.q) * 1e3 for name, run in runs.items()}
     commanded = {name: {"wanted": wanted, "told": told[name]} for name in both}
@@ -120,11 +120,7 @@ def _corrected(correction: Correction) -> dict[str, str | bytes]:
 
 
 def _half(name: str) -> Simulation:
-    return _simulated(named_path(name), (0.5e-3,) * 3)
-
-
-def _simulated(path: Path, clearances: tuple[float, ...]) -> Simulation:
-    return simulate(prepare_scenario(study.arm(), path, study.SETTINGS), clearances)
+    return study.simulated(named_path(name), (0.5e-3,) * 3)
 
 
 def _fit(run: Simulation) -> tuple[Array, Array]:
