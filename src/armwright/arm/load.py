@@ -15,6 +15,7 @@ from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
+from armwright.files.inputs import file_path
 from armwright.files.limits import limit, limit_message
 
 _CATALOGUE = Path(__file__).parent / "catalogue"
@@ -64,7 +65,7 @@ def read_arm(path: Path | str) -> Arm:
     Raises:
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
     """
-    path = Path(path)
+    path = file_path(path)
     top = Document.read(path).root
     convention = top.choice("convention", ("standard", "modified"), default="standard")
     tables = top.tables("joint", "joints")

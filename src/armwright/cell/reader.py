@@ -18,7 +18,7 @@ from armwright.cell.names import arm_name
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
-from armwright.files.inputs import regular_file
+from armwright.files.inputs import file_path, regular_file
 from armwright.files.limits import limit, limit_message
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.kinematics.inverse_kinematics.solve import inverse
@@ -60,7 +60,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     Raises:
         FileFormatError: the file is missing or invalid; the message has file, line and key.
     """
-    path = Path(path)
+    path = file_path(path)
     top = Document.read(path).root
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
@@ -119,9 +119,7 @@ def _read_arms(table: Table, folder: Path) -> dict[str, CellArm]:
             raise table.error(key, "expected the name of an arm, such as ARM_1")
         name = arm_name(match[1])
         if name in arms:
-            raise table.error(
-                key, f"{name} occurs twice; case, - and _, and leading zeros are ignored"
-            )
+            raise table.error(key, f"{name} occurs twice; case, - and _, and leading zeros are ignored")
         arms[name] = _read_arm(table.table(key), folder)
         for other in arms:
             distance = float(np.linalg.norm(arms[name].base[:3, 3] - arms[other].base[:3, 3]))

@@ -22,6 +22,7 @@ from armwright.clearance.linkage import (
 )
 from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.files.document import Document, Table
+from armwright.files.inputs import file_path
 
 _Part = TypeVar("_Part")
 _CATALOGUE = Path(__file__).parent / "catalogue"
@@ -47,7 +48,7 @@ def load_linkage(source: str | Path) -> Linkage:
         if text not in linkage_names():
             raise UnknownNameError("linkage", text, linkage_names())
         return read_linkage(_CATALOGUE / f"{text}.toml")
-    return read_linkage(Path(source))
+    return read_linkage(file_path(source))
 
 
 def read_linkage(path: Path) -> Linkage:

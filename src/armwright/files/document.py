@@ -13,7 +13,7 @@ import numpy as np
 
 from armwright.arrays import LARGEST, Array
 from armwright.errors import FileFormatError, closest, shown
-from armwright.files.inputs import read_text
+from armwright.files.inputs import file_path, read_text
 from armwright.files.key_lines import DuplicateKeyError, Keys, LineTree, json_lines, longest_dotted_key, toml_lines
 from armwright.files.limits import limit, limit_message
 
@@ -42,7 +42,7 @@ class Document:
         Raises:
             FileFormatError: it is missing, a folder, not UTF-8, has a slip of syntax, or is beyond a limit.
         """
-        path = Path(path)
+        path = file_path(path)
         text = read_text(path)
         is_json = path.suffix.lower() == ".json" or (path.suffix.lower() != ".toml" and text.lstrip().startswith("{"))
         data = _parse(path, text, is_json=is_json)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from armwright.errors import FileFormatError, closest
+from armwright.errors import FileFormatError, KindError, closest, shown
 from armwright.files.limits import MEGABYTE, limit, limit_message
 
 _PIECE_BYTES = 1 << 20
@@ -23,6 +23,17 @@ _MAX_NAMES = 1000
 _HASHES_OF_READ_FILES: dict[Path, str] = {}
 # The files that this process has read, by where they were then.
 _SOURCES: dict[Path, None] = {}
+
+
+def file_path(value: Path | str) -> Path:
+    """Return the path of a file.
+
+    Raises:
+        KindError: it is none, such as a number or the text of the file as bytes.
+    """
+    if not isinstance(value, str | Path):
+        raise KindError(f"expected the path of a file, got {shown(value)}")
+    return Path(value)
 
 
 def regular_file(path: Path) -> Path:
@@ -53,7 +64,7 @@ def read_pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
     Raises:
         FileFormatError: it is missing (the nearest name in its folder is told), a folder, or larger than the limit.
     """
-    path, most, got = Path(path), limit(bound) * MEGABYTE, 0
+    path, most, got = file_path(path), limit(bound) * MEGABYTE, 0
     try:
         # Who refuses a row stops asking for pieces; a bare handle is closed with this generator, and never before it.
         # A file such as those of /proc may make its reader wait for ever though it is a regular one; a pipe shall wait.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from armwright.arrays import LARGEST
 from armwright.errors import FileFormatError, shown
-from armwright.files.inputs import read_lines
+from armwright.files.inputs import file_path, read_lines
 from armwright.files.limits import limit, limit_message
 
 # The first is the default for a line with none of them.
@@ -61,7 +61,7 @@ def read_rows(path: Path | str) -> CsvTable:
         FileFormatError: the file is missing, empty, has no rows or more columns than the limit; and while rows are
             asked for, that a row is no CSV or not as wide as the head, or that there are more than the limit.
     """
-    path = Path(path)
+    path = file_path(path)
     lines = enumerate(read_lines(path))
     skipped, text = next(((i, text) for i, text in lines if text.strip(_BLANKS_AND_SEPARATORS)), (0, ""))
     # Most columns win: the name of a column may have a sign in it that separates cells elsewhere.

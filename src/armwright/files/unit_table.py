@@ -19,6 +19,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, IncompleteRowsWarning, closest, counted, shortened, shown
 from armwright.files.column_names import WORD, Heading, Schema, normalised_name, resolve_headings
+from armwright.files.inputs import file_path
 from armwright.files.rows import CsvTable, NumberFormat, read_rows
 
 # Of the lines in which a column is empty a message names this many.
@@ -257,7 +258,7 @@ def read_headers(
     Raises:
         FileFormatError: as ``read_header``; a name of ``columns`` is in none of the files.
     """
-    files = [(Path(path), read_rows(path)) for path in paths]
+    files = [(file_path(path), read_rows(path)) for path in paths]
     first, head = files[0][0], files[0][1].head
 
     def error(name: str, message: str) -> FileFormatError:

@@ -18,6 +18,7 @@ from armwright.arm.urdf.chain import Chain, chain_of
 from armwright.arm.urdf.robot import limits_of, motor_of, read_robot
 from armwright.arrays import Array, number
 from armwright.errors import KindError, shown
+from armwright.files.inputs import file_path
 from armwright.spatial.poses import inverse
 
 # Axes that are this near to parallel were meant to be [rad]: a half turn typed as 3.1416 is 0.7e-5 rad off.
@@ -74,7 +75,7 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
         raise KindError(f"path: expected the path of a URDF file, got {shown(path)}")
     if isinstance(lock, str):
         raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
-    path = Path(path)
+    path = file_path(path)
     locked = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
     robot = read_robot(path, {name: number(q, f"lock, '{name}'") for name, q in locked.items()})
     chain = chain_of(robot, base, tip)
