@@ -1,5 +1,6 @@
 """What all tests share: chance that can be repeated, random samples, and one browser."""
 
+import gc
 import os
 import random
 import shutil
@@ -14,8 +15,11 @@ from hypothesis import settings
 
 from samples import WHOLE, Sample, drawn
 
+# Modules and fixtures that stay loaded are not gone through again and again, which takes a tenth of the time.
+gc.set_threshold(50_000, 20, 50)
+
 # No test depends on how fast a machine is.
-settings.register_profile("untimed", deadline=None, max_examples=100 if WHOLE else 40)
+settings.register_profile("untimed", deadline=None, max_examples=100 if WHOLE else 33)
 settings.load_profile("untimed")
 
 
