@@ -191,7 +191,7 @@ def _by_via(
     solver = solver_of(arm)
     if _exceeds_efforts_at_start(solver, q):
         return None
-    ways: list[Detour] = []
+    candidates: list[tuple[Trajectory, Array, tuple[CertifiedMotion, CertifiedMotion]]] = []
     for ring in chain(_rings(line, obstacle.fraction), _on_joint_moves(solver, q, line.poses[-1])):
         for via in ring:
             try:
@@ -201,17 +201,17 @@ def _by_via(
             # A leg on which gravity alone takes more than a joint may give is no detour either.
             except (PathError, IncapableArmError):
                 continue
-            motion = join([there.trajectory, back.trajectory])
-            sampled = np.asarray(solver.forward(motion(np.linspace(0.0, motion.duration, _PRICE_SAMPLES))))
-            distance, rotation = _largest_deviation(line, np.concatenate([sampled, via[None]]))
-            price = Price(distance=distance, rotation=rotation, time=motion.duration - line.duration)
-            legs = (there, back)
-            ways.append(Detour(trajectory=motion, method="via", obstacle=obstacle, via=via, price=price, legs=legs))
-        best = min(ways, key=lambda way: way.price.time, default=None)
+            candidates.append((join([there.trajectory, back.trajectory]), via, (there, back)))
         # Near the obstacle a detour may still be slow; farther off it is searched for only then.
-        if best is not None and best.price.time < _LONG * line.duration:
-            return best
-    return min(ways, key=lambda way: way.price.time, default=None)
+        if any(motion.duration - line.duration < _LONG * line.duration for motion, _, _ in candidates):
+            break
+    if not candidates:
+        return None
+    motion, via, legs = min(candidates, key=lambda candidate: candidate[0].duration - line.duration)
+    sampled = np.asarray(solver.forward(motion(np.linspace(0.0, motion.duration, _PRICE_SAMPLES))))
+    distance, rotation = _largest_deviation(line, np.concatenate([sampled, via[None]]))
+    price = Price(distance=distance, rotation=rotation, time=motion.duration - line.duration)
+    return Detour(trajectory=motion, method="via", obstacle=obstacle, via=via, price=price, legs=legs)
 
 
 def _exceeds_efforts_at_start(solver: Solver, q: Array) -> bool:
