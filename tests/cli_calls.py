@@ -123,3 +123,13 @@ def _text(stream: io.TextIOWrapper) -> str:
     written = stream.buffer
     assert isinstance(written, io.BytesIO)
     return written.getvalue().decode()
+
+
+def check_mistake(*arguments: str | Path, said: str, folder: Path) -> None:
+    """Check that a mistake gets one message that says what to do, no traceback, and leaves nothing in its folder."""
+    done = armwright(*arguments, cwd=folder)
+
+    assert done.returncode in (2, 3, 4)
+    assert said in " ".join(done.stderr.replace("│", " ").split())
+    assert "Traceback" not in done.stderr
+    assert not list(folder.iterdir())
