@@ -329,6 +329,10 @@ def _fit(
         errors[fitted] = np.frombuffer(fitted_errors)
         return model.residuals(measured, errors)
 
+    def weights_now() -> Array:
+        residuals = residuals_at(errors[fitted].tobytes())
+        return np.asarray(scales * robust_weights(residuals, noise, reject_outliers=reject_outliers))
+
     def cost_residuals(x: Array) -> Array:
         return np.concatenate([residuals_at(x.tobytes()).values * weights, prior @ x])
 
@@ -337,15 +341,11 @@ def _fit(
 
     for _ in range(_REWEIGHTINGS):
         if robust:
-            weights = scales * robust_weights(
-                residuals_at(errors[fitted].tobytes()), noise, reject_outliers=reject_outliers
-            )
+            weights = weights_now()
         errors[fitted] = least_squares(cost_residuals, errors[fitted].copy(), cost_jacobian, **_SOLVER_OPTIONS).x
         if not robust:
             break
-        reweighted = scales * robust_weights(
-            residuals_at(errors[fitted].tobytes()), noise, reject_outliers=reject_outliers
-        )
+        reweighted = weights_now()
         if np.all(np.abs(reweighted - weights) <= _WEIGHT_TOLERANCE * scales):
             break
     return errors
