@@ -17,6 +17,7 @@ from samples import WHOLE, Sample, drawn
 
 # Modules and fixtures that stay loaded are not gone through again and again, which takes a tenth of the time.
 gc.set_threshold(50_000, 20, 50)
+gc.disable()  # while tests are collected; see pytest_collection_finish
 
 # No test depends on how fast a machine is.
 settings.register_profile("untimed", deadline=None, max_examples=100 if WHOLE else 33)
@@ -60,6 +61,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was loaded until here out of all collections of garbage."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(wrapper=True)

@@ -50,10 +50,10 @@ def linkage() -> Linkage:
 
 @cache
 def y1(clearance: float = 0.5e-3, friction: float = 0.05) -> Simulation:
-    return simulate(prepare_scenario(linkage(), named_path("y1"), CENTRE), np.full(3, clearance), frictions=friction)
+    return simulate(prepare_scenario(linkage(), named_path("y1"), COARSE), np.full(3, clearance), frictions=friction)
 
 
-def distances_from_goals(path: Path, clearances: Array, settings: Settings = CENTRE) -> Array:
+def distances_from_goals(path: Path, clearances: Array, settings: Settings = COARSE) -> Array:
     """How far the tip is from the three targets [m]."""
     run = simulate(prepare_scenario(linkage(), path, settings), clearances)
     return np.asarray(np.linalg.norm(tip_errors(run, PickAndPlace().nodes), axis=-1))
@@ -62,7 +62,7 @@ def distances_from_goals(path: Path, clearances: Array, settings: Settings = CEN
 def test_known_clearances() -> None:
     """With known clearances two rounds bring the mean error at the targets from 0.56 mm below a micrometre."""
     reported: list[float] = []
-    correction = correct_nodes(linkage(), PickAndPlace(), ARM_A, CENTRE, rounds=2, progress=reported.append)
+    correction = correct_nodes(linkage(), PickAndPlace(), ARM_A, COARSE, rounds=2, progress=reported.append)
 
     assert correction.before.mean() == pytest.approx(0.5593e-3, rel=0.01)
     assert correction.after.mean() < KNOWN
@@ -74,7 +74,7 @@ def test_known_clearances() -> None:
 
 def test_estimated_clearances() -> None:
     """With the clearances that the thesis estimated arm A comes to 0.005 mm from its targets (thesis: 0.031 mm)."""
-    correction = correct_nodes(linkage(), PickAndPlace(), THESIS_ESTIMATE, CENTRE, rounds=2)
+    correction = correct_nodes(linkage(), PickAndPlace(), THESIS_ESTIMATE, COARSE, rounds=2)
 
     errors = distances_from_goals(correction.path, ARM_A)
     assert errors.mean() < ESTIMATED
@@ -268,7 +268,7 @@ def test_too_much_play() -> None:
 
 def test_diverging() -> None:
     """A linkage whose simulation diverges has no path that puts it right."""
-    run = simulate(prepare_scenario(linkage(), named_path("y1"), CENTRE), ARM_A, frictions=1e4)
+    run = simulate(prepare_scenario(linkage(), named_path("y1"), COARSE), ARM_A, frictions=1e4)
     with pytest.raises(InvalidValueError, match="the simulation diverged; the path cannot be corrected"):
         tip_errors(run, named_path("y1").evaluate([0.25]).position)
 

@@ -41,7 +41,7 @@ def test_claim_holds_against_other_runs(five_bar: Linkage, sample: Sample) -> No
 
 def test_bits_beside_others(five_bar: Linkage) -> None:
     """The run keeps its bits whatever runs beside it, in whatever number of threads, and the claim does too."""
-    task, c = prepare_scenario(five_bar, thesis_path("x4"), Settings()), np.array((3e-4, 4.8e-4, 1.6e-4))
+    task, c = prepare_scenario(five_bar, thesis_path("x4"), Settings(step=2e-5)), np.array((3e-4, 4.8e-4, 1.6e-4))
 
     alone = simulate(task, c)
     runs = [simulate_with_predictability(task, c, threads=threads) for threads in (1, 2)]

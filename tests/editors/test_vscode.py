@@ -130,6 +130,7 @@ def test_sensors() -> None:
         assert dict(Engine(GRAMMAR).pieces(sensor))[sensor] == "variable.other.rlo"
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
 def test_as_pygments(path: Path) -> None:
     """Every character of every program has the same colour in the grammar and in Pygments."""

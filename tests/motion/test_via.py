@@ -107,7 +107,7 @@ def faults(arm: Arm, stage: PlannedStage, X: Array) -> list[str]:
     return found
 
 
-@pytest.mark.share(0.03)
+@pytest.mark.share(0.02)
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5", "seven joints"])
 @pytest.mark.drawn(0.34)
 def test_random_paths_are_smooth_and_never_slower(name: str, sample: Sample) -> None:

@@ -84,6 +84,7 @@ def without(text: str, line: int) -> str | None:
     return "\n".join(lines)
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("seed", range(SEEDS))
 def test_certain_errors_are_errors_of_runs(seed: int) -> None:
     """A run that comes to a statement of which an error was said fails there; arms that were named do the work."""

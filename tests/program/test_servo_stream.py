@@ -150,7 +150,7 @@ def cells(folder: Path) -> tuple[Cell, list[Cell]]:
     return two, ones
 
 
-@pytest.mark.share(0.05)
+@pytest.mark.share(0.035)
 def test_random_programs_by_differences(sample: Sample, tmp_path: Path) -> None:
     """Guards, contact, corners, errors, two arms: no limit is passed from tick to tick, and all arms come to rest."""
     two, ones = cells(tmp_path)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -233,11 +234,17 @@ def bench() -> RunPage:
     return bench_run()
 
 
+@lru_cache(maxsize=4)
+def page_text(data: RunPage) -> str:
+    """Return the page of a run, made once for the tests that open the same."""
+    return run_page(data)
+
+
 class Visit:
     """An opened page, and everything it complained about or asked the network for."""
 
     def __init__(self, page: Any, file: Path, data: RunPage) -> None:
-        file.write_text(run_page(data), encoding="utf-8")
+        file.write_text(page_text(data), encoding="utf-8")
         self.complaints: list[str] = []
         self.requests: list[str] = []
         self.page = page

@@ -29,6 +29,7 @@ class Complaining(Fall):
         return {**super().__call__(points), "failure": reasons}
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("chunk", [1, 200, 1_000_000])
 @pytest.mark.parametrize("block", [1, 3, 50])
 @pytest.mark.parametrize("length", [1, 2, 3, 4, 5])

@@ -277,15 +277,18 @@ from armwright.sweep.designs import full_factorial
 from armwright.sweep.runner import run
 from sweep_tasks import Fall
 
-def peak(runs):
-    tracemalloc.start()
+def sweep(runs):
     design = full_factorial({"speed": np.arange(runs)})
     run(Fall(samples=1000), design, Path(sys.argv[1]) / str(runs), block=20, workers=1).close()
+
+def peak(runs):
+    tracemalloc.start()
+    sweep(runs)
     used = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return used
 
-peak(60)  # libraries are loaded
+sweep(60)  # libraries are loaded
 print(peak(200), peak(1000))
 """
 
