@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 CONSTRAINTS ?= constraints.txt
 export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(abspath $(CONSTRAINTS)))
 
-.PHONY: help demo test proof bench edges examples docs gallery studies pictures messages editor fuzz versions sbom clean
+.PHONY: help demo test proof bench edges examples docs site gallery studies pictures messages editor fuzz versions sbom clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
@@ -75,7 +75,9 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright calibrate puma560-seed examples/puma_points.csv --beyond -o out/calibrated
 	$(BIN)/armwright study dh-calibration -o out/dh
 
-docs: gallery     ## Build the site of the documentation into site/ (the first time 4 minutes)
+docs: gallery site  ## Build the site of the documentation into site/, its gallery made anew (the first time 4 minutes)
+
+site: $(VENV)/docs  ## Build the site from the pages and pictures that are there
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "open site/index.html"
 

@@ -73,12 +73,19 @@ def public_page() -> str:
         for name in getattr(namespace, "__all__", []):
             thing = getattr(namespace, name)
             if not name.startswith("_") and not ismodule(thing):
-                what = (thing.__doc__ or "").strip().partition("\n")[0].replace("|", "\\|")
-                lines.append(f"| [`{name}`][{thing.__module__}.{thing.__qualname__}] | {what} |")
+                lines.append(_public_row(name, thing))
     for module in house():
         if (PACKAGE / f"{module}.py").exists():
             lines += [f"\n## {module}\n", f"::: armwright.{module}\n"]
     return "\n".join(lines)
+
+
+def _public_row(name: str, thing: Any) -> str:
+    """Return the row of a function or class with its first line, or of a constant with its value."""
+    if not hasattr(thing, "__qualname__"):
+        return f"| `{name}` | `{thing!r}` |"
+    what = (thing.__doc__ or "").strip().partition("\n")[0].replace("|", "\\|")
+    return f"| [`{name}`][{thing.__module__}.{thing.__qualname__}] | {what} |"
 
 
 def api_pages() -> dict[str, str]:
