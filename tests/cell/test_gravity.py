@@ -36,6 +36,7 @@ from armwright.program.vm.interpreter import interpret, motion_warnings as warni
 from armwright.program.vm.recording import Recording
 from armwright.simulation.simulator import simulate
 from armwright.spatial.poses import homogeneous
+from armwright.tracing.emit_llvm import Target
 from oracles.with_pinocchio import pinocchio_model, with_load, with_rotors
 from samples import Sample
 
@@ -206,9 +207,10 @@ def test_kernels_by_direction() -> None:
     arm = load_arm("puma560")
     turned = homogeneous(Rotation.from_euler("z", 33, degrees=True).as_matrix(), (1.0, 0.0, 0.0))
     stands, turns, hangs = (cell_of(arm, base).arms["ARM_1"].arm for base in (np.eye(4), turned, HANGING))
+    target = Target(lanes=8, has_fma=True)
     weigh = {"inverse_dynamics", "inverse_dynamics_with_wrench", "forward_dynamics", "mass_and_bias"}
     for name in ("forward", "jacobian", "mass_matrix", *sorted(weigh)):
-        sources = [emit_quantity(arm, name).single for arm in (arm, stands, turns, hangs)]
+        sources = [emit_quantity(arm, name).single_ir(target) for arm in (arm, stands, turns, hangs)]
         assert sources[0] == sources[1] == sources[2]
         assert (sources[0] != sources[3]) == (name in weigh)
 

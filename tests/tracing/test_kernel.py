@@ -16,8 +16,8 @@ from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.inverse_kinematics.geometry import solve_elbow, solve_joint_1
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import BRANCHES
-from armwright.tracing.emit import LANES, emit
-from armwright.tracing.kernel import CalledOff, Kernel, on_cores_for_long
+from armwright.tracing.emit import emit
+from armwright.tracing.kernel import LANES, CalledOff, Kernel, on_cores_for_long
 from armwright.tracing.scalar import Scalar, atan2, cos, sin
 from oracles.arms import random_arm, random_configurations
 
@@ -196,6 +196,6 @@ def test_plain_arrays_need_no_checks(shape: tuple[int, ...], monkeypatch: pytest
     """Once compiled, a function goes from plain arrays straight to its kernel, for one configuration and for many."""
     square = Kernel(emitted=emit("square", lambda x: [[x[0] * x[0]]], {"x": 1})).function("square")
     square(np.ones(shape))
-    monkeypatch.setitem(square.__globals__, "careful", None)
+    monkeypatch.setattr(Kernel, "_careful", None)
 
     np.testing.assert_array_equal(square(np.full(shape, 3.0)), np.full(shape, 9.0))

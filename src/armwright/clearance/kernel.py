@@ -5,20 +5,23 @@ A run keeps its bits whatever runs beside it: no lane reads another.
 
 from __future__ import annotations
 
+import ast
+import hashlib
+import inspect
 import json
-import textwrap
-from collections.abc import Sequence
-from inspect import isfunction
+from collections.abc import Callable, Sequence
 from itertools import islice
 from types import ModuleType
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import attrs
 
 from armwright.clearance import event_location, simulation_loop
 from armwright.clearance.equations import WORKS, Contact, ContactMemory, FrictionModel, State, rates
+from armwright.clearance.lane_layout import LANES
 from armwright.clearance.linkage import Linkage, Material
-from armwright.tracing.emit import LANES, function_source, head, kernel_body
+from armwright.tracing.emit import emit_lanes
+from armwright.tracing.native import processor
 from armwright.tracing.scalar import Scalar
 
 Integrator: TypeAlias = Literal["rk4", "semi-implicit"]
@@ -135,30 +138,72 @@ class Layout:
         return [*state.qd, *linkage_rates.qdd, *bristles, *linkage_rates.powers, *impacts, *depths]
 
 
-def emit_simulation(layout: Layout, integrator: Integrator) -> str:
-    """Write the source of a simulation: its sizes, its equations, and the functions of the loop as they stand."""
+class SimulationCode(NamedTuple):
+    """The code of a simulation.
+
+    Attributes:
+        source: of ``simulate``, Python for Numba.
+        equations: LLVM IR of ``lanes``, the equations of the linkage.
+        symbol: the name under which the source finds them.
+    """
+
+    source: str
+    equations: str
+    symbol: str
+
+
+_HEAD = """import numpy as np
+from numba import float64, int64, njit, types
+
+lanes = types.ExternalFunction("{symbol}", types.void(types.uintp, types.uintp))
+"""
+_RATES = """@njit(error_model="numpy")
+def rates(x, y):
+    lanes(x.ctypes.data, y.ctypes.data)"""
+
+
+def emit_simulation(layout: Layout, integrator: Integrator) -> SimulationCode:
+    """Write the code of a simulation: its sizes, its equations, and the functions of the loop as they stand."""
     sizes = _layout_sizes(layout, integrator)
-    body = kernel_body(layout.rates, sizes["INPUTS"])
+    equations = emit_lanes(layout.rates, sizes["INPUTS"], LANES, processor().target)
+    symbol = f"armwright_{hashlib.sha256(equations.ir.encode()).hexdigest()}"
     events = _function_sources(event_location, _COMPILED) if layout.located else []
-    equations = textwrap.indent(body.lines, " " * 8)
-    return "\n\n".join(
+    source = "\n\n".join(
         [
-            head(body.operations),
-            "\n".join(f"{name} = {value!r}" for name, value in {**sizes, "OUTPUTS": body.outputs}.items()),
-            f"{_COMPILED if layout.located else _INLINED}\ndef rates(x, y):\n    for k in range({LANES}):\n{equations}",
+            _HEAD.format(symbol=symbol),
+            "\n".join(f"{name} = {value!r}" for name, value in {**sizes, "OUTPUTS": equations.outputs}.items()),
+            _RATES,
             *events,
             *_function_sources(simulation_loop, _INLINED),
             _SIGNATURE.format(matrix='types.Array(float64, 2, "C", readonly=True)'),
-            function_source(simulation_loop.simulate),
+            _function_source(simulation_loop.simulate),
             "",
         ]
     )
+    return SimulationCode(source, equations.ir, symbol)
 
 
 def _function_sources(module: ModuleType, decorator: str) -> list[str]:
     """Return the sources of the functions of a module in their order, but for the loop, which calls them."""
-    functions = (x for x in vars(module).values() if isfunction(x) and x.__module__ == module.__name__)
-    return [function_source(x, decorator) for x in functions if x is not simulation_loop.simulate]
+    functions = (x for x in vars(module).values() if inspect.isfunction(x) and x.__module__ == module.__name__)
+    return [_function_source(x, decorator) for x in functions if x is not simulation_loop.simulate]
+
+
+def _function_source(function: Callable[..., object], decorator: str = "") -> str:
+    """Return the text of a function for an emitted source: its statements alone, whatever else they are read with.
+
+    Args:
+        function: one whose names all stand in the emitted source.
+        decorator: a line to put above it.
+    """
+    (definition,) = ast.parse(inspect.getsource(function)).body
+    assert isinstance(definition, ast.FunctionDef)  # noqa: S101 - what is emitted is ours
+    if ast.get_docstring(definition) is not None:
+        del definition.body[0]
+    definition.returns = None
+    for argument in definition.args.args:
+        argument.annotation = None
+    return f"{decorator}\n{ast.unparse(definition)}".lstrip("\n")
 
 
 def _layout_sizes(layout: Layout, integrator: Integrator) -> dict[str, int]:

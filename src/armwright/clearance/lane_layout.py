@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.clearance.equations import WORKS, Contact
-from armwright.tracing.emit import LANES as LANES  # noqa: PLC0414 - part of the layout
 
+# Runs side by side: two to eight vectors.
+LANES = 16
 # Numbers of pins, runs, impacts and samples.
 Integers: TypeAlias = npt.NDArray[np.int64]
 # Numbers of the state: coordinates, their velocities, bristle deflections, works. Coordinates alone; pins.

@@ -26,6 +26,7 @@ from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError
 from armwright.tracing.cache import compiled
 from armwright.tracing.kernel import on_cores_for_long
+from armwright.tracing.native import function_address
 
 # A tip farther from its path than this has diverged [m].
 _DIVERGED = 1.0
@@ -182,7 +183,11 @@ def _run_lanes(scenario: Scenario, layout: Layout, start: Array, contacts: Array
 
 @cache
 def _compiled_kernel(layout: Layout, integrator: Integrator) -> Any:
-    return compiled(emit_simulation(layout, integrator), "simulate", f"the simulation of {layout.linkage.name}")
+    from armwright.tracing.from_numba import announce  # noqa: PLC0415 - Numba takes half a second
+
+    code, title = emit_simulation(layout, integrator), f"the simulation of {layout.linkage.name}"
+    announce(code.symbol, function_address(code.equations, "lanes"))
+    return compiled(code.source, "simulate", title)
 
 
 def _unpack_record(scenario: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:

@@ -31,10 +31,12 @@ def kernel(
     """
     from armwright.arm.load import load_arm
     from armwright.compiled.quantities import emit_quantity
+    from armwright.tracing.native import processor
 
     emitted = emit_quantity(load_arm(arm), quantity)
     total = sum(emitted.operations.values())
-    source = emitted.single if single else emitted.rows
+    target = processor().target
+    source = emitted.single_ir(target) if single else emitted.rows_ir(target)
     if as_json:
         counts = {"operations": emitted.operations, "total": total, "joined": emitted.joined}
         print_json({**counts, "source": source})

@@ -5,7 +5,6 @@
 
 from __future__ import annotations  # what help shows keeps the names of array types, which are long
 
-import inspect
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import wraps
@@ -72,7 +71,6 @@ class _KernelMethod:
         if compiled is None:
             return wraps(method)(lambda arm, *inputs, **options: getattr(arm, name)(*inputs, **options))
         function = compiled.kernel(name).function(name, str(method.__doc__))
-        function.__signature__ = inspect.signature(method.__get__(compiled))  # type: ignore[attr-defined]
         # Found there before this descriptor from now on.
         compiled.__dict__[name] = function
         return function

@@ -9,17 +9,14 @@ linear speeds never appear.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 from armwright.arm.model import Arm, Joint, Link
 from armwright.dynamics.arguments import NO_WRENCH, Scalars
-from armwright.dynamics.bodies import body_of
-from armwright.dynamics.newton_euler import base_frame_acceleration, tool_reaction
-from armwright.kinematics.forward_kinematics import link_transform
+from armwright.dynamics.joint_frames import JointStep, joint_body, joint_steps
+from armwright.dynamics.newton_euler import base_frame_acceleration, tool_wrench
 from armwright.tracing.scalar import Scalar, reciprocal
-from armwright.tracing.vectors import Matrix, Vector, add, apply, congruence, cross, dot, product, scale, transpose
-
-_Transform: TypeAlias = tuple[Matrix, Vector]
+from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, transpose
 
 
 class Articulated(NamedTuple):
@@ -56,7 +53,7 @@ class JointResponse(NamedTuple):
         pivot: their component along the joint, rotor included.
         effort: the effort that remains for acceleration.
         coriolis: velocity-product acceleration of the link at the joint; angular, of a slide linear.
-        centripetal: acceleration of the origin of the link's frame about the joint.
+        centripetal: acceleration of the joint point about that of the joint before, along the axes of that.
     """
 
     n: Vector
@@ -88,43 +85,44 @@ def articulated_body(
     Source:
         Featherstone (2008), section 7.3, with the accelerations of points as in Luh, Walker & Paul (1980).
     """
-    transforms = [link_transform(joint, position) for joint, position in zip(arm.joints, q, strict=True)]
-    velocities = _angular_velocities(arm, transforms, qd)
-    f, n = tool_reaction(arm, q, wrench)
+    steps = joint_steps(arm, q)
+    velocities = _angular_velocities(arm, steps, qd)
+    f, n = tool_wrench(arm, q, wrench)
     body = Articulated(J=_zeros(), H=_zeros(), M=_zeros(), n0=n, f0=f)
     responses: list[JointResponse] = []
     for i in reversed(range(arm.n)):
-        joint, (before, at_joint, behind) = arm.joints[i], velocities[i]
-        body = _combined(_link_inertia(arm.links[i], behind), body)
-        centripetal = cross(at_joint, cross(at_joint, transforms[i][1]))
-        body = _in_previous_frame(body, transforms[i], centripetal)
-        coriolis = scale(1.0 if joint.revolute else 2.0, [before[1] * qd[i], -before[0] * qd[i], 0.0])
+        joint, step, (before, w) = arm.joints[i], steps[i], velocities[i]
+        body = _combined(_link_inertia(joint, arm.links[i], w), body)
+        coriolis = scale(1.0 if joint.revolute else 2.0, [w[1] * qd[i], -(w[0] * qd[i]), 0.0])
+        centripetal = cross(before, cross(before, step.lever))
         response = _joint_response(body, joint, arm.motors[i].inertia, tau[i], (coriolis, centripetal))
-        body = _through_joint(body, joint, response)
+        body = _at_previous_joint(_through_joint(body, joint, response), step, centripetal)
         responses.append(response)
     responses.reverse()
-    return _outward(arm, transforms, responses), [response.pivot for response in responses]
+    return _outward(arm, steps, responses), [response.pivot for response in responses]
 
 
 def _zeros() -> Matrix:
     return [[0.0, 0.0, 0.0] for _ in range(3)]
 
 
-def _angular_velocities(arm: Arm, transforms: Sequence[_Transform], qd: Scalars) -> list[tuple[Vector, Vector, Vector]]:
-    """Return for each joint the angular velocity of frame i-1 and frame i in frame i-1, and of frame i in frame i."""
+def _angular_velocities(arm: Arm, steps: Sequence[JointStep], qd: Scalars) -> list[tuple[Vector, Vector]]:
+    """Return for each joint the angular velocity of the link before it, and of its own, along the axes of each."""
     w: Vector = [0.0, 0.0, 0.0]
     velocities = []
-    for joint, (R, _), speed in zip(arm.joints, transforms, qd, strict=True):
-        at_joint = [w[0], w[1], w[2] + speed] if joint.revolute else w
-        behind = apply(transpose(R), at_joint)
-        velocities.append((w, at_joint, behind))
-        w = behind
+    for joint, step, speed in zip(arm.joints, steps, qd, strict=True):
+        before, w = w, step.inward_axes(w)
+        if joint.revolute:
+            w = [w[0], w[1], w[2] + speed]
+        velocities.append((before, w))
     return velocities
 
 
-def _link_inertia(link: Link, w: Vector) -> Articulated:
-    """Return a rigid link with the angular velocity w, in its frame."""
-    mass, (x, y, z), tensor = body_of(link)
+def _link_inertia(joint: Joint, link: Link, w: Vector) -> Articulated:
+    """Return a rigid link with the angular velocity w, about its joint point."""
+    mass, (x, y, z), spread = joint_body(joint, link)
+    trace = spread[0][0] + spread[1][1] + spread[2][2]
+    tensor = [[(trace if i == j else 0.0) - spread[i][j] for j in range(3)] for i in range(3)]
     return Articulated(
         J=tensor,
         H=[[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]],
@@ -139,25 +137,33 @@ def _combined(a: Articulated, b: Articulated) -> Articulated:
     return Articulated(J=J, H=H, M=M, n0=add(a.n0, b.n0), f0=add(a.f0, b.f0))
 
 
-def _in_previous_frame(body: Articulated, transform: _Transform, centripetal: Vector) -> Articulated:
-    """Return a body of frame i in frame i-1, for accelerations of its point at the origin of frame i-1."""
-    R, p = transform
-    J, M = congruence(R, body.J), congruence(R, body.M)
-    H = product(product(R, body.H), transpose(R))
-    f0 = add(apply(R, body.f0), apply(M, centripetal))
-    n0 = add(apply(R, body.n0), apply(H, centripetal), cross(p, f0))
-    # H and J about the origin of frame i-1: H + [p] M and J - H [p] + [p] (H + [p] M)ᵀ, row by row.
+def _at_previous_joint(body: Articulated, step: JointStep, centripetal: Vector) -> Articulated:
+    """Return a body about a joint point about that of the joint before, along the axes of that."""
+    p = step.lever
+    J, H, M = (step.outward_matrix(matrix) for matrix in (body.J, body.H, body.M))
+    f0 = add(step.outward_axes(body.f0), apply(M, centripetal))
+    n0 = add(step.outward_axes(body.n0), apply(H, centripetal), cross(p, f0))
+    # H and J about the point before: H + [p] M and J - H [p] + [p] (H + [p] M)ᵀ, row by row.
     shifted = [add(row, lever) for row, lever in zip(H, transpose([cross(p, row) for row in M]), strict=True)]
     there, back = [cross(p, row) for row in H], [cross(p, row) for row in shifted]
-    upper = [[J[i][j] + there[i][j] + back[j][i] if j >= i else 0.0 for j in range(3)] for i in range(3)]
-    J = [[upper[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)]
-    return Articulated(J=J, H=shifted, M=M, n0=n0, f0=f0)
+    return Articulated(
+        J=_mirrored([[J[i][j] + there[i][j] + back[j][i] for j in range(3)] for i in range(3)]),
+        H=shifted,
+        M=_mirrored(M),
+        n0=n0,
+        f0=f0,
+    )
+
+
+def _mirrored(matrix: Matrix) -> Matrix:
+    """Return the symmetric matrix of an upper half."""
+    return [[matrix[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)]
 
 
 def _joint_response(
     body: Articulated, joint: Joint, rotor: float, tau: Scalar, biases: tuple[Vector, Vector]
 ) -> JointResponse:
-    """Return the response of a body in frame i-1 to joint i, which is the z axis."""
+    """Return the response of a body, about the joint point, to joint i, which is the z axis."""
     if joint.revolute:
         n, f, own, bias = [row[2] for row in body.J], body.H[2], body.J, body.n0[2]
     else:
@@ -183,11 +189,13 @@ def _through_joint(body: Articulated, joint: Joint, response: JointResponse) -> 
     )
 
 
-def _outward(arm: Arm, transforms: Sequence[_Transform], responses: Sequence[JointResponse]) -> list[Scalar]:
+def _outward(arm: Arm, steps: Sequence[JointStep], responses: Sequence[JointResponse]) -> list[Scalar]:
     w_dot: Vector = [0.0, 0.0, 0.0]
     v_dot = base_frame_acceleration(arm)
     accelerations: list[Scalar] = []
-    for joint, (R, p), response in zip(arm.joints, transforms, responses, strict=True):
+    for joint, step, response in zip(arm.joints, steps, responses, strict=True):
+        v_dot = step.inward_axes(add(v_dot, cross(w_dot, step.lever), response.centripetal))
+        w_dot = step.inward_axes(w_dot)
         if joint.revolute:
             w_dot = add(w_dot, response.coriolis)
         else:
@@ -200,7 +208,4 @@ def _outward(arm: Arm, transforms: Sequence[_Transform], responses: Sequence[Joi
             w_dot = add(w_dot, along)
         else:
             v_dot = add(v_dot, along)
-        v_dot = add(v_dot, cross(w_dot, p), response.centripetal)
-        Rt = transpose(R)
-        w_dot, v_dot = apply(Rt, w_dot), apply(Rt, v_dot)
     return accelerations

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armwright.arm.model import Arm
+from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch
-from armwright.dynamics.newton_euler import lever_of
 from armwright.kinematics.forward_kinematics import link_frames, link_transform
+from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Vector, add, apply, cross, dot, transpose
 
@@ -31,10 +31,22 @@ def link_kinetic_energy(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> 
             w, v = apply(Rt, add(w, rate)), apply(Rt, v)
         else:
             w, v = apply(Rt, w), apply(Rt, add(v, rate))
-        v = add(v, cross(w, lever_of(joint, position)))
+        v = add(v, cross(w, _lever(joint, position)))
         v_com = add(v, cross(w, link.com.tolist()))
         energy = energy + 0.5 * (link.mass * dot(v_com, v_com) + dot(w, apply(link.inertia.tolist(), w)))
     return energy
+
+
+def _lever(joint: Joint, q: Scalar) -> Vector:
+    """Return the vector from the origin of frame i-1 to that of frame i, in frame i.
+
+    It is Rᵀp of the link transform, in which the angle about z cancels.
+    """
+    d = joint.d if joint.revolute else joint.d + q
+    if joint.fixed is not None:
+        X = joint.behind
+        return apply(X[:3, :3].T.tolist(), add(X[:3, 3].tolist(), [0.0, 0.0, d]))
+    return [joint.a, exact_sine(joint.alpha) * d, exact_cosine(joint.alpha) * d]
 
 
 def link_potential_energy(arm: Arm, q: Sequence[Scalar]) -> Scalar:

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch, stack_matrix
-from armwright.dynamics.bodies import NOTHING, body_of, combined, in_previous_frame
-from armwright.kinematics.forward_kinematics import link_transform
+from armwright.dynamics.joint_frames import JointBody, at_previous_joint, combined, joint_body, joint_steps
 from armwright.tracing.scalar import Scalar
-from armwright.tracing.vectors import Matrix, Vector, add, apply, cross
+from armwright.tracing.vectors import Matrix, Vector, add, cross
 
 
 def composite_rigid_body(arm: Arm, q: Sequence[Scalar]) -> Matrix:
@@ -26,22 +25,26 @@ def composite_rigid_body(arm: Arm, q: Sequence[Scalar]) -> Matrix:
     Source:
         Walker & Orin (1982), method 3; Featherstone (2008), section 6.2.
     """
-    transforms = [link_transform(joint, position) for joint, position in zip(arm.joints, q, strict=True)]
+    steps = joint_steps(arm, q)
     M: Matrix = [[0.0] * arm.n for _ in range(arm.n)]
-    body = NOTHING
+    beyond: JointBody | None = None
     for i in reversed(range(arm.n)):
-        # In frame i-1 the joint is the z axis through the origin.
-        body = in_previous_frame(combined(body, body_of(arm.links[i])), *transforms[i])
-        if arm.joints[i].revolute:
+        joint = arm.joints[i]
+        body = joint_body(joint, arm.links[i])
+        if beyond is not None:
+            body = combined(body, at_previous_joint(beyond, steps[i + 1]))
+        beyond = body
+        # About the joint point, of which the joint is the z axis.
+        if joint.revolute:
             P: Vector = [-body.moment[1], body.moment[0], 0.0]
-            L: Vector = [row[2] for row in body.tensor]
+            L: Vector = [-body.spread[0][2], -body.spread[1][2], body.spread[0][0] + body.spread[1][1]]
         else:
             P, L = [0.0, 0.0, body.mass], [body.moment[1], -body.moment[0], 0.0]
         for j in reversed(range(i + 1)):
             if j < i:
-                R, p = transforms[j]
-                P = apply(R, P)
-                L = add(apply(R, L), cross(p, P))
+                step = steps[j + 1]
+                P, L = step.outward_axes(P), step.outward_axes(L)
+                L = add(L, cross(step.lever, P))
             M[i][j] = M[j][i] = L[2] if arm.joints[j].revolute else P[2]
     return M
 

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armwright.arm.model import Arm, Joint, Motor
+from armwright.arm.model import Arm, Motor
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
-from armwright.kinematics.forward_kinematics import link_frames, link_transform, stack
-from armwright.spatial.rotations import exact_cosine, exact_sine
+from armwright.dynamics.joint_frames import JointBody, joint_body, joint_steps, lever_behind
+from armwright.kinematics.forward_kinematics import link_frames, stack
 from armwright.tracing.scalar import Scalar, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
 
@@ -24,9 +24,8 @@ def newton_euler(
 
     Arguments and sources are those of ``joint_wrenches``. The efforts are the components along or about each joint.
     """
-    wrenches = joint_wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
-    joints = zip(arm.joints, wrenches, strict=True)
-    return [dot(link.moment if joint.revolute else link.force, link.axis) for joint, link in joints]
+    wrenches = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
+    return [(n if joint.revolute else f)[2] for joint, (f, n) in zip(arm.joints, wrenches, strict=True)]
 
 
 class JointWrench(NamedTuple):
@@ -48,9 +47,6 @@ def joint_wrenches(
 ) -> list[JointWrench]:
     """Return the wrench of each link on the next, over abstract scalars.
 
-    Outward, from the base: speeds and accelerations of the links, each in its own frame. Gravity enters as an
-    opposite acceleration of the base. Inward, from the tool: forces and moments.
-
     Args:
         arm: the arm, with n joints.
         q: n joint positions.
@@ -64,29 +60,77 @@ def joint_wrenches(
         Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25). The report prints the base acceleration with
         gravity pointing up; here gravity is a vector of the arm.
     """
-    v_dot = base_frame_acceleration(arm, base_acceleration)
+    wrenches = []
+    found = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
+    for joint, position, (f, n) in zip(arm.joints, q, found, strict=True):
+        about = n if joint.revolute else add(n, cross([0.0, 0.0, joint.d + position], f))
+        to_frame = transpose(joint.behind[:3, :3].tolist())
+        wrenches.append(JointWrench(apply(to_frame, f), apply(to_frame, about), [row[2] for row in to_frame]))
+    return wrenches
+
+
+def _wrenches(
+    arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars, *, base_acceleration: Scalars
+) -> list[tuple[Vector, Vector]]:
+    """Return force and moment of each link on the next, about the point and along the axes of its joint.
+
+    Outward, from the base: angular velocity, angular acceleration and acceleration of each joint point, in the axes
+    that rotate with the joint, of which z is its own. Gravity enters as an opposite acceleration of the base. Inward,
+    from the tool: forces and moments.
+
+    Arguments are those of ``joint_wrenches``.
+
+    Source:
+        Luh, Walker & Paul (1980), about joint points instead of centres of mass, in the axes behind the rotation of a
+        joint and before its twist, in which a link is constant: Khalil & Kleinfinger (1987).
+    """
     w: Vector = [0.0, 0.0, 0.0]
     w_dot: Vector = [0.0, 0.0, 0.0]
-    links: list[tuple[Matrix, Vector, Vector, Vector]] = []
-    for joint, link, position, speed, acceleration in zip(arm.joints, arm.links, q, qd, qdd, strict=True):
-        R, _ = link_transform(joint, position)
-        Rt = transpose(R)
-        lever = lever_of(joint, position)
-        w, w_dot, v_dot = _next_link(joint, Rt, lever, (w, w_dot, v_dot), (speed, acceleration))
-        com, inertia = link.com.tolist(), link.inertia.tolist()
-        com_acceleration = add(v_dot, cross(w_dot, com), cross(w, cross(w, com)))
-        force = scale(link.mass, com_acceleration)
-        spin = add(apply(inertia, w_dot), cross(w, apply(inertia, w)))
-        links.append((R, lever, force, add(spin, cross(add(lever, com), force))))
-    f, n = tool_reaction(arm, q, wrench)
-    wrenches: list[JointWrench] = []
-    for R, lever, force, moment in reversed(links):
-        # f and n act from link i on the next, at the origin of frame i, in frame i.
-        n = add(n, cross(lever, f), moment)
-        f = add(f, force)
-        wrenches.append(JointWrench(f, n, R[2]))
-        f, n = apply(R, f), apply(R, n)
+    v_dot = base_frame_acceleration(arm, base_acceleration)
+    U: Matrix = [[0.0, 0.0, 0.0] for _ in range(3)]
+    steps = joint_steps(arm, q)
+    links: list[tuple[Vector, Vector]] = []
+    for joint, link, step, speed, acceleration in zip(arm.joints, arm.links, steps, qd, qdd, strict=True):
+        v_dot = step.inward_axes(add(v_dot, apply(U, step.lever)))
+        w, w_dot = step.inward_axes(w), step.inward_axes(w_dot)
+        if joint.revolute:
+            w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
+            w = [w[0], w[1], w[2] + speed]
+        else:
+            twice = speed + speed
+            v_dot = add(v_dot, [w[1] * twice, -(w[0] * twice), acceleration])
+        U = _point_accelerations(w, w_dot)
+        links.append(_link_wrench(joint_body(joint, link), U, v_dot))
+    f, n = tool_wrench(arm, q, wrench)
+    wrenches: list[tuple[Vector, Vector]] = []
+    for step, (force, moment) in zip(reversed(steps), reversed(links), strict=True):
+        f, n = add(f, force), add(n, moment)
+        wrenches.append((f, n))
+        f, n = step.outward_axes(f), step.outward_axes(n)
+        n = add(n, cross(step.lever, f))
     return wrenches[::-1]
+
+
+def _point_accelerations(w: Vector, w_dot: Vector) -> Matrix:
+    """Return U: a point of a body at r from its origin has the acceleration U r relative to that."""
+    xx, yy, zz = (x * x for x in w)
+    xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
+    return [
+        [-(yy + zz), xy - w_dot[2], xz + w_dot[1]],
+        [xy + w_dot[2], -(xx + zz), yz - w_dot[0]],
+        [xz - w_dot[1], yz + w_dot[0], -(xx + yy)],
+    ]
+
+
+def _link_wrench(body: JointBody, U: Matrix, v_dot: Vector) -> tuple[Vector, Vector]:
+    """Return force and moment that accelerate a link, about its joint point."""
+    force = add(scale(body.mass, v_dot), apply(U, body.moment))
+    moment = []
+    for b, c in ((1, 2), (2, 0), (0, 1)):
+        # Of the integral of r x (U r): what U makes of the spread, its antisymmetric part.
+        turned = dot(U[c], body.spread[b]) - dot(U[b], body.spread[c])
+        moment.append(turned + body.moment[b] * v_dot[c] - body.moment[c] * v_dot[b])
+    return force, moment
 
 
 def base_frame_acceleration(arm: Arm, base_acceleration: Scalars = _STILL) -> Vector:
@@ -94,35 +138,15 @@ def base_frame_acceleration(arm: Arm, base_acceleration: Scalars = _STILL) -> Ve
     return apply(arm.base[:3, :3].T.tolist(), subtract(base_acceleration, arm.gravity.tolist()))
 
 
-def lever_of(joint: Joint, q: Scalar) -> Vector:
-    """Return the vector from the origin of frame i-1 to that of frame i, in frame i.
-
-    It is Rᵀp of the link transform, in which the angle about z cancels.
-    """
-    d = joint.d if joint.revolute else joint.d + q
-    if joint.fixed is not None:
-        X = joint.behind
-        return apply(X[:3, :3].T.tolist(), add(X[:3, 3].tolist(), [0.0, 0.0, d]))
-    return [joint.a, exact_sine(joint.alpha) * d, exact_cosine(joint.alpha) * d]
-
-
-def _next_link(
-    joint: Joint, Rt: Matrix, lever: Vector, motion: tuple[Vector, Vector, Vector], rates: tuple[Scalar, Scalar]
-) -> tuple[Vector, Vector, Vector]:
-    """Carry angular speed, angular acceleration and acceleration of the origin from frame i-1 to frame i."""
-    w, w_dot, v_dot = motion
-    speed, acceleration = rates
-    if joint.revolute:
-        z_speed = [0.0, 0.0, speed]
-        w_dot = apply(Rt, add(w_dot, [0.0, 0.0, acceleration], cross(w, z_speed)))
-        w = apply(Rt, add(w, z_speed))
-        v_dot = apply(Rt, v_dot)
-    else:
-        w, w_dot = apply(Rt, w), apply(Rt, w_dot)
-        slide = apply(Rt, [0.0, 0.0, speed])
-        v_dot = add(apply(Rt, add(v_dot, [0.0, 0.0, acceleration])), scale(2.0, cross(w, slide)))
-    v_dot = add(v_dot, cross(w_dot, lever), cross(w, cross(w, lever)))
-    return w, w_dot, v_dot
+def tool_wrench(arm: Arm, q: Scalars, wrench: Scalars) -> tuple[Vector, Vector]:
+    """Return force and moment of the last link on the surroundings, about the point and along the axes of its joint."""
+    f, n = tool_reaction(arm, q, wrench)
+    if wrench is NO_WRENCH:
+        return f, n
+    joint = arm.joints[-1]
+    R = joint.behind[:3, :3].tolist()
+    f, n = apply(R, f), apply(R, n)
+    return f, add(n, cross(lever_behind(joint), f))
 
 
 def tool_reaction(arm: Arm, q: Scalars, wrench: Scalars) -> tuple[Vector, Vector]:

@@ -27,7 +27,7 @@ from armwright.simulation.controllers import Controller, no_effort
 from armwright.simulation.integrators import Gill, Integrator, Slope, Step, first_crossing
 from armwright.simulation.plant import Moment, Phase, Plant, Start
 from armwright.simulation.result import Brake, Event, JointState, Simulation, Status
-from armwright.tracing.assignments import LARGEST_ANGLE
+from armwright.tracing.machine import LARGEST_ANGLE
 
 # So many events within so short a time [s] are an entanglement.
 _ENTANGLED = 50

@@ -32,11 +32,11 @@ class Graph:
     def inputs(self, count: int) -> list["Traced"]:
         """Return the next ``count`` inputs."""
         first = sum(node.op == "input" for node in self.nodes)
-        return [Traced(self, self._add(Node("input", (), float(first + i)))) for i in range(count)]
+        return [Traced(self, self.record(Node("input", (), float(first + i)))) for i in range(count)]
 
     def constant(self, value: float) -> int:
         """Return the node of a constant; -0.0 is another than 0.0."""
-        return self._add(Node("constant", (), float(value)))
+        return self.record(Node("constant", (), float(value)))
 
     def apply(self, op: str, *operands: int) -> int:
         """Return the node of an operation, simplified where its value is known or it does nothing."""
@@ -46,13 +46,14 @@ class Graph:
             return simple
         if op in _COMMUTE:
             operands = tuple(sorted(operands))
-        return self._add(Node(op, operands))
+        return self.record(Node(op, operands))
 
     def value(self, node: int) -> float | None:
         """Return the value of a constant, None for any other node."""
         return self.nodes[node].value if self.nodes[node].op == "constant" else None
 
-    def _add(self, node: Node) -> int:
+    def record(self, node: Node) -> int:
+        """Return the node of an operation as it is, the same one for the same operation."""
         key = (node.op, node.operands, node.value, math.copysign(1.0, node.value))
         if key not in self._known:
             self._known[key] = len(self.nodes)

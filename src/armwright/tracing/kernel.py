@@ -1,13 +1,15 @@
 """Compiled kernels: called with arrays, for one configuration or for many."""
 
+import ctypes
 import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache, cached_property, reduce
+from inspect import Parameter, Signature
 from itertools import pairwise
 from operator import or_
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import attrs
 import numpy as np
@@ -15,9 +17,14 @@ import numpy.typing as npt
 
 from armwright.arrays import LARGEST, Array, ArrayLike, cores, floats, leading_axes
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.tracing.assignments import LARGEST_ANGLE
-from armwright.tracing.cache import compiled
-from armwright.tracing.emit import LANES, MEANINGLESS, UNUSUAL, Emitted, Shape
+from armwright.tracing.door import Door, Passed
+from armwright.tracing.emit import Emitted, Shape
+from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
+from armwright.tracing.machine import LARGEST_ANGLE
+from armwright.tracing.native import function_address, processor
+
+# Rows are given to threads in multiples of this, so that every one but the last works on whole vectors.
+LANES = 16
 
 # One number, which is 0 until work in progress is to end without a result.
 CalledOff: TypeAlias = npt.NDArray[np.int64]
@@ -25,45 +32,13 @@ CalledOff: TypeAlias = npt.NDArray[np.int64]
 # Below this many rows a second thread costs more than it saves.
 _ROWS_PER_THREAD = 4096
 
-# The function that is called with arrays, with the inputs and outputs of the kernel by name: a closure over ``*inputs``
-# takes a fifth to a third longer (docs/decisions/0012-structure.md). Arrays that are not as expected go to ``careful``.
-# The inputs are names that ``emit`` has checked.
-_CALL = """
-def call({inputs}, *, threads=None, out=None):
-    try:
-        if not ({plain} is array):
-            pass
-        elif {first}.ndim == {axes}:
-            if out is None:
-                {allocations}
-                if not single({inputs}, {outputs}):
-                    return {outputs}
-            else:
-                {unpack}
-                if {fits} and not single({inputs}, {outputs}):
-                    return out
-        elif {all_rows} and (len({first}) < {few} or threads == 1):
-            rows_asked = len({first})
-            if out is None:
-                {allocations_of_many}
-                if not rows(0, rows_asked, {inputs}, {outputs}):
-                    return {outputs}
-            else:
-                {unpack}
-                if {fits_many} and not rows(0, rows_asked, {inputs}, {outputs}):
-                    return out
-    except foreign:
-        pass
-    return careful(({inputs},), threads, out)
-"""
-
 
 @attrs.frozen(kw_only=True, eq=False, slots=False)
 class Kernel:
     """An equation, compiled: the part for one configuration and the part for many, each when it is first needed.
 
     Attributes:
-        emitted: its source, and the shapes of its inputs and outputs.
+        emitted: its code, and the shapes of its inputs and outputs.
         raise_for_invalid: raises the error that belongs to inputs for which the conditions of the equation do not hold.
         remark: called with inputs that are unusual, and with how many calls up from it the caller stands.
     """
@@ -74,13 +49,14 @@ class Kernel:
 
     @cached_property
     def single(self) -> Callable[..., int]:
-        """The function of one configuration, for calls from other compiled code: see ``Emitted``."""
-        return compiled(self.emitted.single, "single", self.emitted.title)
+        """The function of one configuration, for calls from loops that Numba compiles.
 
-    @cached_property
-    def rows(self) -> Callable[..., int]:
-        """The function of many configurations: see ``Emitted``."""
-        return compiled(self.emitted.rows, "rows", self.emitted.title)
+        It takes the arrays of inputs and outputs, and returns a status: see ``Emitted``.
+        """
+        from armwright.tracing.from_numba import callable_from_numba  # noqa: PLC0415 - Numba takes half a second
+
+        shapes = (*self.emitted.inputs.values(), *self.emitted.outputs)
+        return callable_from_numba(self._address("single"), shapes)
 
     def function(self, name: str, doc: str = "") -> Callable[..., Any]:
         """Return the function that evaluates the equation for one configuration or many.
@@ -99,49 +75,37 @@ class Kernel:
             doc: its docstring.
         """
         inputs = self.emitted.inputs
-        outputs = [f"out{i}" for i in range(len(self._kinds))]
-        known: dict[str, Any] = {"empty": np.empty, "array": np.ndarray, "careful": self._careful, "foreign": _FOREIGN}
+        by_name = [Parameter(one, Parameter.KEYWORD_ONLY, default=None) for one in ("threads", "out")]
+        signature = Signature([*(Parameter(one, Parameter.POSITIONAL_OR_KEYWORD) for one in inputs), *by_name])
 
-        def for_outputs(statement: str, separator: str, lead: str) -> str:
-            """Write a statement for every output: its name, its shape behind a leading axis, and its type go in."""
-            shapes = ((f"({lead}{', '.join(map(str, shape))},)", kind.__name__) for shape, kind in self._kinds)
-            return separator.join(statement.format(out, *shape) for out, shape in zip(outputs, shapes, strict=True))
+        def careful(*arguments: Any, **named: Any) -> Any:
+            given = signature.bind(*arguments, **named).arguments
+            return self._careful([given[one] for one in inputs], given.get("threads"), given.get("out"))
 
-        def compiled_when_called(part: str) -> Callable[..., int]:
-            def compile_and_call(*arrays: Array) -> int:
-                # Compiled when it is first needed, and from then on called directly.
-                known[part] = getattr(self, part)
-                from numba.core.errors import NumbaError  # noqa: PLC0415 - loaded by now
+        careful.__name__, careful.__qualname__, careful.__doc__ = name, name, doc
+        careful.__signature__ = signature  # type: ignore[attr-defined]
+        return self._door.open(name, f"{name}{signature}\n--\n\n{doc}", careful)
 
-                known["foreign"] = (*_FOREIGN, NumbaError)
-                try:
-                    return int(known[part](*arrays))
-                except known["foreign"]:
-                    return MEANINGLESS  # the careful way says why
+    @cached_property
+    def _door(self) -> Door:
+        inputs = [Passed(shape, float) for shape in self.emitted.inputs.values()]
+        return Door(inputs, [Passed(*of_output) for of_output in self._kinds], 2 * _ROWS_PER_THREAD)
 
-            return compile_and_call
+    def _address(self, part: Literal["single", "rows"]) -> int:
+        """Return the address of a function, which is compiled when it is first asked for."""
+        target = processor().target
+        ir = self.emitted.single_ir(target) if part == "single" else self.emitted.rows_ir(target)
+        address = function_address(ir, part)
+        self._door.connect(part, address)
+        return address
 
-        known |= {part: compiled_when_called(part) for part in ("single", "rows")}
-        text = _CALL.format(
-            inputs=", ".join(inputs),
-            # Numba takes a masked array for its numbers, once it has met an array of another class.
-            plain=" is ".join(f"{x}.__class__" for x in inputs),
-            first=next(iter(inputs)),
-            axes=len(next(iter(inputs.values()))),
-            # A compiled function takes long to find out that one of its inputs has too few axes.
-            all_rows=" and ".join(f"{x}.ndim == {len(shape) + 1}" for x, shape in inputs.items()),
-            few=2 * _ROWS_PER_THREAD,
-            allocations=for_outputs("{} = empty({}, {})", "; ", ""),
-            allocations_of_many=for_outputs("{} = empty({}, {})", "; ", "rows_asked, "),
-            unpack=f"{', '.join(outputs)} = out",
-            fits=for_outputs("{}.shape == {}", " and ", ""),
-            fits_many=for_outputs("{}.shape == {}", " and ", "rows_asked, "),
-            outputs=", ".join(outputs),
-        )
-        exec(text, known)  # noqa: S102 - numbers, and names that are identifiers
-        made: Callable[..., Any] = known["call"]
-        made.__name__, made.__qualname__, made.__doc__ = name, name, doc
-        return made
+    @cached_property
+    def _single(self) -> Callable[[Any], int]:
+        return _SINGLE(self._address("single"))
+
+    @cached_property
+    def _rows(self) -> Callable[[int, int, Any], int]:
+        return _ROWS(self._address("rows"))
 
     def __call__(self, *inputs: ArrayLike, threads: int | None = None, out: Any = None) -> Any:
         """Evaluate the equation: see ``function``."""
@@ -157,6 +121,8 @@ class Kernel:
             raise InvalidValueError(f"threads: expected an integer above 0, or None for all cores, got {threads!r}")
         arrays, lead = self._checked(inputs)
         results = self._results(lead, out)
+        if out is not None and any(np.may_share_memory(x, y) for x in arrays for y in results):
+            arrays = [x.copy() for x in arrays]
         status = self._run(arrays, lead, results, threads)
         if status & MEANINGLESS:
             for name, array in zip(self.emitted.inputs, arrays, strict=True):
@@ -194,20 +160,27 @@ class Kernel:
 
     def _run(self, arrays: list[Array], lead: Shape, results: list[Array], threads: int | None) -> int:
         if not lead:
-            return self.single(*map(np.ascontiguousarray, arrays), *results)
+            return self._single(_addresses([*map(np.ascontiguousarray, arrays), *results]))
         rows = math.prod(lead)
         shapes = self.emitted.inputs.values()
         flat = [_rows(x, lead, shape) for x, shape in zip(arrays, shapes, strict=True)]
         flat += results if len(lead) == 1 else [x.reshape(rows, *x.shape[len(lead) :]) for x in results]
+        addresses, run = _addresses(flat), self._rows
         parts = _parts(rows, threads, max(rows // _ROWS_PER_THREAD, 1))
         if len(parts) == 1:
-            return self.rows(0, rows, *flat)
-        jobs = [_pool().submit(self.rows, first, last, *flat) for first, last in parts]
+            return run(0, rows, addresses)
+        jobs = [_pool().submit(run, first, last, addresses) for first, last in parts]
         return reduce(or_, (job.result() for job in jobs))
 
 
-# What the shortest way meets in arrays of other numbers; with Numba loaded, its own error too.
-_FOREIGN = (AttributeError, TypeError, ValueError)
+# The functions of a kernel; what they are given is let go of by the interpreter meanwhile.
+_SINGLE = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
+_ROWS = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p)
+
+
+def _addresses(arrays: Sequence[Array]) -> Any:
+    """Return the addresses of arrays, as a kernel takes them."""
+    return (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
 
 
 def _input(value: ArrayLike, shape: Shape, name: str) -> Array:

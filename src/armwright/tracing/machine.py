@@ -1,0 +1,220 @@
+"""From a traced graph to the operations of a processor, the same for every language that is emitted.
+
+Sines, cosines and arc tangents are written out, and which multiplication and addition become one instruction is
+written down, not left to a compiler: so a configuration has the same bits whatever the language, the width of the
+vectors, and the code around it.
+
+The operations are those of a ``Graph`` without ``sin``, ``cos``, ``atan2`` and ``round``, and
+
+- ``fma``: a · b + c, rounded once.
+- ``bit``: whether a bit of the representation of a number is set; its number is the value of the second operand.
+- ``both``, ``either``, ``differ``, ``not``: of truth values.
+- ``number``: 1 for a truth value that holds, else 0.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from armwright.arrays import LARGEST
+from armwright.tracing.elementary import arc_tangent, root, rounded, sine_cosine
+from armwright.tracing.graph import Graph, Node, Traced, reachable
+
+# The operations whose result is a truth value.
+TRUTHS = frozenset({"less", "less_equal", "bit", "both", "either", "differ", "not"})
+# The operations that may take in a multiplication.
+_SUMS = frozenset({"add", "subtract"})
+
+# No input whose sine is taken is larger: less than ten digits would be right.
+LARGEST_ANGLE = 1e12
+
+
+class Watched(NamedTuple):
+    """What makes a configuration valid, and what makes it unusual, by the numbers of nodes.
+
+    Attributes:
+        angles: inputs whose sine is taken, which must be finite and no larger than ``LARGEST_ANGLE``.
+        others: inputs that must be finite and no larger than ``LARGEST``.
+        positive: nodes that must be above 0.
+        bounds: by node, beyond what it is unusual.
+    """
+
+    angles: Sequence[int] = ()
+    others: Sequence[int] = ()
+    positive: Sequence[int] = ()
+    bounds: Mapping[int, float] = {}
+
+
+class MachineCode(NamedTuple):
+    """A graph of the operations of a processor.
+
+    Attributes:
+        graph: its nodes, each behind its operands.
+        order: the nodes in use.
+        outputs: the nodes of the values asked for; numbers, but for those of flags.
+        invalid: the truth value that a configuration has no meaning; None where none is watched.
+        unusual: the truth value that an input is beyond its bound; None where there are no bounds.
+        joined: how many additions take in a multiplication.
+    """
+
+    graph: Graph
+    order: list[int]
+    outputs: list[int]
+    invalid: int | None
+    unusual: int | None
+    joined: int
+
+
+def machine_code(
+    graph: Graph,
+    outputs: Sequence[int],
+    watched: Watched | None = None,
+    flags: Iterable[int] = (),
+) -> MachineCode:
+    """Translate a traced graph.
+
+    Args:
+        graph: the graph of an equation.
+        outputs: the nodes whose values are asked for.
+        watched: what is watched, if anything.
+        flags: which outputs, by their places, are truth values.
+    """
+    watched = watched or Watched()
+    required = [*outputs, *watched.positive]
+    order = reachable(graph, [*watched.angles, *watched.others, *required])
+    joined = fused(graph, order, required)
+    target = _Target(Graph())
+    new: dict[int, int] = {}
+    absorbed = set(joined.values())
+    for i in order:
+        if i not in absorbed:
+            new[i] = target.translate(graph.nodes[i], new, _product(graph, joined.get(i)))
+    truths = set(flags)
+    ends = [target.truth(new[i]) if k in truths else target.number(new[i]) for k, i in enumerate(outputs)]
+    invalid, unusual = target.verdicts(watched, new)
+    all_ends = [*ends, *(x for x in (invalid, unusual) if x is not None)]
+    return MachineCode(target.graph, reachable(target.graph, all_ends), ends, invalid, unusual, len(joined))
+
+
+def _product(graph: Graph, number: int | None) -> tuple[int, Node] | None:
+    return None if number is None else (number, graph.nodes[number])
+
+
+class _Target:
+    """The graph under construction."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self._circles: dict[int, tuple[Traced, Traced]] = {}
+
+    def translate(self, node: Node, new: Mapping[int, int], product: tuple[int, Node] | None) -> int:
+        """Return the node for one of the traced graph, whose operands are translated; ``product``: what it takes in."""
+        if node.op in ("constant", "input"):
+            return self.graph.record(node)
+        if product is not None:
+            return self._fused(node, new, *product)
+        operands = [new[i] for i in node.operands]
+        if node.op == "select":
+            return self._op("select", self.truth(operands[0]), *map(self.number, operands[1:]))
+        operands = [self.number(i) for i in operands]
+        if node.op in _WRITTEN_OUT:
+            return _WRITTEN_OUT[node.op](*(Traced(self.graph, i) for i in operands)).node
+        return self._circle(operands[0], node.op) if node.op in ("sin", "cos") else self._op(node.op, *operands)
+
+    def _circle(self, angle: int, op: str) -> int:
+        """Return the sine or cosine of an angle, of which both are written out together."""
+        if angle not in self._circles:
+            self._circles[angle] = sine_cosine(Traced(self.graph, angle))
+        return self._circles[angle][op == "cos"].node
+
+    def number(self, node: int) -> int:
+        """Return a node as a number."""
+        return self._op("number", node) if self.graph.nodes[node].op in TRUTHS else node
+
+    def truth(self, node: int) -> int:
+        """Return a node as a truth value: whether it is not 0."""
+        op, operands, _ = self.graph.nodes[node]
+        if op in TRUTHS:
+            return node
+        if op == "number":
+            return operands[0]
+        zero = self.graph.constant(0.0)
+        return self._op("either", self._op("less", node, zero), self._op("less", zero, node))
+
+    def verdicts(self, watched: Watched, new: Mapping[int, int]) -> tuple[int | None, int | None]:
+        """Return whether a configuration is invalid, and whether it is unusual."""
+        valid: list[int] = []
+        # One sum of squares tells of many: it is not a number, infinite or too large where one of them is.
+        for inputs, largest in ((watched.angles, LARGEST_ANGLE), (watched.others, LARGEST)):
+            if inputs:
+                size = self.graph.constant(0.0)
+                for i in inputs:
+                    size = (
+                        self._op("fma", new[i], new[i], size)
+                        if i is not inputs[0]
+                        else self._op("multiply", new[i], new[i])
+                    )
+                valid.append(self._op("less_equal", size, self.graph.constant(largest**2)))
+        zero = self.graph.constant(0.0)
+        valid += [self._op("less", zero, new[i]) for i in watched.positive]
+        usual = [
+            self._op("less_equal", self._op("absolute", new[i]), self.graph.constant(bound))
+            for i, bound in watched.bounds.items()
+        ]
+        invalid, unusual = (self._not_all(conditions) for conditions in (valid, usual))
+        return invalid, unusual
+
+    def _not_all(self, conditions: Sequence[int]) -> int | None:
+        if not conditions:
+            return None
+        first, *others = conditions
+        for condition in others:
+            first = self._op("both", first, condition)
+        return self._op("not", first)
+
+    def _fused(self, node: Node, new: Mapping[int, int], product: int, multiplication: Node) -> int:
+        a, b = (self.number(new[i]) for i in multiplication.operands)
+        first, second = node.operands
+        if node.op == "add":
+            return self._op("fma", a, b, self.number(new[second if first == product else first]))
+        if first == product:
+            return self._op("fma", a, b, self._op("negate", self.number(new[second])))
+        return self._op("fma", self._op("negate", a), b, self.number(new[first]))
+
+    def _op(self, op: str, *operands: int) -> int:
+        return self.graph.record(Node(op, operands))
+
+
+_WRITTEN_OUT: dict[str, Callable[..., Traced]] = {"atan2": arc_tangent, "round": rounded, "sqrt": root}
+
+
+def fused(graph: Graph, order: Iterable[int], outputs: Iterable[int]) -> dict[int, int]:
+    """Return which multiplication each sum takes in: number of the sum -> number of the multiplication.
+
+    A compiler may join a · b + c in one instruction, rounded once, on its own, but then what it does depends on what
+    stands around the code. Here it is part of the graph's translation, so a kernel gives the same bits however it is
+    compiled: alone, in a vector, inlined into another loop.
+
+    A multiplication is taken in only where that makes it disappear: by all sums that use it, or by none.
+
+    Args:
+        graph: the graph.
+        order: the nodes in use.
+        outputs: the nodes whose values are asked for.
+    """
+    users: dict[int, list[int]] = {}
+    for i in order:
+        for operand in set(graph.nodes[i].operands):
+            users.setdefault(operand, []).append(i)
+    required = set(outputs)
+    products = [
+        i
+        for i, of in users.items()
+        if graph.nodes[i].op == "multiply" and i not in required and all(graph.nodes[j].op in _SUMS for j in of)
+    ]
+    taken: dict[int, int] = {}
+    # Those with one user first: each of them is one instruction less, whatever becomes of the others.
+    for i in sorted(products, key=lambda i: (len(users[i]), -i)):
+        squares = any(graph.nodes[j].operands == (i, i) for j in users[i])
+        if not squares and not any(j in taken for j in users[i]):
+            taken.update(dict.fromkeys(users[i], i))
+    return taken
