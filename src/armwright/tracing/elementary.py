@@ -56,7 +56,7 @@ def arc_tangent(y: Traced, x: Traced) -> Traced:
     """Return the angle of the point (x, y) [rad], in (-pi, pi]; 0 for the origin."""
     ax, ay = abs(x), abs(y)
     steep = ax < ay
-    low, high = select(ay < ax, ay, ax), select(ay < ax, ax, ay)
+    low, high = select(steep, ax, ay), select(steep, ay, ax)
     # Above 0.66 the angle is measured from pi/4; one division serves both.
     past = low > 0.66 * high
     above, below = select(past, low - high, low), select(past, low + high, high)
