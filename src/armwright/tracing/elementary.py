@@ -70,7 +70,8 @@ def arc_tangent(y: Traced, x: Traced) -> Traced:
     t = above / select(below > 0.0, below, 1.0)
     z = t * t
     w = z * z
-    even, odd = _ARC_TANGENT[12], _ARC_TANGENT[13]
+    even: Scalar = _ARC_TANGENT[12]
+    odd: Scalar = _ARC_TANGENT[13]
     for i in range(10, -1, -2):
         even, odd = fma(w, even, _ARC_TANGENT[i]), fma(w, odd, _ARC_TANGENT[i + 1])
     r = fma(-(t * z), fma(z, odd, even), t)
