@@ -38,6 +38,24 @@ print(repr(float(kernel(np.array([0.5]))[0])), int(not compiled))
 """
 
 
+# The same wave in a loop that Numba compiles.
+_START_LOOP = """
+import numpy as np
+from armwright.tracing.cache import compiled
+SOURCE = '''
+import math
+from numba import float64, types
+SIGNATURE = types.void(types.Array(float64, 1, "C"))
+def wave(x):
+    for i in range(len(x)):
+        x[i] = math.sin(x[i]) * 1.25
+'''
+x, wave = np.array([0.5]), compiled(SOURCE, "wave", "a wave")
+wave(x)
+print(repr(float(x[0])), len(wave.stats.cache_hits))
+"""
+
+
 def _environment(cache: Path | None) -> dict[str, str]:
     environment = {name: os.environ[name] for name in ("PATH", "TMPDIR") if name in os.environ}
     environment |= {"PYTHONPATH": SOURCES, "PYTHONDONTWRITEBYTECODE": "1"}
@@ -57,9 +75,9 @@ def starting(cache: Path) -> subprocess.Popen[str]:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[ForkServer]:
-    """A process that has loaded the compiler, and compiled nothing."""
+    """A process that has loaded the compilers, and compiled nothing."""
     with fork_server(
-        ["numpy", "armwright.tracing.emit", "armwright.tracing.kernel", "llvmlite.binding"], _environment(None)
+        ["numpy", "armwright.tracing.emit", "armwright.tracing.kernel", "llvmlite.binding", "numba"], _environment(None)
     ) as server:
         yield server
 
@@ -72,8 +90,8 @@ def start(server: ForkServer, tmp_path_factory: pytest.TempPathFactory) -> Calla
     """
     scratch = tmp_path_factory.mktemp("scratch")
 
-    def started(cache: Path, *, cwd: Path = scratch, **more: Any) -> str:
-        answer = server.call(cwd, scratch, code=_START, environment=_environment(cache), **more)
+    def started(cache: Path, *, cwd: Path = scratch, code: str = _START, **more: Any) -> str:
+        answer = server.call(cwd, scratch, code=code, environment=_environment(cache), **more)
         assert (answer["status"], answer["err"]) == (0, "")
         value, hits = answer["out"].split()
         assert value == VALUE
@@ -199,3 +217,18 @@ def test_a_file_for_a_cache(tmp_path: Path, start: Callable[..., str]) -> None:
     (tmp_path / "file").write_text("in the way")
 
     assert start(tmp_path / "file") == "0"
+
+
+def test_loops_of_numba(tmp_path: Path, start: Callable[..., str]) -> None:
+    """What Numba compiled is found too, made anew after any damage, and no foreign code runs in its place."""
+    cache = tmp_path / "cache"
+    assert [start(cache, code=_START_LOOP), start(cache, code=_START_LOOP)] == ["0", "1"]
+    (entry,) = entries(cache)
+    sound, poison = entry.read_bytes(), pickle.dumps(_Poison())
+
+    for bad in (_flipped(sound), poison, sound[:50] + poison):
+        entry.write_bytes(bad)
+        assert start(cache, code=_START_LOOP, cwd=tmp_path) == "0"
+    Store(entry.parent).put(entry.name, pickle.dumps((b"no code", b"no function")))
+    assert [start(cache, code=_START_LOOP), start(cache, code=_START_LOOP)] == ["0", "1"]
+    assert not (tmp_path / "PWNED").exists()

@@ -5,10 +5,11 @@
 
 from __future__ import annotations  # what help shows keeps the names of array types, which are long
 
+import os
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import wraps
-from threading import Lock
+from threading import RLock
 from typing import Any, TypeVar, cast
 
 import attrs
@@ -25,14 +26,19 @@ _Method = TypeVar("_Method", bound=Callable[..., Any])
 # Arms whose functions are kept, those asked for last.
 _MAX_ARMS = 64
 _COMPILED: OrderedDict[object, CompiledArm] = OrderedDict()
-_COMPILED_LOCK = Lock()
+_COMPILED_LOCK = RLock()
+# A process that is forked while another thread holds it would wait for ever.
+os.register_at_fork(
+    before=_COMPILED_LOCK.acquire, after_in_parent=_COMPILED_LOCK.release, after_in_child=_COMPILED_LOCK.release
+)
 
 
 def compile_arm(arm: Arm) -> CompiledArm:
     """Return an arm whose quantities are compiled, each when it is first asked for.
 
-    A first compilation takes some seconds and is kept on disk: see ``armwright.files.store.cache_folder``. Of the arms
-    asked for last the compiled ones are kept, so asking again costs nothing. Threads may ask at the same time.
+    A first compilation takes hundredths to tenths of a second and is kept on disk: see
+    ``armwright.files.store.cache_folder``. Of the arms asked for last the compiled ones are kept, so asking again costs
+    nothing. Threads may ask at the same time.
 
     Args:
         arm: the arm, with n joints.

@@ -1,4 +1,4 @@
-"""The quantities of an arm that can be compiled: their equations, shapes and conditions, and their emitted sources."""
+"""The quantities of an arm that can be compiled: their equations, shapes and conditions, and their emitted code."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Rows = list[list[Scalar]]
 
 
 def emit_quantity(arm: Arm, name: str) -> Emitted:
-    """Return the source of a quantity's kernel and its operation count.
+    """Return the code of a quantity's kernel and its operation count.
 
     Args:
         arm: the arm.

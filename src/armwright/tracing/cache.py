@@ -1,4 +1,4 @@
-"""Compiled functions: taken from the user's cache where they are there, otherwise compiled, once, and kept.
+"""Loops that Numba compiles: taken from the user's cache where they are there, otherwise compiled, once, and kept.
 
 A source is executed from memory, never from a file, and what was compiled comes out of a store that checks every byte
 (``armwright.files.store``): Numba writes and reads no files of its own.
@@ -64,7 +64,7 @@ def _load(key: str, source: str, entry: str, title: str) -> Callable[..., Any]:
 
 def _function(key: str, entry: str, code: CodeType, exchange: "_Exchange") -> Callable[..., Any]:
     """Return the compiled function of a code that this process, or one like it, has emitted."""
-    from numba import njit  # noqa: PLC0415 - costs half a second, and only kernels need it
+    from numba import njit  # noqa: PLC0415 - costs half a second, and only loops need it
     from numba.core.typeinfer import register_dispatcher  # noqa: PLC0415
 
     module = ModuleType(_module_name(key))
@@ -113,7 +113,7 @@ def _module_name(key: str) -> str:
 
 def _key(source: str) -> str:
     """Name a source by itself, the versions that compile it, and the processor it is compiled for."""
-    import llvmlite.binding as llvm  # noqa: PLC0415 - costs a quarter of a second, and only kernels need it
+    import llvmlite.binding as llvm  # noqa: PLC0415 - costs a twentieth of a second, and only compiled code needs it
     import numba  # noqa: PLC0415
 
     processor = [llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]

@@ -105,8 +105,10 @@ class Door:
         definition = [_address_of(texts[0]), address, _METH_FASTCALL | _METH_KEYWORDS, _address_of(texts[1])]
         table = _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())
         # The object of the function owns the table, and the table all that it points to.
-        table.keep = (careful, shapes, kinds, texts)  # type: ignore[attr-defined]
+        table.keep = (careful, shapes, kinds, texts, np.empty, _OUT, _THREADS)  # type: ignore[attr-defined]
         self._tables.append(table)
+        for part, place in self._kernels.items():  # another thread may have compiled it meanwhile
+            self.connect(part, place)
         new = ctypes.pythonapi.PyCFunction_NewEx
         new.restype, new.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p]
         return new(_address_of(table) + 8 * len(words), table, None)  # type: ignore[no-any-return]

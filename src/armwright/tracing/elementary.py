@@ -3,8 +3,10 @@
 They are written over traced scalars and become part of every emitted graph that needs them: no branch, and no call.
 
 Accuracy, against correctly rounded values (tests/tracing/test_kernel.py): sine and cosine within 2 ulp for
-|x| up to 1e5; beyond, the error grows as |x| · 1e-22 and reaches 1e-9 at 1e13; not meant beyond 1e15. Arc tangent
-within 2 ulp everywhere; its sign at y = -0.0 is that of +0.0.
+|x| up to 1e5; beyond, the error grows as |x| · 1e-22 and reaches 1e-9 at 1e13; not meant beyond 1e15. A processor that
+rounds products before it adds has 2 ulp up to 1e6, and beyond an error of |x| · 1e-16. Arc tangent within 2 ulp for
+lengths from 1e-320 to 1e300. The sine of -0.0 is +0.0, the sign of an arc tangent at y = -0.0 is that of +0.0, and at
+x = -0.0 it is the arc tangent at +0.0. What is not a number goes on as such.
 
 Source:
     Argument reduction in three parts: Cody & Waite (1980). Polynomials of sine and cosine: the fdlibm kernels (Sun
@@ -31,13 +33,14 @@ def fma(a: Scalar, b: Scalar, c: Scalar) -> Traced:
 
 
 def rounded(x: Traced) -> Traced:
-    """Return the integer nearest to ``x``; the even one of two."""
+    """Return the integer nearest to ``x``, for |x| up to 2^51; the even one of two."""
     return (x + _ROUNDING) - _ROUNDING
 
 
 def root(x: Traced) -> Traced:
     """Return the root of ``x``, and 0 for what rounding has pushed below 0."""
-    return traced("sqrt", select(x > 0.0, x, 0.0))
+    # NaN is not below 0, and its root is NaN.
+    return traced("sqrt", select(x <= 0.0, 0.0, x))
 
 
 def sine_cosine(x: Traced) -> tuple[Traced, Traced]:
@@ -67,7 +70,8 @@ def arc_tangent(y: Traced, x: Traced) -> Traced:
     # Above 0.6 the angle is measured from pi/4; one division serves both.
     past = low > 0.6 * high
     above, below = select(past, low - high, low), select(past, low + high, high)
-    t = above / select(below > 0.0, below, 1.0)
+    # Only of the origin the lengths are 0; NaN goes on.
+    t = above / select(below <= 0.0, 1.0, below)
     z = t * t
     w = z * z
     even: Scalar = _ARC_TANGENT[12]

@@ -16,6 +16,10 @@ from armwright.tracing.scalar import Scalar
 Shape: TypeAlias = tuple[int, ...]
 
 
+# What the function of every kernel takes by name.
+_OPTIONS = ("threads", "out")
+
+
 class Guarded(NamedTuple):
     """What an equation returns whose values mean something only under conditions.
 
@@ -97,10 +101,13 @@ def emit(
         bounds: by the name of an input, how far from 0 each of its numbers usually is; farther numbers are reported.
 
     Raises:
-        InvalidValueError: the name of an input is no identifier, as which a caller may write it.
+        InvalidValueError: there is no input, or the name of one is no identifier, as which a caller may write it, or
+            that of an option of every kernel.
     """
+    if not inputs:
+        raise InvalidValueError("inputs: expected at least one")
     for name in inputs:
-        if not (name.isascii() and name.isidentifier()) or iskeyword(name):
+        if name in _OPTIONS or not (name.isascii() and name.isidentifier()) or iskeyword(name):
             raise InvalidValueError(f"inputs: expected names such as 'qd', got {shown(name)}")
     graph = Graph()
     input_shapes = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}

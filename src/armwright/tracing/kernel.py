@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache, cached_property, reduce
 from inspect import Parameter, Signature
-from itertools import pairwise
+from itertools import combinations, pairwise
 from operator import or_
 from typing import Any, Literal, TypeAlias
 
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import LARGEST, Array, ArrayLike, cores, floats, leading_axes
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError, ShapeError, shown
 from armwright.tracing.door import Door, Passed
 from armwright.tracing.emit import Emitted, Shape
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
@@ -31,6 +31,8 @@ CalledOff: TypeAlias = npt.NDArray[np.int64]
 
 # Below this many rows a second thread costs more than it saves.
 _ROWS_PER_THREAD = 4096
+# After so many rows, milliseconds of work, a signal is heard; a multiple of the lanes.
+_ROWS_BETWEEN_SIGNALS = 65536
 
 
 @attrs.frozen(kw_only=True, eq=False, slots=False)
@@ -55,8 +57,7 @@ class Kernel:
         """
         from armwright.tracing.from_numba import callable_from_numba  # noqa: PLC0415 - Numba takes half a second
 
-        shapes = (*self.emitted.inputs.values(), *self.emitted.outputs)
-        return callable_from_numba(self._address("single"), shapes)
+        return callable_from_numba(self._address("single"), *self._passed)
 
     def function(self, name: str, doc: str = "") -> Callable[..., Any]:
         """Return the function that evaluates the equation for one configuration or many.
@@ -87,9 +88,15 @@ class Kernel:
         return self._door.open(name, f"{name}{signature}\n--\n\n{doc}", careful)
 
     @cached_property
-    def _door(self) -> Door:
+    def _passed(self) -> tuple[list[Passed], list[Passed]]:
+        """The arrays that are read, and those that are written."""
+        flags, outputs = self.emitted.flags, enumerate(self.emitted.outputs)
         inputs = [Passed(shape, float) for shape in self.emitted.inputs.values()]
-        return Door(inputs, [Passed(*of_output) for of_output in self._kinds], 2 * _ROWS_PER_THREAD)
+        return inputs, [Passed(shape, bool if i in flags else float) for i, shape in outputs]
+
+    @cached_property
+    def _door(self) -> Door:
+        return Door(*self._passed, 2 * _ROWS_PER_THREAD)
 
     def _address(self, part: Literal["single", "rows"]) -> int:
         """Return the address of a function, which is compiled when it is first asked for."""
@@ -111,13 +118,9 @@ class Kernel:
         """Evaluate the equation: see ``function``."""
         return self._careful(inputs, threads, out)
 
-    @cached_property
-    def _kinds(self) -> tuple[tuple[Shape, type], ...]:
-        return tuple((s, bool if i in self.emitted.flags else float) for i, s in enumerate(self.emitted.outputs))
-
     def _careful(self, inputs: Sequence[ArrayLike], threads: int | None, out: Any) -> Any:
         """Check everything, evaluate, and find out what is wrong where something is."""
-        if threads is not None and not (isinstance(threads, int) and threads > 0):
+        if threads is not None and not (_is_integer(threads) and threads > 0):
             raise InvalidValueError(f"threads: expected an integer above 0, or None for all cores, got {threads!r}")
         arrays, lead = self._checked(inputs)
         results = self._results(lead, out)
@@ -147,30 +150,47 @@ class Kernel:
 
     def _results(self, lead: Shape, out: Any) -> list[Array]:
         """Return the arrays to fill: new ones, or the caller's where they are fit for it."""
+        _, outputs = self._passed
         if out is None:
-            return [np.empty((*lead, *shape), kind) for shape, kind in self._kinds]
+            return [np.empty((*lead, *shape), kind) for shape, kind in outputs]
         to_fill = list(out) if isinstance(out, tuple) else [out]
-        expected = [((*lead, *shape), np.dtype(kind)) for shape, kind in self._kinds]
-        fit = [isinstance(x, np.ndarray) and x.flags.c_contiguous and x.flags.writeable for x in to_fill]
+        expected = [((*lead, *shape), np.dtype(kind)) for shape, kind in outputs]
+        fit = [isinstance(x, np.ndarray) and x.flags.carray for x in to_fill]
         if not all(fit) or [(x.shape, x.dtype) for x in to_fill] != expected:
             needed = ", ".join(f"{shape} {kind}" for shape, kind in expected)
-            got = ", ".join(f"{np.shape(x)} {np.asarray(x).dtype}" for x in to_fill)
+            got = ", ".join(map(_described, to_fill)) or "none"
             raise ShapeError(f"out: expected writable arrays in C order, {needed}; got {got}")
+        if any(np.may_share_memory(x, y) for x, y in combinations(to_fill, 2)):
+            raise ShapeError("out: expected arrays apart from each other, got some that share memory")
         return to_fill
 
     def _run(self, arrays: list[Array], lead: Shape, results: list[Array], threads: int | None) -> int:
         if not lead:
-            return self._single(_addresses([*map(np.ascontiguousarray, arrays), *results]))
+            return self._single(_addresses([*map(_plain, arrays), *results]))
         rows = math.prod(lead)
         shapes = self.emitted.inputs.values()
         flat = [_rows(x, lead, shape) for x, shape in zip(arrays, shapes, strict=True)]
         flat += results if len(lead) == 1 else [x.reshape(rows, *x.shape[len(lead) :]) for x in results]
-        addresses, run = _addresses(flat), self._rows
+        addresses, run, called_off = _addresses(flat), self._rows, list[bool]()
+
+        def work(first: int, last: int) -> int:
+            status = 0
+            for start in range(first, last, _ROWS_BETWEEN_SIGNALS):
+                if not called_off:
+                    status |= run(start, min(start + _ROWS_BETWEEN_SIGNALS, last), addresses)
+            return status
+
         parts = _parts(rows, threads, max(rows // _ROWS_PER_THREAD, 1))
         if len(parts) == 1:
-            return run(0, rows, addresses)
-        jobs = [_pool().submit(run, first, last, addresses) for first, last in parts]
-        return reduce(or_, (job.result() for job in jobs))
+            return work(0, rows)
+        jobs = [_pool().submit(work, first, last) for first, last in parts]
+        try:
+            return reduce(or_, (job.result() for job in jobs))
+        except BaseException:
+            # Nothing is written to the caller's arrays after a signal has ended the call.
+            called_off.append(True)
+            wait(jobs)
+            raise
 
 
 # The functions of a kernel; what they are given is let go of by the interpreter meanwhile.
@@ -179,8 +199,29 @@ _ROWS = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.
 
 
 def _addresses(arrays: Sequence[Array]) -> Any:
-    """Return the addresses of arrays, as a kernel takes them."""
-    return (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
+    """Return the addresses of arrays, as a kernel takes them; they keep the arrays."""
+    addresses: Any = (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
+    # A signal may end a call while other threads still work on its arrays.
+    addresses.arrays = arrays
+    return addresses
+
+
+def _is_integer(value: object) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _described(value: object) -> str:
+    """Say of what was given to be filled what matters of it."""
+    if not isinstance(value, np.ndarray):
+        return shown(value)
+    flags = value.flags
+    words = {"read-only": flags.writeable, "not in C order": flags.c_contiguous, "not aligned": flags.aligned}
+    return " ".join([f"{value.shape} {value.dtype}", *(word for word, holds in words.items() if not holds)])
+
+
+def _plain(array: Array) -> Array:
+    """Return ``array`` in C order and aligned, as a kernel reads it, without a copy where it is already."""
+    return np.require(array, requirements=("C", "A"))
 
 
 def _input(value: ArrayLike, shape: Shape, name: str) -> Array:
@@ -197,7 +238,7 @@ def _rows(array: Array, lead: Shape, shape: Shape) -> Array:
         array = np.broadcast_to(array, (*lead, *shape))
     if len(lead) > 1:
         array = array.reshape(-1, *shape)
-    return array if array.flags.c_contiguous else np.ascontiguousarray(array)
+    return _plain(array)
 
 
 def on_cores_for_long(work: Callable[[int, int, CalledOff], object], rows: int, threads: int | None) -> None:
@@ -230,3 +271,7 @@ def _parts(rows: int, threads: int | None, max_count: int) -> list[tuple[int, in
 @cache
 def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(max_workers=os.cpu_count())
+
+
+# A process that is forked has none of the threads of its parent.
+os.register_at_fork(after_in_child=_pool.cache_clear)

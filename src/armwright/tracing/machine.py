@@ -155,7 +155,7 @@ class _Target:
                     )
                 valid.append(self._op("less_equal", size, self.graph.constant(largest**2)))
         zero = self.graph.constant(0.0)
-        valid += [self._op("less", zero, new[i]) for i in watched.positive]
+        valid += [self._op("less", zero, self.number(new[i])) for i in watched.positive]
         usual = [
             self._op("less_equal", self._op("absolute", new[i]), self.graph.constant(bound))
             for i, bound in watched.bounds.items()

@@ -5,6 +5,7 @@ What is loaded comes out of a store that checks every byte (``armwright.files.st
 
 import contextlib
 import hashlib
+import os
 import sys
 import threading
 from functools import cache
@@ -15,7 +16,9 @@ from armwright.tracing.emit_llvm import Target
 
 # Engines own the code that they have loaded, and live as long as the process: others may hold its addresses.
 _LOADED: dict[str, Any] = {}
-_LOADING = threading.Lock()
+_LOADING = threading.RLock()
+# A process that is forked while another thread compiles would wait for that thread, which it does not have.
+os.register_at_fork(before=_LOADING.acquire, after_in_parent=_LOADING.release, after_in_child=_LOADING.release)
 # What is stored begins with this, and the object of the compiler follows.
 _SIGNATURE = b"object of LLVM\n"
 
