@@ -17,8 +17,10 @@ from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.compiled.quantities import emit_quantity, quantity_names
 from armwright.dynamics.accelerations import forward_dynamics
+from armwright.dynamics.derivatives import forward_dynamics_derivatives, inverse_dynamics_derivatives
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.dynamics.regressors import regressor
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
@@ -51,6 +53,9 @@ PLAIN: dict[str, Callable[..., Any]] = {
     "forward_dynamics": forward_dynamics,
     "mass_matrix": mass_matrix,
     "mass_and_bias": _mass_and_bias,
+    "inverse_dynamics_derivatives": inverse_dynamics_derivatives,
+    "forward_dynamics_derivatives": forward_dynamics_derivatives,
+    "regressor": regressor,
 }
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
-from armwright.dynamics.accelerations import NEGLIGIBLE, check_pivots, less_friction
+from armwright.dynamics.accelerations import check_pivots, less_friction
 from armwright.dynamics.arguments import Scalars, batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot
 from armwright.dynamics.newton_euler import drive_effort, newton_euler
@@ -145,7 +145,8 @@ def effort_partials(
         qdd: n joint accelerations, as well.
     """
     efforts = newton_euler(arm, q, qd, qdd)
-    efforts = [x + drive_effort(*of) for x, *of in zip(efforts, arm.motors, qd, qdd, strict=True)]
+    drives = (drive_effort(*of_joint) for of_joint in zip(arm.motors, qd, qdd, strict=True))
+    efforts = [effort + drive for effort, drive in zip(efforts, drives, strict=True)]
     n = arm.n
     rows = jacobian(efforts, [*q, *qd, *qdd])
     M = [[rows[min(i, j)][2 * n + max(i, j)] for j in range(n)] for i in range(n)]

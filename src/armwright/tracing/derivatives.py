@@ -137,12 +137,8 @@ def _unless_zero(graph: Graph, node: int) -> int | None:
     return None if graph.value(node) == 0 else node
 
 
-def _signed(graph: Graph, x: int, sign: bool) -> int:
-    return graph.apply("negate", x) if sign else x
-
-
 def _subtract(graph: Graph, _i: int, _operands: tuple[int, ...], k: int, x: int) -> int:
-    return _signed(graph, x, k == 1)
+    return graph.apply("negate", x) if k == 1 else x
 
 
 def _multiply(graph: Graph, _i: int, operands: tuple[int, ...], k: int, x: int) -> int:
@@ -152,8 +148,9 @@ def _multiply(graph: Graph, _i: int, operands: tuple[int, ...], k: int, x: int) 
 def _divide(graph: Graph, i: int, operands: tuple[int, ...], k: int, x: int) -> int:
     # One division for all derivatives.
     inverse = graph.apply("divide", graph.constant(1.0), operands[1])
-    factor = inverse if k == 0 else graph.apply("multiply", i, inverse)
-    return _signed(graph, graph.apply("multiply", x, factor), k == 1)
+    if k == 0:
+        return graph.apply("multiply", x, inverse)
+    return graph.apply("negate", graph.apply("multiply", x, graph.apply("multiply", i, inverse)))
 
 
 def _sin(graph: Graph, _i: int, operands: tuple[int, ...], _k: int, x: int) -> int:
@@ -161,7 +158,7 @@ def _sin(graph: Graph, _i: int, operands: tuple[int, ...], _k: int, x: int) -> i
 
 
 def _cos(graph: Graph, _i: int, operands: tuple[int, ...], _k: int, x: int) -> int:
-    return _signed(graph, graph.apply("multiply", x, graph.apply("sin", *operands)), True)
+    return graph.apply("negate", graph.apply("multiply", x, graph.apply("sin", *operands)))
 
 
 def _inverse_where_positive(graph: Graph, factor: float, x: int) -> int:
@@ -178,8 +175,8 @@ def _sqrt(graph: Graph, i: int, _operands: tuple[int, ...], _k: int, x: int) -> 
 def _atan2(graph: Graph, _i: int, operands: tuple[int, ...], k: int, x: int) -> int:
     squares = [graph.apply("multiply", a, a) for a in operands]
     inverse = _inverse_where_positive(graph, 1.0, graph.apply("add", *squares))
-    factor = graph.apply("multiply", operands[1 - k], inverse)
-    return _signed(graph, graph.apply("multiply", x, factor), k == 1)
+    product = graph.apply("multiply", x, graph.apply("multiply", operands[1 - k], inverse))
+    return graph.apply("negate", product) if k == 1 else product
 
 
 def _absolute(graph: Graph, _i: int, operands: tuple[int, ...], _k: int, x: int) -> int:
@@ -202,7 +199,7 @@ _PARTIALS: dict[str, Callable[[Graph, int, tuple[int, ...], int, int], int | Non
     "subtract": _subtract,
     "multiply": _multiply,
     "divide": _divide,
-    "negate": lambda graph, _i, _operands, _k, x: _signed(graph, x, True),
+    "negate": lambda graph, _i, _operands, _k, x: graph.apply("negate", x),
     "sin": _sin,
     "cos": _cos,
     "sqrt": _sqrt,

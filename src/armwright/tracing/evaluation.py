@@ -1,4 +1,4 @@
-"""Graphs evaluated with NumPy, node by node: the plain way to the values of an equation that exists as a graph alone."""
+"""Graphs evaluated with NumPy, node by node: the plain way to values of equations that exist as graphs alone."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
