@@ -5,3 +5,7 @@ array one value per configuration, all in one sweep. A traced scalar leaves a gr
 which shared terms are one node and constants are folded; of the graph straight-line source is emitted (``emit``), which
 Numba compiles once and a cache on disk keeps (``cache``), and which is called with arrays as a function (``kernel``).
 """
+
+from armwright.lazy_namespace import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)
