@@ -13,6 +13,7 @@ from . import (
     spatial as spatial,
     study as study,
     sweep as sweep,
+    tracing as tracing,
 )
 from .arm.load import arm_names as arm_names, load_arm as load_arm
 from .arm.model import Arm as Arm

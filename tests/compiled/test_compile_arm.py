@@ -17,9 +17,11 @@ from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.compiled.quantities import emit_quantity, quantity_names
 from armwright.dynamics.accelerations import forward_dynamics
+from armwright.dynamics.derivatives import forward_dynamics_derivatives, inverse_dynamics_derivatives
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.dynamics.regressors import regressor
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward, link_poses
@@ -59,6 +61,9 @@ PLAIN: dict[str, Callable[..., Any]] = {
     "coriolis_efforts": coriolis_efforts,
     "kinetic_energy": kinetic_energy,
     "potential_energy": potential_energy,
+    "inverse_dynamics_derivatives": inverse_dynamics_derivatives,
+    "forward_dynamics_derivatives": forward_dynamics_derivatives,
+    "regressor": regressor,
 }
 
 

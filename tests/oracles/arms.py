@@ -69,3 +69,12 @@ def squared(arm: Arm, rng: np.random.Generator) -> Arm:
 def random_configurations(arm: Arm, rng: np.random.Generator, count: int) -> Array:
     """Configurations spread evenly over the limits, (count, n)."""
     return rng.uniform(arm.limits.lower, arm.limits.upper, size=(count, arm.n))
+
+
+def of_all_kinds(arm: Arm, rng: np.random.Generator) -> Arm:
+    """The arm with fixed transforms at some joints, links that weigh nothing in between, and drives with friction."""
+    joints = [attrs.evolve(x, fixed=random_pose(rng)) if rng.random() < 0.5 else x for x in arm.joints]
+    links = [Link() if i + 1 < arm.n and rng.random() < 0.3 else link for i, link in enumerate(arm.links)]
+    names = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
+    motors = [Motor(**dict(zip(names, rng.uniform(0.1, 2.0, size=4), strict=True))) for _ in range(arm.n)]
+    return attrs.evolve(arm, joints=joints, links=links, motors=motors)

@@ -31,7 +31,8 @@ def pinocchio_model(arm: Arm, *, carried: bool = False) -> tuple[pin.Model, pin.
     for i, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True)):
         kind = pin.JointModelRZ() if joint.revolute else pin.JointModelPZ()
         parent = model.addJoint(parent, kind, place, f"joint {i + 1}")
-        place = _turn_z(joint.theta) * _shift(0.0, joint.d) * _shift(joint.a, 0.0) * _turn_x(joint.alpha)
+        fixed = pin.SE3.Identity() if joint.fixed is None else pin.SE3(joint.fixed)
+        place = _turn_z(joint.theta) * _shift(0.0, joint.d) * fixed * _shift(joint.a, 0.0) * _turn_x(joint.alpha)
         model.appendBodyToJoint(parent, pin.Inertia(link.mass, link.com, link.inertia), place)
     tool = model.addFrame(pin.Frame("tool", parent, place * pin.SE3(arm.tool), pin.FrameType.OP_FRAME))
     model.gravity.linear = arm.gravity.copy()

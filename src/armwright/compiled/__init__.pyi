@@ -1,1 +1,3 @@
 from .arm import CompiledArm as CompiledArm, compile_arm as compile_arm
+from .derivatives import derivative as derivative
+from .normal_equations import NormalEquations as NormalEquations, normal_equations as normal_equations

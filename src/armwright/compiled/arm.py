@@ -389,6 +389,85 @@ class CompiledArm:
             UnsupportedArmError: nothing is known of the mass of some link.
         """
 
+    @_kernel_method
+    def inverse_dynamics_derivatives(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        *,
+        threads: int | None = None,
+        out: tuple[Array, Array, Array] | None = None,
+    ) -> tuple[Array, Array, Array]:
+        """Return the derivatives of the efforts of a motion, drives included.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s]. Dry friction has the derivative 0, at rest too.
+            qdd: (..., n) joint accelerations [rad/s²] or [m/s²].
+            threads: how many cores to use; all when None.
+            out: three arrays (..., n, n) to fill.
+
+        Returns:
+            dq: (..., n, n) derivative of effort i by position j.
+            dqd: (..., n, n) derivative of effort i by velocity j.
+            M: (..., n, n) mass matrix, rotor inertia included: derivative of effort i by acceleration j.
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+
+    @_kernel_method
+    def forward_dynamics_derivatives(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        tau: ArrayLike,
+        *,
+        threads: int | None = None,
+        out: tuple[Array, Array, Array] | None = None,
+    ) -> tuple[Array, Array, Array]:
+        """Return the derivatives of the accelerations that efforts of the drives cause.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s]. Dry friction has the derivative 0, at rest too.
+            tau: (..., n) efforts [N m] or [N].
+            threads: how many cores to use; all when None.
+            out: three arrays (..., n, n) to fill.
+
+        Returns:
+            dq: (..., n, n) derivative of acceleration i by position j.
+            dqd: (..., n, n) derivative of acceleration i by velocity j.
+            dtau: (..., n, n) derivative of acceleration i by effort j: the inverse of the mass matrix.
+
+        Raises:
+            UnsupportedArmError: some joint moves nothing that resists an acceleration, or nothing is known of the mass
+                of some link.
+        """
+
+    @_kernel_method
+    def regressor(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, threads: int | None = None, out: Array | None = None
+    ) -> Array:
+        """Return the regressor Y of a motion: tau = Y theta, with the parameters of ``dynamics.dynamic_parameters``.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            qdd: (..., n) joint accelerations [rad/s²] or [m/s²].
+            threads: how many cores to use; all when None.
+            out: (..., n, 14 n) to fill.
+
+        Returns:
+            Y: (..., n, 14 n): ten columns per link, for its mass, first moments and inertia tensor about the origin of
+            its frame; behind them four per joint, for rotor inertia, viscous friction, and dry friction in and against
+            the direction of q.
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+
     def kernel(self, quantity: str) -> Kernel:
         """Return the kernel behind a function, whose part for one configuration other compiled code can call.
 

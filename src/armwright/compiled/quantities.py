@@ -12,9 +12,11 @@ from armwright.arrays import Array
 from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics, less_friction
 from armwright.dynamics.arguments import weighed
 from armwright.dynamics.articulated_body import articulated_body
+from armwright.dynamics.derivatives import acceleration_partials, effort_partials, forward_dynamics_derivatives
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy, rotor_energy
 from armwright.dynamics.inertia_matrix import composite_rigid_body
 from armwright.dynamics.newton_euler import drive_effort, newton_euler
+from armwright.dynamics.regressors import OF_DRIVE, OF_LINK, effort_regressor
 from armwright.dynamics.shares import gravity_shares, speed_shares
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward_kinematics import link_frames, tool_frame
@@ -22,11 +24,13 @@ from armwright.kinematics.inverse_kinematics.branches import branches, merged
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
 from armwright.kinematics.jacobians import frame_columns, tool_columns
 from armwright.tracing.emit import Emitted, Equation, Guarded, emit
+from armwright.tracing.graph import Traced
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, Vector
 
 Numbers = Sequence[Scalar]
+Inputs = Sequence[Traced]
 Rows = list[list[Scalar]]
 
 
@@ -126,7 +130,7 @@ def _mass_matrix(arm: Arm, q: Numbers) -> Rows:
     M = composite_rigid_body(arm, q)
     for i, motor in enumerate(arm.motors):
         M[i][i] = M[i][i] + motor.inertia
-    return [[x for row in M for x in row]]
+    return [_flat(M)]
 
 
 def _mass_and_bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
@@ -153,13 +157,30 @@ def _potential_energy(arm: Arm, q: Numbers) -> Rows:
     return [[link_potential_energy(arm, q)]]
 
 
+def _inverse_dynamics_derivatives(arm: Arm, q: Inputs, qd: Inputs, qdd: Inputs) -> Rows:
+    return [_flat(A) for A in effort_partials(arm, q, qd, qdd)]
+
+
+def _forward_dynamics_derivatives(arm: Arm, q: Inputs, qd: Inputs, tau: Inputs) -> Guarded:
+    matrices, pivots = acceleration_partials(arm, q, qd, tau)
+    return Guarded([_flat(A) for A in matrices], [pivot.inertia - NEGLIGIBLE * pivot.size for pivot in pivots])
+
+
+def _regressor(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers) -> Rows:
+    return [_flat(effort_regressor(arm, q, qd, qdd))]
+
+
+def _flat(A: Matrix) -> list[Scalar]:
+    return [x for row in A for x in row]
+
+
 def _pose(frame: tuple[Matrix, Vector]) -> Vector:
     rows = [[*row, coordinate] for row, coordinate in zip(*frame, strict=True)]
     return [x for row in [*rows, [0.0, 0.0, 0.0, 1.0]] for x in row]
 
 
 class _Quantity(NamedTuple):
-    """One row of the table: shapes stand in letters, n for the number of joints and f for that of the frames.
+    """One row of the table. In shapes, n is the number of joints, f that of the frames, p that of the parameters.
 
     Attributes:
         equation: over abstract scalars.
@@ -177,16 +198,20 @@ class _Quantity(NamedTuple):
 
 
 def _size(arm: Arm, letter: str | int) -> int:
-    return letter if isinstance(letter, int) else {"n": arm.n, "f": arm.n + 2}[letter]
+    return (
+        letter if isinstance(letter, int) else {"n": arm.n, "f": arm.n + 2, "p": (OF_LINK + OF_DRIVE) * arm.n}[letter]
+    )
 
 
 # The inputs that are positions of joints.
 _POSITIONS = ("q", "near")
 _STATE: dict[str, tuple[str | int, ...]] = {"q": ("n",), "qd": ("n",)}
 _MOTION = {**_STATE, "qdd": ("n",)}
+_FORCED = {**_STATE, "tau": ("n",)}
 _Q = {"q": ("n",)}
 # Those that ask for no masses and inertias.
 _GEOMETRY = {"forward", "link_poses", "jacobian", "tool_jacobian", "pose_and_jacobian", "inverse_branches"}
+_THREE_MATRICES = (("n", "n"),) * 3
 _QUANTITIES = {
     "forward": _Quantity(_forward, _Q, ((4, 4),)),
     "link_poses": _Quantity(_link_poses, _Q, (("f", 4, 4),)),
@@ -196,7 +221,7 @@ _QUANTITIES = {
     "inverse_branches": _Quantity(_inverse_branches, {"pose": (4, 4), "near": (6,)}, ((8, 6), (8,)), flags=(1,)),
     "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),)),
     "inverse_dynamics_with_wrench": _Quantity(_inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),)),
-    "forward_dynamics": _Quantity(_forward_dynamics, {**_STATE, "tau": ("n",)}, (("n",),), plain=forward_dynamics),
+    "forward_dynamics": _Quantity(_forward_dynamics, _FORCED, (("n",),), plain=forward_dynamics),
     "mass_matrix": _Quantity(_mass_matrix, _Q, (("n", "n"),)),
     "mass_and_bias": _Quantity(_mass_and_bias, _STATE, (("n", "n"), ("n",))),
     "bias": _Quantity(_bias, _STATE, (("n",),)),
@@ -204,4 +229,9 @@ _QUANTITIES = {
     "coriolis_efforts": _Quantity(_coriolis_efforts, _STATE, (("n",),)),
     "kinetic_energy": _Quantity(_kinetic_energy, _STATE, ((),)),
     "potential_energy": _Quantity(_potential_energy, _Q, ((),)),
+    "inverse_dynamics_derivatives": _Quantity(_inverse_dynamics_derivatives, _MOTION, _THREE_MATRICES),
+    "forward_dynamics_derivatives": _Quantity(
+        _forward_dynamics_derivatives, _FORCED, _THREE_MATRICES, plain=forward_dynamics_derivatives
+    ),
+    "regressor": _Quantity(_regressor, _MOTION, (("n", "p"),)),
 }

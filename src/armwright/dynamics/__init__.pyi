@@ -1,5 +1,11 @@
 from .accelerations import forward_dynamics as forward_dynamics, toacc as toacc
 from .bejczy import bejczy_efforts as bejczy_efforts
+from .derivatives import (
+    AccelerationDerivatives as AccelerationDerivatives,
+    EffortDerivatives as EffortDerivatives,
+    forward_dynamics_derivatives as forward_dynamics_derivatives,
+    inverse_dynamics_derivatives as inverse_dynamics_derivatives,
+)
 from .energy import kinetic_energy as kinetic_energy, potential_energy as potential_energy
 from .equation_of_motion import Terms as Terms, terms as terms
 from .inertia_matrix import mass_matrix as mass_matrix
@@ -10,4 +16,5 @@ from .lagrange_euler import (
 )
 from .newton_euler import LinkForces as LinkForces, inverse_dynamics as inverse_dynamics, link_forces as link_forces
 from .payloads import payload as payload
+from .regressors import dynamic_parameters as dynamic_parameters, regressor as regressor
 from .shares import coriolis_efforts as coriolis_efforts, gravity_efforts as gravity_efforts

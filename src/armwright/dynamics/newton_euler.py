@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from armwright.arm.model import Arm, Motor
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
-from armwright.dynamics.joint_frames import JointBody, joint_body, joint_steps, lever_behind
+from armwright.dynamics.joint_frames import JointBody, JointStep, joint_body, joint_steps, lever_behind
 from armwright.kinematics.forward_kinematics import link_frames, stack
 from armwright.tracing.scalar import Scalar, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
@@ -84,23 +85,12 @@ def _wrenches(
         Luh, Walker & Paul (1980), about joint points instead of centres of mass, in the axes behind the rotation of a
         joint and before its twist, in which a link is constant: Khalil & Kleinfinger (1987).
     """
-    w: Vector = [0.0, 0.0, 0.0]
-    w_dot: Vector = [0.0, 0.0, 0.0]
-    v_dot = base_frame_acceleration(arm, base_acceleration)
-    U: Matrix = [[0.0, 0.0, 0.0] for _ in range(3)]
     steps = joint_steps(arm, q)
-    links: list[tuple[Vector, Vector]] = []
-    for joint, link, step, speed, acceleration in zip(arm.joints, arm.links, steps, qd, qdd, strict=True):
-        v_dot = step.inward_axes(add(v_dot, apply(U, step.lever)))
-        w, w_dot = step.inward_axes(w), step.inward_axes(w_dot)
-        if joint.revolute:
-            w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
-            w = [w[0], w[1], w[2] + speed]
-        else:
-            twice = speed + speed
-            v_dot = add(v_dot, [w[1] * twice, -(w[0] * twice), acceleration])
-        U = _point_accelerations(w, w_dot)
-        links.append(_link_wrench(joint_body(joint, link), U, v_dot))
+    motions = joint_motions(arm, steps, qd, qdd, base_acceleration)
+    links = [
+        _link_wrench(joint_body(joint, link), motion.U, motion.v_dot)
+        for joint, link, motion in zip(arm.joints, arm.links, motions, strict=True)
+    ]
     f, n = tool_wrench(arm, q, wrench)
     wrenches: list[tuple[Vector, Vector]] = []
     for step, (force, moment) in zip(reversed(steps), reversed(links), strict=True):
@@ -111,7 +101,52 @@ def _wrenches(
     return wrenches[::-1]
 
 
-def _point_accelerations(w: Vector, w_dot: Vector) -> Matrix:
+class JointMotion(NamedTuple):
+    """The motion of a link, along the axes of its joint, over abstract scalars.
+
+    Attributes:
+        w: angular velocity.
+        w_dot: angular acceleration.
+        v_dot: acceleration of the joint point; gravity enters as an opposite acceleration.
+        U: a point of the link at r from the joint point has the acceleration U r relative to that.
+    """
+
+    w: Vector
+    w_dot: Vector
+    v_dot: Vector
+    U: Matrix
+
+
+def joint_motions(
+    arm: Arm, steps: Sequence[JointStep], qd: Scalars, qdd: Scalars, base_acceleration: Scalars = _STILL
+) -> Iterator[JointMotion]:
+    """Give the motion of each link, from the base outward.
+
+    Args:
+        arm: the arm, with n joints.
+        steps: the steps from joint to joint.
+        qd: n joint speeds.
+        qdd: n joint accelerations.
+        base_acceleration: of the base, along its own axes.
+    """
+    w: Vector = [0.0, 0.0, 0.0]
+    w_dot: Vector = [0.0, 0.0, 0.0]
+    v_dot = base_frame_acceleration(arm, base_acceleration)
+    U: Matrix = [[0.0, 0.0, 0.0] for _ in range(3)]
+    for joint, step, speed, acceleration in zip(arm.joints, steps, qd, qdd, strict=True):
+        v_dot = step.inward_axes(add(v_dot, apply(U, step.lever)))
+        w, w_dot = step.inward_axes(w), step.inward_axes(w_dot)
+        if joint.revolute:
+            w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
+            w = [w[0], w[1], w[2] + speed]
+        else:
+            twice = speed + speed
+            v_dot = add(v_dot, [w[1] * twice, -(w[0] * twice), acceleration])
+        U = point_accelerations(w, w_dot)
+        yield JointMotion(w, w_dot, v_dot, U)
+
+
+def point_accelerations(w: Vector, w_dot: Vector) -> Matrix:
     """Return U: a point of a body at r from its origin has the acceleration U r relative to that."""
     xx, yy, zz = (x * x for x in w)
     xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]

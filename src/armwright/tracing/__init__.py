@@ -7,3 +7,7 @@ which shared terms are one node and constants are folded. The graph is translate
 It is called with arrays as a function (``kernel``, ``door``), or from loops that Numba compiles (``from_numba``,
 ``cache``).
 """
+
+from armwright.lazy_namespace import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -34,6 +34,8 @@ _INSTRUCTIONS = {
 }
 # Bytes of a number, and of a line of the cache.
 _DOUBLE, _LINE = 8, 64
+# Blocks of more bytes than this are not fetched ahead: they would drive out of the nearest cache what is worked on.
+_FETCHED = 16384
 
 
 class Column(NamedTuple):
@@ -341,7 +343,7 @@ def _fetch_next_block(text: _Text, inputs: Sequence[Column], outputs: Sequence[C
     text.intrinsics.add("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
     for i, (place, one) in enumerate(zip(here, [*inputs, *outputs], strict=True)):
         block = text.lanes * one.size
-        for line in range(0, block, _LINE):
+        for line in range(0, block if block <= _FETCHED else 0, _LINE):
             ahead, is_written = text.address(place, block + line, "i8"), int(i >= len(inputs))
             text.do(f"call void @llvm.prefetch.p0(ptr {ahead}, i32 {is_written}, i32 3, i32 1)")
 

@@ -1,0 +1,116 @@
+"""Derivatives of an equation of the user's, exact and compiled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import accumulate
+from numbers import Real
+from typing import Any, Literal
+
+from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, counted, shown
+from armwright.tracing.derivatives import jacobian
+from armwright.tracing.emit import Shape, emit
+from armwright.tracing.graph import Graph, Traced
+from armwright.tracing.kernel import Kernel
+from armwright.tracing.scalar import Scalar
+
+
+def derivative(
+    equation: Callable[..., Scalar | Sequence[Scalar]],
+    inputs: Mapping[str, int | Shape],
+    *,
+    of: str | Sequence[str],
+    order: Literal[1, 2] = 1,
+) -> Callable[..., Any]:
+    """Return a compiled function of the values of an equation and of their derivatives, which are exact.
+
+    The equation is run on scalars that write down what is done with them. It may use + - * /, abs, comparisons,
+    and the functions of ``armwright.tracing``; instead of a branch on such a scalar it writes ``select``. The functions
+    of an arm over abstract scalars, such as ``dynamics.newton_euler.newton_euler``, are equations as well.
+
+    Where there is no derivative, it is 0 for a comparison, for rounding, for ``abs`` and ``sqrt`` at 0, and for
+    ``atan2`` of the point (0, 0); that of ``select`` is the derivative of the branch that is chosen.
+
+    Args:
+        equation: takes one list of scalars per input, a matrix row by row, and returns a scalar, or a list of m.
+        inputs: of each input, by its name, how many numbers one value has, or its shape.
+        of: names of the inputs to differentiate by.
+        order: 2 for the second derivatives, too, of an equation that returns a scalar.
+
+    Returns:
+        A function of one array (..., *shape) per input, which also takes ``threads`` and ``out``, as those of
+        ``CompiledArm`` do. It returns a tuple: the values, (...) of a scalar, otherwise (..., m); for each name in
+        ``of`` the derivatives, of the shape of the values followed by that of the input; and for order 2 the Hessian,
+        (..., k, k), by all k numbers of these inputs together, one input behind the other.
+
+    Raises:
+        KindError: ``equation`` is no function, or returns something else than scalars.
+        ShapeError: an input or a list of values has no numbers.
+        UnknownNameError: ``of`` names no input.
+        InvalidValueError: ``order`` is neither 1 nor 2, or 2 for more than a scalar; or the name of an input is no
+            identifier.
+
+    Source:
+        Griewank & Walther (2008), Evaluating Derivatives, chapters 3 to 5.
+    """
+    shapes = {name: _shape(name, value) for name, value in inputs.items()}
+    names = [of] if isinstance(of, str) else list(of)
+    for name in names:
+        if name not in shapes:
+            raise UnknownNameError("input", name, shapes)
+    if not names:
+        raise InvalidValueError("of: expected the name of an input, got none")
+    if order not in (1, 2):
+        raise InvalidValueError(f"order: expected 1 or 2, got {shown(order)}")
+    if not callable(equation):
+        raise KindError(f"equation: expected a function of scalars, got {shown(equation)}")
+    name_of_equation = getattr(equation, "__name__", "")
+    title = name_of_equation if name_of_equation.isidentifier() else "equation"
+    # What the equation returns is known once it has run.
+    trial = Graph()
+    values, value_shape = _values(equation(*(trial.inputs(math.prod(shape)) for shape in shapes.values())))
+    if order == 2 and value_shape:
+        raise InvalidValueError(
+            f"order: expected 1, for the equation returns a list of {counted(len(values), 'scalar')}"
+        )
+    sizes = [math.prod(shapes[name]) for name in names]
+    places = [slice(last - size, last) for last, size in zip(accumulate(sizes), sizes, strict=True)]
+
+    def with_derivatives(*scalars: list[Traced]) -> list[list[Scalar]]:
+        values, _ = _values(equation(*scalars))
+        of_input = dict(zip(shapes, scalars, strict=True))
+        columns = [x for name in names for x in of_input[name]]
+        rows = jacobian(values, columns)
+        first = [[x for row in rows for x in row[place]] for place in places]
+        if order == 1:
+            return [values, *first]
+        H = jacobian(rows[0], columns)
+        return [values, *first, [H[min(i, j)][max(i, j)] for i in range(len(H)) for j in range(len(H))]]
+
+    outputs = [value_shape, *((*value_shape, *shapes[name]) for name in names)]
+    if order == 2:
+        outputs.append((sum(sizes), sum(sizes)))
+    kernel = Kernel(emitted=emit(title, with_derivatives, shapes, shapes=outputs))
+    return kernel.function(title, _DOC.format(", ".join(names)))
+
+
+_DOC = "Return the values of the equation, and their derivatives by {}: see ``armwright.compiled.derivative``."
+
+
+def _shape(name: str, value: int | Shape) -> Shape:
+    shape = (value,) if isinstance(value, int) else tuple(value)
+    if not all(isinstance(size, int) and size > 0 for size in shape):
+        raise ShapeError(f"inputs: expected a size above 0, or a shape of such, for {name!r}, got {shown(value)}")
+    return shape
+
+
+def _values(result: Any) -> tuple[list[Scalar], Shape]:
+    """Return what an equation returns as a list of scalars, and its shape."""
+    if isinstance(result, Traced | Real):
+        return [result], ()
+    if not isinstance(result, list | tuple) or not all(isinstance(x, Traced | Real) for x in result):
+        raise KindError(f"equation: expected it to return a scalar or a list of scalars, got {shown(result)}")
+    if not result:
+        raise ShapeError("equation: expected it to return at least one scalar, got none")
+    return list(result), (len(result),)

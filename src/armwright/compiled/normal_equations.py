@@ -1,0 +1,83 @@
+"""Normal equations of the parameters of the dynamics, added up over any number of samples."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import LARGEST, Array, ArrayLike, broadcast_rows, exact_shape, joint_array
+from armwright.compiled.arm import CompiledArm, compile_arm
+from armwright.errors import InvalidValueError
+
+# Samples whose regressors exist at a time: 2 MB of them for six joints.
+_BLOCK = 512
+
+
+class NormalEquations(NamedTuple):
+    """The normal equations A theta = b of least squares, whose parameters are those of ``dynamics.dynamic_parameters``.
+
+    Those of several measurements are added.
+
+    Attributes:
+        A: (14 n, 14 n) sum of Yᵀ W Y, symmetric. It is singular: not all parameters can be told apart.
+        b: (14 n,) sum of Yᵀ W tau.
+    """
+
+    A: Array
+    b: Array
+
+
+def normal_equations(
+    arm: Arm | CompiledArm,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    tau: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+) -> NormalEquations:
+    """Return the normal equations of measured motions, for the parameters of the dynamics.
+
+    The regressors of all samples never exist together: beside what is given, memory does not grow with their number.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint velocities.
+        qdd: (..., n) joint accelerations.
+        tau: (..., n) measured efforts [N m] or [N].
+        weights: (n,) weight of each joint, 0 or more: the inverse of the variance of its effort; all 1 when left out.
+
+    Returns:
+        Their matrix (14 n, 14 n) and right side (14 n,).
+
+    Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
+        ShapeError: a last axis is not n long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite, or a weight is below 0.
+        UnsupportedArmError: the mass of a link is unknown.
+
+    Source:
+        Khalil & Dombre (2002), section 12.4.
+    """
+    fast = arm if isinstance(arm, CompiledArm) else compile_arm(arm)
+    n = fast.arm.n
+    regressor = fast.regressor
+    W = np.ones(n) if weights is None else exact_shape(weights, (n,), "weights", LARGEST)
+    if (W < 0).any():
+        raise InvalidValueError(f"weights: expected numbers of 0 or more, got {W.tolist()}")
+    named = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
+    rows = broadcast_rows(", ".join(named), *(joint_array(x, n, name) for name, x in named.items()))
+    q_, qd_, qdd_, tau_ = (x.reshape(-1, n) for x in rows)
+    columns = 14 * n
+    A, b = np.zeros((columns, columns)), np.zeros(columns)
+    for first in range(0, len(q_), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        Y = regressor(q_[block], qd_[block], qdd_[block])
+        # Each joint's rows: Y has one block of them per sample.
+        weighted = (Y * W[:, None]).reshape(-1, columns)
+        A += weighted.T @ Y.reshape(-1, columns)
+        b += weighted.T @ tau_[block].reshape(-1)
+    return NormalEquations((A + A.T) / 2, b)

@@ -1,0 +1,8 @@
+from .scalar import (
+    atan2 as atan2,
+    cos as cos,
+    round_half_even as round_half_even,
+    select as select,
+    sin as sin,
+    sqrt as sqrt,
+)
