@@ -48,7 +48,7 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
     bounds = dict.fromkeys(_POSITIONS, admitted(arm).tolist())
     equation: Equation = partial(quantity.equation, arm)
-    return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags, bounds=bounds)
+    return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags, bounds=bounds, rolled_from=quantity.rolled_from)
 
 
 def quantity_kernel(arm: Arm, name: str) -> Kernel:
@@ -140,6 +140,7 @@ class _Quantity(NamedTuple):
         outputs: their shapes.
         flags: which outputs are truth values.
         plain: the plain function, which raises what belongs to inputs that break a condition; None without conditions.
+        rolled_from: the number of joints from which its loops over links are loops of the code; None if they never are.
     """
 
     equation: Callable[..., Rows | Guarded]
@@ -147,6 +148,7 @@ class _Quantity(NamedTuple):
     outputs: tuple[tuple[str | int, ...], ...]
     flags: tuple[int, ...] = ()
     plain: Callable[..., object] | None = None
+    rolled_from: int | None = None
 
 
 def _size(arm: Arm, letter: str | int) -> int:
@@ -166,7 +168,7 @@ _QUANTITIES = {
     "jacobian": _Quantity(_jacobian, _Q, ((6, "n"),)),
     "pose_and_jacobian": _Quantity(_pose_and_jacobian, _Q, ((4, 4), (6, "n"))),
     "inverse_branches": _Quantity(_inverse_branches, {"pose": (4, 4), "near": (6,)}, ((8, 6), (8,)), flags=(1,)),
-    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),)),
+    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),), rolled_from=20),
     "inverse_dynamics_with_wrench": _Quantity(_inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),)),
     "forward_dynamics": _Quantity(_forward_dynamics, {**_STATE, "tau": ("n",)}, (("n",),), plain=forward_dynamics),
     "mass_matrix": _Quantity(_mass_matrix, _Q, (("n", "n"),)),

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from armwright.arm.model import Arm, Joint, Link
 from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.tracing.scalar import Scalar, cos, sin
+from armwright.tracing.scan import scan
 from armwright.tracing.vectors import Matrix, Vector, add, apply, product, scale, transpose
 
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -90,18 +91,27 @@ def joint_steps(arm: Arm, q: Sequence[Scalar]) -> list[JointStep]:
         arm: the arm, with n joints.
         q: n joint positions.
     """
-    steps: list[JointStep] = []
+    at_rest: list[JointStep] = []
     fixed: Sequence[Sequence[float]] = _IDENTITY
     lever: Vector = [0.0, 0.0, 0.0]
-    for joint, position in zip(arm.joints, q, strict=True):
-        if joint.revolute:
-            angle = joint.theta + position
-            steps.append(JointStep(fixed, cos(angle), sin(angle), lever))
-        else:
-            along = scale(joint.d + position, [row[2] for row in fixed])
-            steps.append(JointStep(fixed, exact_cosine(joint.theta), exact_sine(joint.theta), add(lever, along)))
+    for joint in arm.joints:
+        at_rest.append(JointStep(fixed, exact_cosine(joint.theta), exact_sine(joint.theta), lever))
         fixed, lever = joint.behind[:3, :3].tolist(), lever_behind(joint)
-    return steps
+    offsets = [joint.theta if joint.revolute else joint.d for joint in arm.joints]
+    return scan(_moved, (), at_rest, kinds(arm), offsets, q)[1]
+
+
+def _moved(_: tuple[()], step: JointStep, revolute: bool, offset: float, position: Scalar) -> tuple[tuple[()], JointStep]:
+    """Return the step to a joint that has moved."""
+    value = offset + position
+    if revolute:
+        return (), step._replace(cosine=cos(value), sine=sin(value))
+    return (), step._replace(lever=add(step.lever, scale(value, [row[2] for row in step.fixed])))
+
+
+def kinds(arm: Arm) -> list[bool]:
+    """Return which joints rotate."""
+    return [joint.revolute for joint in arm.joints]
 
 
 def at_previous_joint(body: JointBody, step: JointStep) -> JointBody:

@@ -9,9 +9,10 @@ import numpy as np
 from armwright.arm.model import Arm, Motor
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
-from armwright.dynamics.joint_frames import JointBody, joint_body, joint_steps, lever_behind
+from armwright.dynamics.joint_frames import JointBody, JointStep, joint_body, joint_steps, kinds, lever_behind
 from armwright.kinematics.forward_kinematics import link_frames, stack
 from armwright.tracing.scalar import Scalar, select
+from armwright.tracing.scan import scan
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
 
 _STILL = (0.0, 0.0, 0.0)
@@ -84,31 +85,50 @@ def _wrenches(
         Luh, Walker & Paul (1980), about joint points instead of centres of mass, in the axes behind the rotation of a
         joint and before its twist, in which a link is constant: Khalil & Kleinfinger (1987).
     """
-    w: Vector = [0.0, 0.0, 0.0]
-    w_dot: Vector = [0.0, 0.0, 0.0]
-    v_dot = base_frame_acceleration(arm, base_acceleration)
-    U: Matrix = [[0.0, 0.0, 0.0] for _ in range(3)]
-    steps = joint_steps(arm, q)
-    links: list[tuple[Vector, Vector]] = []
-    for joint, link, step, speed, acceleration in zip(arm.joints, arm.links, steps, qd, qdd, strict=True):
-        v_dot = step.inward_axes(add(v_dot, apply(U, step.lever)))
-        w, w_dot = step.inward_axes(w), step.inward_axes(w_dot)
-        if joint.revolute:
-            w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
-            w = [w[0], w[1], w[2] + speed]
-        else:
-            twice = speed + speed
-            v_dot = add(v_dot, [w[1] * twice, -(w[0] * twice), acceleration])
-        U = _point_accelerations(w, w_dot)
-        links.append(_link_wrench(joint_body(joint, link), U, v_dot))
-    f, n = tool_wrench(arm, q, wrench)
-    wrenches: list[tuple[Vector, Vector]] = []
-    for step, (force, moment) in zip(reversed(steps), reversed(links), strict=True):
-        f, n = add(f, force), add(n, moment)
-        wrenches.append((f, n))
-        f, n = step.outward_axes(f), step.outward_axes(n)
-        n = add(n, cross(step.lever, f))
-    return wrenches[::-1]
+    still = [0.0, 0.0, 0.0]
+    U: Matrix = [list(still) for _ in range(3)]
+    steps, revolute = joint_steps(arm, q), kinds(arm)
+    bodies = [joint_body(joint, link) for joint, link in zip(arm.joints, arm.links, strict=True)]
+    base = _Motion(still, still, base_frame_acceleration(arm, base_acceleration), U)
+    _, links = scan(_outward, base, steps, revolute, bodies, qd, qdd)
+    return scan(_inward, tool_wrench(arm, q, wrench), steps, links, reverse=True)[1]
+
+
+class _Motion(NamedTuple):
+    """The motion of a link at its joint point, along the axes of the joint; v_dot with gravity as its opposite.
+
+    U: a point of the link at r from there has the acceleration v_dot + U r.
+    """
+
+    w: Vector
+    w_dot: Vector
+    v_dot: Vector
+    U: Matrix
+
+
+def _outward(
+    motion: _Motion, step: JointStep, revolute: bool, body: JointBody, speed: Scalar, acceleration: Scalar
+) -> tuple[_Motion, tuple[Vector, Vector]]:
+    """Return the motion of a link, from that of the link before, and the force and moment that accelerate it."""
+    v_dot = step.inward_axes(add(motion.v_dot, apply(motion.U, step.lever)))
+    w, w_dot = step.inward_axes(motion.w), step.inward_axes(motion.w_dot)
+    if revolute:
+        w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
+        w = [w[0], w[1], w[2] + speed]
+    else:
+        twice = speed + speed
+        v_dot = add(v_dot, [w[1] * twice, -(w[0] * twice), acceleration])
+    U = _point_accelerations(w, w_dot)
+    return _Motion(w, w_dot, v_dot, U), _link_wrench(body, U, v_dot)
+
+
+def _inward(
+    beyond: tuple[Vector, Vector], step: JointStep, link: tuple[Vector, Vector]
+) -> tuple[tuple[Vector, Vector], tuple[Vector, Vector]]:
+    """Return force and moment at the joint before a link and at its own, from those of the link beyond."""
+    f, n = (add(x, own) for x, own in zip(beyond, link, strict=True))
+    force, moment = step.outward_axes(f), step.outward_axes(n)
+    return (force, add(moment, cross(step.lever, force))), (f, n)
 
 
 def _point_accelerations(w: Vector, w_dot: Vector) -> Matrix:
