@@ -9,11 +9,12 @@ from typing import NamedTuple
 from armwright.arm.model import Arm
 from armwright.arm.positions import admitted, ask_for_degrees
 from armwright.arrays import Array
-from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics, less_friction
+from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics
 from armwright.dynamics.arguments import weighed
 from armwright.dynamics.articulated_body import articulated_body
+from armwright.dynamics.drives import less_friction, with_drives
 from armwright.dynamics.inertia_matrix import composite_rigid_body
-from armwright.dynamics.newton_euler import drive_effort, newton_euler
+from armwright.dynamics.newton_euler import newton_euler
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward_kinematics import link_frames, tool_frame
 from armwright.kinematics.inverse_kinematics.branches import branches, merged
@@ -48,7 +49,15 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
     bounds = dict.fromkeys(_POSITIONS, admitted(arm).tolist())
     equation: Equation = partial(quantity.equation, arm)
-    return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags, bounds=bounds, rolled_from=quantity.rolled_from)
+    return emit(
+        f"{name} of {arm.name}",
+        equation,
+        inputs,
+        shapes=outputs,
+        flags=quantity.flags,
+        bounds=bounds,
+        rolled_from=quantity.rolled_from,
+    )
 
 
 def quantity_kernel(arm: Arm, name: str) -> Kernel:
@@ -105,9 +114,7 @@ def _inverse_branches(arm: Arm, X_BT: Numbers, near: Numbers) -> Rows:
 
 
 def _inverse_dynamics(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers, *wrench: Numbers) -> Rows:
-    efforts = newton_euler(arm, q, qd, qdd, *wrench)
-    drives = (drive_effort(*of_joint) for of_joint in zip(arm.motors, qd, qdd, strict=True))
-    return [[effort + drive for effort, drive in zip(efforts, drives, strict=True)]]
+    return [with_drives(arm, newton_euler(arm, q, qd, qdd, *wrench), qd, qdd)]
 
 
 def _forward_dynamics(arm: Arm, q: Numbers, qd: Numbers, tau: Numbers) -> Guarded:

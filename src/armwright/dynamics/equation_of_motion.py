@@ -14,7 +14,8 @@ from armwright.dynamics.lagrange_euler import (
     pose_derivatives,
     speed_coefficients,
 )
-from armwright.dynamics.newton_euler import dry_friction, newton_euler
+from armwright.dynamics.drives import dry_friction
+from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.payloads import payload
 from armwright.errors import KindError, shown
 from armwright.kinematics.forward_kinematics import stack

@@ -101,7 +101,9 @@ def joint_steps(arm: Arm, q: Sequence[Scalar]) -> list[JointStep]:
     return scan(_moved, (), at_rest, kinds(arm), offsets, q)[1]
 
 
-def _moved(_: tuple[()], step: JointStep, revolute: bool, offset: float, position: Scalar) -> tuple[tuple[()], JointStep]:
+def _moved(
+    _: tuple[()], step: JointStep, revolute: bool, offset: float, position: Scalar
+) -> tuple[tuple[()], JointStep]:
     """Return the step to a joint that has moved."""
     value = offset + position
     if revolute:

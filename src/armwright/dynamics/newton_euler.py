@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armwright.arm.model import Arm, Motor
+from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
+from armwright.dynamics.drives import with_drives
 from armwright.dynamics.joint_frames import JointBody, JointStep, joint_body, joint_steps, kinds, lever_behind
 from armwright.kinematics.forward_kinematics import link_frames, stack
-from armwright.tracing.scalar import Scalar, select
+from armwright.tracing.scalar import Scalar
 from armwright.tracing.scan import scan
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
 
@@ -25,8 +26,8 @@ def newton_euler(
 
     Arguments and sources are those of ``joint_wrenches``. The efforts are the components along or about each joint.
     """
-    wrenches = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
-    return [(n if joint.revolute else f)[2] for joint, (f, n) in zip(arm.joints, wrenches, strict=True)]
+    joints = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
+    return [effort for _, _, effort in joints]
 
 
 class JointWrench(NamedTuple):
@@ -63,7 +64,7 @@ def joint_wrenches(
     """
     wrenches = []
     found = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
-    for joint, position, (f, n) in zip(arm.joints, q, found, strict=True):
+    for joint, position, (f, n, _) in zip(arm.joints, q, found, strict=True):
         about = n if joint.revolute else add(n, cross([0.0, 0.0, joint.d + position], f))
         to_frame = transpose(joint.behind[:3, :3].tolist())
         wrenches.append(JointWrench(apply(to_frame, f), apply(to_frame, about), [row[2] for row in to_frame]))
@@ -72,8 +73,8 @@ def joint_wrenches(
 
 def _wrenches(
     arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars, *, base_acceleration: Scalars
-) -> list[tuple[Vector, Vector]]:
-    """Return force and moment of each link on the next, about the point and along the axes of its joint.
+) -> list[tuple[Vector, Vector, Scalar]]:
+    """Return force and moment of each link on the next, about the point and along the axes of its joint, and its effort.
 
     Outward, from the base: angular velocity, angular acceleration and acceleration of each joint point, in the axes
     that rotate with the joint, of which z is its own. Gravity enters as an opposite acceleration of the base. Inward,
@@ -91,7 +92,7 @@ def _wrenches(
     bodies = [joint_body(joint, link) for joint, link in zip(arm.joints, arm.links, strict=True)]
     base = _Motion(still, still, base_frame_acceleration(arm, base_acceleration), U)
     _, links = scan(_outward, base, steps, revolute, bodies, qd, qdd)
-    return scan(_inward, tool_wrench(arm, q, wrench), steps, links, reverse=True)[1]
+    return scan(_inward, tool_wrench(arm, q, wrench), steps, revolute, links, reverse=True)[1]
 
 
 class _Motion(NamedTuple):
@@ -123,12 +124,12 @@ def _outward(
 
 
 def _inward(
-    beyond: tuple[Vector, Vector], step: JointStep, link: tuple[Vector, Vector]
-) -> tuple[tuple[Vector, Vector], tuple[Vector, Vector]]:
-    """Return force and moment at the joint before a link and at its own, from those of the link beyond."""
+    beyond: tuple[Vector, Vector], step: JointStep, revolute: bool, link: tuple[Vector, Vector]
+) -> tuple[tuple[Vector, Vector], tuple[Vector, Vector, Scalar]]:
+    """Return force and moment at the joint before a link, and at its own with its effort, from those beyond."""
     f, n = (add(x, own) for x, own in zip(beyond, link, strict=True))
     force, moment = step.outward_axes(f), step.outward_axes(n)
-    return (force, add(moment, cross(step.lever, force))), (f, n)
+    return (force, add(moment, cross(step.lever, force))), (f, n, (n if revolute else f)[2])
 
 
 def _point_accelerations(w: Vector, w_dot: Vector) -> Matrix:
@@ -187,16 +188,6 @@ def tool_reaction(arm: Arm, q: Scalars, wrench: Scalars) -> tuple[Vector, Vector
     return f, n
 
 
-def drive_effort(motor: Motor, qd: Scalar, qdd: Scalar) -> Scalar:
-    """Return the effort of the drive itself: rotor inertia, viscous and dry friction, over abstract scalars."""
-    return motor.inertia * qdd + motor.viscous * qd + dry_friction(motor, qd)
-
-
-def dry_friction(motor: Motor, qd: Scalar) -> Scalar:
-    """Return the Coulomb friction of a moving joint, 0 at rest, over abstract scalars."""
-    return select(qd > 0, motor.coulomb_forward, select(qd < 0, -motor.coulomb_backward, 0.0))
-
-
 def coulomb_friction(arm: Arm, qd: Array) -> Array:
     """Return the Coulomb friction of joints (..., n) that move as ``qd`` does, 0 at rest."""
     forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
@@ -240,10 +231,7 @@ def inverse_dynamics(
     moved = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
     efforts = newton_euler(arm, q_, qd_, qdd_, push, base_acceleration=moved)
     if drives:
-        efforts = [
-            effort + drive_effort(motor, speed, acceleration)
-            for effort, motor, speed, acceleration in zip(efforts, arm.motors, qd_, qdd_, strict=True)
-        ]
+        efforts = with_drives(arm, efforts, qd_, qdd_)
     return stack(efforts, lead)
 
 

@@ -204,7 +204,8 @@ class _Text:
         self.do(f"{link} = phi i64 [{first}, %{before}], [{link}_next, %{name}_end]")
         for x, begin in zip(state, start, strict=True):
             self.do(f"{x} = phi {self.number} [{begin}, %{before}], [{x}_next, %{name}_end]")
-        self._fetch_ahead(link, n)
+        if self.ahead:
+            self.fetch_ahead(link, n)
         row = self.let(f"mul i64 {link}, {width}")
         labels = [f"{name}_kind{kind}" for kind in kinds]
         kind = self.let(f"load i8, ptr {self.address(kind_of, link, 'i8')}, align 1")
@@ -239,19 +240,18 @@ class _Text:
         self.do(f"{name}_left:")
         return _Left([f"{x}_next" for x in state], each)
 
-    def _fetch_ahead(self, link: str, links: int) -> None:
-        """Ask, link by link, for the memory that is still to be asked for."""
+    def fetch_ahead(self, link: str = "0", links: int = 1) -> None:
+        """Ask for the memory of the next block while this one is worked on: a part of it at each link."""
+        self.intrinsics.add("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
         for ahead in self.ahead:
             lines = -(-ahead.size // (_LINE * links))
-            start = self.address(ahead.start, self.let(f"mul i64 {link}, {lines * _LINE}"), "i8")
+            start = ahead.start
+            if links > 1:
+                start = self.address(start, self.let(f"mul i64 {link}, {lines * _LINE}"), "i8")
             for line in range(lines):
-                self.fetch(self.address(start, line * _LINE, "i8"), is_written=ahead.is_written)
+                address = self.address(start, line * _LINE, "i8")
+                self.do(f"call void @llvm.prefetch.p0(ptr {address}, i32 {int(ahead.is_written)}, i32 3, i32 1)")
         self.ahead.clear()
-
-    def fetch(self, address: str, *, is_written: bool) -> None:
-        """Ask for a line of memory."""
-        self.intrinsics.add("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
-        self.do(f"call void @llvm.prefetch.p0(ptr {address}, i32 {int(is_written)}, i32 3, i32 1)")
 
     def _operation(self, node: Node, x: Sequence[str]) -> str:
         if node.op == "fma" and not self.has_fma:
@@ -353,7 +353,7 @@ class _Text:
 
 
 class _Ahead(NamedTuple):
-    """Memory to ask for before it is needed: its address, its size [bytes], and what for."""
+    """Memory to ask for before it is needed: its address, its size [bytes], and whether it will be written."""
 
     start: str
     size: int
@@ -500,7 +500,12 @@ def rows_ir(code: MachineCode, inputs: Sequence[Column], outputs: Sequence[Colum
     _copy_last_rows(text, inputs, here, spare)
     text.do("work:")
     places = [text.let(f"phi ptr [{a}, %block], [{b}, %copy]") for a, b in zip(here, spare, strict=True)]
-    _fetch_next_block(text, inputs, outputs, here)
+    text.ahead = [
+        _Ahead(text.address(start, lanes * one.size, "i8"), lanes * one.size, i >= len(inputs))
+        for i, (start, one) in enumerate(zip(here, arrays, strict=True))
+    ]
+    if not code.graph.loops:
+        text.fetch_ahead()
     bad, odd = _body(text, code, inputs, outputs, places)
     text.do(f"%bad_now = or {truth} %bad, {bad}")
     text.do(f"%odd_now = or {truth} %odd, {odd}")
@@ -534,14 +539,6 @@ def _copy_last_rows(text: _Text, inputs: Sequence[Column], here: Sequence[str], 
     text.do("%k_next = add i64 %k, 1")
     text.do(f"%k_done = icmp eq i64 %k_next, {text.lanes}")
     text.do("br i1 %k_done, label %work, label %copy")
-
-
-def _fetch_next_block(text: _Text, inputs: Sequence[Column], outputs: Sequence[Column], here: Sequence[str]) -> None:
-    """Ask for the memory of the next block while this one is worked on."""
-    for i, (place, one) in enumerate(zip(here, [*inputs, *outputs], strict=True)):
-        block = text.lanes * one.size
-        for line in range(0, block, _LINE):
-            text.fetch(text.address(place, block + line, "i8"), is_written=i >= len(inputs))
 
 
 def lanes_ir(code: MachineCode, inputs: int, count: int, target: Target) -> str:

@@ -120,7 +120,9 @@ class _Rolled:
         stored = [list(dict.fromkeys(r for r in one.results if self._is_computed(one, r, carried))) for one in steps]
         outputs = max(map(len, stored))
         # A kind with fewer results than another has anything in their place.
-        filled = [[*of, *[one.graph.constant(0.0)] * (outputs - len(of))] for one, of in zip(steps, stored, strict=True)]
+        filled = [
+            [*of, *[one.graph.constant(0.0)] * (outputs - len(of))] for one, of in zip(steps, stored, strict=True)
+        ]
         constants = [list(table) for table in self.tables]
         rows: list[tuple[float, ...]] = [()] * self.count
         kind_of = [0] * self.count
@@ -227,7 +229,9 @@ class _Rolled:
         new, results = self.step(
             _replaced(self.state, iter([state[p] for p in places])), *_replaced(kind.tree, iter(numbers))
         )
-        nodes = [[x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in _numbers(t)] for t in (new, results)]
+        nodes = [
+            [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in _numbers(t)] for t in (new, results)
+        ]
         return _TracedStep(graph, *nodes, results)
 
     @staticmethod
