@@ -74,6 +74,7 @@ class _Text:
         self.lines: list[str] = []
         self.intrinsics: set[str] = set()
         self.ahead: list[_Ahead] = []
+        self.ahead_in: Loop | None = None
         self._count = 0
         self._block = ""
         self._tables: list[str] = []
@@ -204,7 +205,7 @@ class _Text:
         self.do(f"{link} = phi i64 [{first}, %{before}], [{link}_next, %{name}_end]")
         for x, begin in zip(state, start, strict=True):
             self.do(f"{x} = phi {self.number} [{begin}, %{before}], [{x}_next, %{name}_end]")
-        if self.ahead:
+        if loop is self.ahead_in:
             self.fetch_ahead(link, n)
         row = self.let(f"mul i64 {link}, {width}")
         labels = [f"{name}_kind{kind}" for kind in kinds]
@@ -251,7 +252,6 @@ class _Text:
             for line in range(lines):
                 address = self.address(start, line * _LINE, "i8")
                 self.do(f"call void @llvm.prefetch.p0(ptr {address}, i32 {int(ahead.is_written)}, i32 3, i32 1)")
-        self.ahead.clear()
 
     def _operation(self, node: Node, x: Sequence[str]) -> str:
         if node.op == "fma" and not self.has_fma:
@@ -504,7 +504,10 @@ def rows_ir(code: MachineCode, inputs: Sequence[Column], outputs: Sequence[Colum
         _Ahead(text.address(start, lanes * one.size, "i8"), lanes * one.size, i >= len(inputs))
         for i, (start, one) in enumerate(zip(here, arrays, strict=True))
     ]
-    if not code.graph.loops:
+    if code.graph.loops:
+        # The longest loop has the most time for it.
+        text.ahead_in = max(code.graph.loops, key=lambda loop: sum(len(step.graph.nodes) for step in loop.steps))
+    else:
         text.fetch_ahead()
     bad, odd = _body(text, code, inputs, outputs, places)
     text.do(f"%bad_now = or {truth} %bad, {bad}")
