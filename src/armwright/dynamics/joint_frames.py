@@ -56,12 +56,14 @@ class JointStep(NamedTuple):
     """The step from the joint before to a joint.
 
     Attributes:
+        revolute: whether the joint rotates.
         fixed: (3, 3) constant rotation of the axes of the joint, before it moves, along those of the joint before.
         cosine: of the angle of the joint.
         sine: of it.
         lever: from joint point to joint point, along the axes of the joint before.
     """
 
+    revolute: bool
     fixed: Sequence[Sequence[float]]
     cosine: Scalar
     sine: Scalar
@@ -95,25 +97,19 @@ def joint_steps(arm: Arm, q: Sequence[Scalar]) -> list[JointStep]:
     fixed: Sequence[Sequence[float]] = _IDENTITY
     lever: Vector = [0.0, 0.0, 0.0]
     for joint in arm.joints:
-        at_rest.append(JointStep(fixed, exact_cosine(joint.theta), exact_sine(joint.theta), lever))
+        cosine, sine = exact_cosine(joint.theta), exact_sine(joint.theta)
+        at_rest.append(JointStep(joint.revolute, fixed, cosine, sine, lever))
         fixed, lever = joint.behind[:3, :3].tolist(), lever_behind(joint)
     offsets = [joint.theta if joint.revolute else joint.d for joint in arm.joints]
-    return scan(_moved, (), at_rest, kinds(arm), offsets, q)[1]
+    return scan(_moved, (), at_rest, offsets, q)[1]
 
 
-def _moved(
-    _: tuple[()], step: JointStep, revolute: bool, offset: float, position: Scalar
-) -> tuple[tuple[()], JointStep]:
+def _moved(_: tuple[()], step: JointStep, offset: float, position: Scalar) -> tuple[tuple[()], JointStep]:
     """Return the step to a joint that has moved."""
     value = offset + position
-    if revolute:
+    if step.revolute:
         return (), step._replace(cosine=cos(value), sine=sin(value))
     return (), step._replace(lever=add(step.lever, scale(value, [row[2] for row in step.fixed])))
-
-
-def kinds(arm: Arm) -> list[bool]:
-    """Return which joints rotate."""
-    return [joint.revolute for joint in arm.joints]
 
 
 def at_previous_joint(body: JointBody, step: JointStep) -> JointBody:

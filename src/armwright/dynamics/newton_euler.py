@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +11,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
 from armwright.dynamics.drives import with_drives
-from armwright.dynamics.joint_frames import JointBody, JointStep, joint_body, joint_steps, kinds, lever_behind
-from armwright.kinematics.forward_kinematics import link_frames, stack
+from armwright.dynamics.joint_frames import JointBody, JointStep, joint_body, joint_steps, lever_behind
+from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.scan import scan
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
@@ -74,7 +75,7 @@ def joint_wrenches(
 def _wrenches(
     arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars, *, base_acceleration: Scalars
 ) -> list[tuple[Vector, Vector, Scalar]]:
-    """Return force and moment of each link on the next, about the point and along the axes of its joint, and its effort.
+    """Return force, moment and effort of each joint; about its point and along its axes, of a link on the next.
 
     Outward, from the base: angular velocity, angular acceleration and acceleration of each joint point, in the axes
     that rotate with the joint, of which z is its own. Gravity enters as an opposite acceleration of the base. Inward,
@@ -88,11 +89,11 @@ def _wrenches(
     """
     still = [0.0, 0.0, 0.0]
     U: Matrix = [list(still) for _ in range(3)]
-    steps, revolute = joint_steps(arm, q), kinds(arm)
+    steps = joint_steps(arm, q)
     bodies = [joint_body(joint, link) for joint, link in zip(arm.joints, arm.links, strict=True)]
     base = _Motion(still, still, base_frame_acceleration(arm, base_acceleration), U)
-    _, links = scan(_outward, base, steps, revolute, bodies, qd, qdd)
-    return scan(_inward, tool_wrench(arm, q, wrench), steps, revolute, links, reverse=True)[1]
+    _, links = scan(_outward, base, steps, bodies, qd, qdd)
+    return scan(_inward, tool_wrench(arm, steps, wrench), steps, links, reverse=True)[1]
 
 
 class _Motion(NamedTuple):
@@ -108,12 +109,12 @@ class _Motion(NamedTuple):
 
 
 def _outward(
-    motion: _Motion, step: JointStep, revolute: bool, body: JointBody, speed: Scalar, acceleration: Scalar
+    motion: _Motion, step: JointStep, body: JointBody, speed: Scalar, acceleration: Scalar
 ) -> tuple[_Motion, tuple[Vector, Vector]]:
     """Return the motion of a link, from that of the link before, and the force and moment that accelerate it."""
     v_dot = step.inward_axes(add(motion.v_dot, apply(motion.U, step.lever)))
     w, w_dot = step.inward_axes(motion.w), step.inward_axes(motion.w_dot)
-    if revolute:
+    if step.revolute:
         w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
         w = [w[0], w[1], w[2] + speed]
     else:
@@ -124,12 +125,12 @@ def _outward(
 
 
 def _inward(
-    beyond: tuple[Vector, Vector], step: JointStep, revolute: bool, link: tuple[Vector, Vector]
+    beyond: tuple[Vector, Vector], step: JointStep, link: tuple[Vector, Vector]
 ) -> tuple[tuple[Vector, Vector], tuple[Vector, Vector, Scalar]]:
     """Return force and moment at the joint before a link, and at its own with its effort, from those beyond."""
     f, n = (add(x, own) for x, own in zip(beyond, link, strict=True))
     force, moment = step.outward_axes(f), step.outward_axes(n)
-    return (force, add(moment, cross(step.lever, force))), (f, n, (n if revolute else f)[2])
+    return (force, add(moment, cross(step.lever, force))), (f, n, (n if step.revolute else f)[2])
 
 
 def _point_accelerations(w: Vector, w_dot: Vector) -> Matrix:
@@ -159,33 +160,28 @@ def base_frame_acceleration(arm: Arm, base_acceleration: Scalars = _STILL) -> Ve
     return apply(arm.base[:3, :3].T.tolist(), subtract(base_acceleration, arm.gravity.tolist()))
 
 
-def tool_wrench(arm: Arm, q: Scalars, wrench: Scalars) -> tuple[Vector, Vector]:
-    """Return force and moment of the last link on the surroundings, about the point and along the axes of its joint."""
-    f, n = tool_reaction(arm, q, wrench)
-    if wrench is NO_WRENCH:
-        return f, n
-    joint = arm.joints[-1]
-    R = joint.behind[:3, :3].tolist()
-    f, n = apply(R, f), apply(R, n)
-    return f, add(n, cross(lever_behind(joint), f))
-
-
-def tool_reaction(arm: Arm, q: Scalars, wrench: Scalars) -> tuple[Vector, Vector]:
-    """Return force and moment of the last link on the surroundings, at its origin, in its frame.
+def tool_wrench(arm: Arm, steps: Sequence[JointStep], wrench: Scalars) -> tuple[Vector, Vector]:
+    """Return force and moment of the last link on the surroundings, about the point and along the axes of its joint.
 
     Args:
         arm: the arm, with n joints.
-        q: n joint positions.
+        steps: from joint to joint.
         wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
     """
     if wrench is NO_WRENCH:
         return [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-    R, _ = link_frames(arm, q)[-1]
-    Rt = transpose(R)
-    force, moment = apply(Rt, wrench[:3]), apply(Rt, wrench[3:])
+    to_base = transpose(arm.base[:3, :3].tolist())
+    outside = apply(to_base, wrench[:3]), apply(to_base, wrench[3:])
+    (force, moment), _ = scan(_along_next_axes, outside, steps)
+    joint = arm.joints[-1]
+    lever = add(lever_behind(joint), (joint.behind[:3, :3] @ arm.tool[:3, 3]).tolist())
     f = subtract([0.0, 0.0, 0.0], force)
-    n = subtract(cross(arm.tool[:3, 3].tolist(), f), moment)
-    return f, n
+    return f, subtract(cross(lever, f), moment)
+
+
+def _along_next_axes(vectors: tuple[Vector, Vector], step: JointStep) -> tuple[tuple[Vector, Vector], tuple[()]]:
+    a, b = vectors
+    return (step.inward_axes(a), step.inward_axes(b)), ()
 
 
 def coulomb_friction(arm: Arm, qd: Array) -> Array:
