@@ -175,12 +175,12 @@ _QUANTITIES = {
     "jacobian": _Quantity(_jacobian, _Q, ((6, "n"),)),
     "pose_and_jacobian": _Quantity(_pose_and_jacobian, _Q, ((4, 4), (6, "n"))),
     "inverse_branches": _Quantity(_inverse_branches, {"pose": (4, 4), "near": (6,)}, ((8, 6), (8,)), flags=(1,)),
-    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),), rolled_from=12),
+    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),), rolled_from=11),
     "inverse_dynamics_with_wrench": _Quantity(
-        _inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),), rolled_from=12
+        _inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),), rolled_from=11
     ),
     "forward_dynamics": _Quantity(
-        _forward_dynamics, {**_STATE, "tau": ("n",)}, (("n",),), plain=forward_dynamics, rolled_from=12
+        _forward_dynamics, {**_STATE, "tau": ("n",)}, (("n",),), plain=forward_dynamics, rolled_from=18
     ),
     "mass_matrix": _Quantity(_mass_matrix, _Q, (("n", "n"),)),
     "mass_and_bias": _Quantity(_mass_and_bias, _STATE, (("n", "n"), ("n",))),

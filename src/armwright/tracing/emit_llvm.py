@@ -281,25 +281,26 @@ class _Text:
             rows = [self._load_row(pointer, r, start, width) for r in range(self.lanes)]
             yield from ((start + k, x) for k, x in enumerate(self._transposed(rows)) if start + k < width)
 
-    def store_columns(self, pointer: str, width: int, column: Callable[[int], str]) -> None:
+    def store_columns(self, pointer: str, values: "_Values", columns: Sequence[int]) -> None:
         """Write columns, each a vector, as a block of rows."""
+        width = len(columns)
         if self.lanes == 1 or width == 1:
-            for i in range(width):
-                self.do(f"store {self.number} {column(i)}, ptr {self.address(pointer, i)}, align 8")
+            for i, node in enumerate(columns):
+                self.do(f"store {self.number} {values[node]}, ptr {self.address(pointer, i)}, align 8")
             return
         for start in _windows(width, self.lanes):
-            block = [column(start + k) if start + k < width else "poison" for k in range(self.lanes)]
+            block = [values[columns[start + k]] if start + k < width else "poison" for k in range(self.lanes)]
             # A row of fewer numbers than a vector begins where the one before it ends too far: it is written behind it.
             for r, row in enumerate(self._transposed(block)):
                 self._store_row(pointer, r, start, width, row)
 
-    def store_flags(self, pointer: str, width: int, column: Callable[[int], str]) -> None:
+    def store_flags(self, pointer: str, values: "_Values", columns: Sequence[int]) -> None:
         """Write columns of truth values as a block of rows of bytes."""
-        for i in range(width):
-            x = column(i)
+        for i, node in enumerate(columns):
+            x = values[node]
             for r in range(self.lanes):
                 one = x if self.lanes == 1 else self.let(f"extractelement {self.of('i1')} {x}, i32 {r}")
-                place = self.address(pointer, r * width + i, "i8")
+                place = self.address(pointer, r * len(columns) + i, "i8")
                 self.do(f"store i8 {self.let(f'zext i1 {one} to i8')}, ptr {place}, align 1")
 
     def _load_row(self, pointer: str, r: int, start: int, width: int) -> str:
@@ -596,9 +597,8 @@ def _body(
     text.graph(code.graph, code.order, values)
     first = 0
     for place, one in zip(written, outputs, strict=True):
-        nodes = code.outputs[first : first + one.width]
         write = text.store_flags if one.flag else text.store_columns
-        write(place, one.width, lambda i, nodes=nodes: values[nodes[i]])
+        write(place, values, code.outputs[first : first + one.width])
         first += one.width
     return tuple(text.never if x is None else values[x] for x in (code.invalid, code.unusual))  # type: ignore[return-value]
 

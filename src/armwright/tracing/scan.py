@@ -113,7 +113,7 @@ class _Rolled:
 
     def result(self) -> tuple[Tree, list[Tree]]:
         """Leave the loop in the graph; return what ``scan`` does."""
-        start = [self._node(x) for x in _numbers(self.state)]
+        start = _nodes(self.graph, self.state)
         places, steps = self._traced_steps(start)
         carried = max(places, default=-1) + 1
         inputs = carried + len(self.sequences)
@@ -147,7 +147,7 @@ class _Rolled:
         sequences = list(self.sequences.values())
         for one, kind, store, table in zip(steps, self.kinds, stored, constants, strict=True):
             for j, i in enumerate(kind.numbers):
-                values = []
+                values: list[Any] = []
                 for r in one.results:
                     op, _, value = one.graph.nodes[r]
                     if r in store:
@@ -229,10 +229,7 @@ class _Rolled:
         new, results = self.step(
             _replaced(self.state, iter([state[p] for p in places])), *_replaced(kind.tree, iter(numbers))
         )
-        nodes = [
-            [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in _numbers(t)] for t in (new, results)
-        ]
-        return _TracedStep(graph, *nodes, results)
+        return _TracedStep(graph, _nodes(graph, new), _nodes(graph, results), results)
 
     @staticmethod
     def _is_computed(step: _TracedStep, result: int, carried: int) -> bool:
@@ -240,11 +237,13 @@ class _Rolled:
         op, _, value = step.graph.nodes[result]
         return not (op == "constant" or (op == "input" and value >= carried))
 
-    def _node(self, x: Any) -> int:
-        return x.node if isinstance(x, Traced) else self.graph.constant(float(x))
-
     def _of_loop(self, op: str, loop: int, value: int) -> Traced:
         return Traced(self.graph, self.graph.record(Node(op, (loop,), float(value))))
+
+
+def _nodes(graph: Graph, tree: Tree) -> list[int]:
+    """Return the nodes of the numbers of a tree."""
+    return [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in _numbers(tree)]
 
 
 def _numbered(values: Iterable[Hashable]) -> list[int]:
