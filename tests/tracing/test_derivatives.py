@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.model import Motor
-from armwright.dynamics.newton_euler import dry_friction
+from armwright.dynamics.drives import dry_friction
 from armwright.tracing.derivatives import forward_mode, jacobian, replaced, reverse_mode
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph, Traced, operation_count

@@ -9,13 +9,14 @@ from typing import NamedTuple
 from armwright.arm.model import Arm
 from armwright.arm.positions import admitted, ask_for_degrees
 from armwright.arrays import Array
-from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics, less_friction
+from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics
 from armwright.dynamics.arguments import weighed
 from armwright.dynamics.articulated_body import articulated_body
 from armwright.dynamics.derivatives import acceleration_partials, effort_partials, forward_dynamics_derivatives
+from armwright.dynamics.drives import less_friction, with_drives
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy, rotor_energy
 from armwright.dynamics.inertia_matrix import composite_rigid_body
-from armwright.dynamics.newton_euler import drive_effort, newton_euler
+from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.regressors import OF_DRIVE, OF_LINK, effort_regressor
 from armwright.dynamics.shares import gravity_shares, speed_shares
 from armwright.errors import UnknownNameError
@@ -54,7 +55,15 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
     bounds = dict.fromkeys(_POSITIONS, admitted(arm).tolist())
     equation: Equation = partial(quantity.equation, arm)
-    return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags, bounds=bounds)
+    return emit(
+        f"{name} of {arm.name}",
+        equation,
+        inputs,
+        shapes=outputs,
+        flags=quantity.flags,
+        bounds=bounds,
+        rolled_from=quantity.rolled_from,
+    )
 
 
 def quantity_kernel(arm: Arm, name: str) -> Kernel:
@@ -116,9 +125,7 @@ def _inverse_branches(arm: Arm, X_BT: Numbers, near: Numbers) -> Rows:
 
 
 def _inverse_dynamics(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers, *wrench: Numbers) -> Rows:
-    efforts = newton_euler(arm, q, qd, qdd, *wrench)
-    drives = (drive_effort(*of_joint) for of_joint in zip(arm.motors, qd, qdd, strict=True))
-    return [[effort + drive for effort, drive in zip(efforts, drives, strict=True)]]
+    return [with_drives(arm, newton_euler(arm, q, qd, qdd, *wrench), qd, qdd)]
 
 
 def _forward_dynamics(arm: Arm, q: Numbers, qd: Numbers, tau: Numbers) -> Guarded:
@@ -188,6 +195,7 @@ class _Quantity(NamedTuple):
         outputs: their shapes.
         flags: which outputs are truth values.
         plain: the plain function, which raises what belongs to inputs that break a condition; None without conditions.
+        rolled_from: the number of joints from which its loops over links are loops of the code; None if they never are.
     """
 
     equation: Callable[..., Rows | Guarded]
@@ -195,6 +203,7 @@ class _Quantity(NamedTuple):
     outputs: tuple[tuple[str | int, ...], ...]
     flags: tuple[int, ...] = ()
     plain: Callable[..., object] | None = None
+    rolled_from: int | None = None
 
 
 def _size(arm: Arm, letter: str | int) -> int:
@@ -219,9 +228,11 @@ _QUANTITIES = {
     "tool_jacobian": _Quantity(_tool_jacobian, _Q, ((6, "n"),)),
     "pose_and_jacobian": _Quantity(_pose_and_jacobian, _Q, ((4, 4), (6, "n"))),
     "inverse_branches": _Quantity(_inverse_branches, {"pose": (4, 4), "near": (6,)}, ((8, 6), (8,)), flags=(1,)),
-    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),)),
-    "inverse_dynamics_with_wrench": _Quantity(_inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),)),
-    "forward_dynamics": _Quantity(_forward_dynamics, _FORCED, (("n",),), plain=forward_dynamics),
+    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),), rolled_from=11),
+    "inverse_dynamics_with_wrench": _Quantity(
+        _inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),), rolled_from=11
+    ),
+    "forward_dynamics": _Quantity(_forward_dynamics, _FORCED, (("n",),), plain=forward_dynamics, rolled_from=18),
     "mass_matrix": _Quantity(_mass_matrix, _Q, (("n", "n"),)),
     "mass_and_bias": _Quantity(_mass_and_bias, _STATE, (("n", "n"), ("n",))),
     "bias": _Quantity(_bias, _STATE, (("n",),)),

@@ -11,7 +11,8 @@ from armwright.arm.model import Arm, Motor
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot, articulated_body
-from armwright.dynamics.newton_euler import dry_friction, newton_euler
+from armwright.dynamics.drives import less_friction
+from armwright.dynamics.newton_euler import newton_euler
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
@@ -144,12 +145,6 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
                 f"inertia {what} its axis while the distal joints are free. Give its link a {amount} or its motor an "
                 "inertia."
             )
-
-
-def less_friction(arm: Arm, qd: Sequence[Scalar], tau: Sequence[Scalar]) -> list[Scalar]:
-    """Return the efforts less the friction of the moving drives, over abstract scalars."""
-    joints = zip(arm.motors, qd, tau, strict=True)
-    return [effort - motor.viscous * speed - dry_friction(motor, speed) for motor, speed, effort in joints]
 
 
 def _without_drives(arm: Arm) -> Arm:

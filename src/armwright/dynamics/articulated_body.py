@@ -8,14 +8,14 @@ linear speeds never appear.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
-from armwright.arm.model import Arm, Joint, Link
+from armwright.arm.model import Arm, Joint, Link, Motor
 from armwright.dynamics.arguments import NO_WRENCH, Scalars
 from armwright.dynamics.joint_frames import JointStep, joint_body, joint_steps
 from armwright.dynamics.newton_euler import base_frame_acceleration, tool_wrench
 from armwright.tracing.scalar import Scalar, reciprocal
+from armwright.tracing.scan import scan
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, transpose
 
 
@@ -44,6 +44,20 @@ class Pivot(NamedTuple):
     size: Scalar
 
 
+class LinkVelocity(NamedTuple):
+    """The velocity of a link, and the accelerations that come of velocities alone.
+
+    Attributes:
+        w: angular velocity, along the axes of the joint.
+        coriolis: acceleration of the link at the joint; angular, of a slide linear.
+        centripetal: acceleration of the joint point about that of the joint before, along the axes of that.
+    """
+
+    w: Vector
+    coriolis: Vector
+    centripetal: Vector
+
+
 class JointResponse(NamedTuple):
     """The results of the inward pass for a joint, which the outward pass uses.
 
@@ -51,17 +65,15 @@ class JointResponse(NamedTuple):
         n: moment for a unit acceleration of the joint.
         f: force for it.
         pivot: their component along the joint, rotor included.
+        mobility: the acceleration for a unit of effort.
         effort: the effort that remains for acceleration.
-        coriolis: velocity-product acceleration of the link at the joint; angular, of a slide linear.
-        centripetal: acceleration of the joint point about that of the joint before, along the axes of that.
     """
 
     n: Vector
     f: Vector
     pivot: Pivot
+    mobility: Scalar
     effort: Scalar
-    coriolis: Vector
-    centripetal: Vector
 
 
 def articulated_body(
@@ -86,49 +98,64 @@ def articulated_body(
         Featherstone (2008), section 7.3, with the accelerations of points as in Luh, Walker & Paul (1980).
     """
     steps = joint_steps(arm, q)
-    velocities = _angular_velocities(arm, steps, qd)
-    f, n = tool_wrench(arm, q, wrench)
-    body = Articulated(J=_zeros(), H=_zeros(), M=_zeros(), n0=n, f0=f)
-    responses: list[JointResponse] = []
-    for i in reversed(range(arm.n)):
-        joint, step, (before, w) = arm.joints[i], steps[i], velocities[i]
-        body = _combined(_link_inertia(joint, arm.links[i], w), body)
-        coriolis = scale(1.0 if joint.revolute else 2.0, [w[1] * qd[i], -(w[0] * qd[i]), 0.0])
-        centripetal = cross(before, cross(before, step.lever))
-        response = _joint_response(body, joint, arm.motors[i].inertia, tau[i], (coriolis, centripetal))
-        body = _at_previous_joint(_through_joint(body, joint, response), step, centripetal)
-        responses.append(response)
-    responses.reverse()
-    return _outward(arm, steps, responses), [response.pivot for response in responses]
+    links = [_rigid_link(*of_joint) for of_joint in zip(arm.joints, arm.links, arm.motors, strict=True)]
+    _, velocities = scan(_velocity, [0.0, 0.0, 0.0], steps, qd)
+    f, n = tool_wrench(arm, steps, wrench)
+    beyond = Articulated(J=_zeros(), H=_zeros(), M=_zeros(), n0=n, f0=f)
+    _, responses = scan(_inward, beyond, steps, links, velocities, tau, reverse=True)
+    base = [0.0, 0.0, 0.0], base_frame_acceleration(arm)
+    _, accelerations = scan(_outward, base, steps, velocities, responses)
+    return accelerations, [response.pivot for response in responses]
+
+
+class _RigidLink(NamedTuple):
+    """A link about its joint point: inertia, mass times centre of mass, and mass; and the rotor of its joint."""
+
+    inertia: Matrix
+    moment: Vector
+    mass: float
+    rotor: float
+
+
+def _rigid_link(joint: Joint, link: Link, motor: Motor) -> _RigidLink:
+    mass, moment, spread = joint_body(joint, link)
+    trace = spread[0][0] + spread[1][1] + spread[2][2]
+    inertia = [[(trace if i == j else 0.0) - spread[i][j] for j in range(3)] for i in range(3)]
+    return _RigidLink(inertia, moment, mass, motor.inertia)
 
 
 def _zeros() -> Matrix:
     return [[0.0, 0.0, 0.0] for _ in range(3)]
 
 
-def _angular_velocities(arm: Arm, steps: Sequence[JointStep], qd: Scalars) -> list[tuple[Vector, Vector]]:
-    """Return for each joint the angular velocity of the link before it, and of its own, along the axes of each."""
-    w: Vector = [0.0, 0.0, 0.0]
-    velocities = []
-    for joint, step, speed in zip(arm.joints, steps, qd, strict=True):
-        before, w = w, step.inward_axes(w)
-        if joint.revolute:
-            w = [w[0], w[1], w[2] + speed]
-        velocities.append((before, w))
-    return velocities
+def _velocity(before: Vector, step: JointStep, speed: Scalar) -> tuple[Vector, LinkVelocity]:
+    """Return the velocity of a link, from the angular velocity of the link before."""
+    w = step.inward_axes(before)
+    coriolis = scale(1.0 if step.revolute else 2.0, [w[1] * speed, -(w[0] * speed), 0.0])
+    if step.revolute:
+        w = [w[0], w[1], w[2] + speed]
+    return w, LinkVelocity(w, coriolis, cross(before, cross(before, step.lever)))
 
 
-def _link_inertia(joint: Joint, link: Link, w: Vector) -> Articulated:
+def _inward(
+    beyond: Articulated, step: JointStep, link: _RigidLink, velocity: LinkVelocity, tau: Scalar
+) -> tuple[Articulated, JointResponse]:
+    """Return how a link and all beyond it react at the joint before, and the response at its own."""
+    body = _combined(_link_inertia(link, velocity.w), beyond)
+    response = _joint_response(body, step, link.rotor, tau)
+    through = _through_joint(body, step, response, velocity.coriolis)
+    return _at_previous_joint(through, step, velocity.centripetal), response
+
+
+def _link_inertia(link: _RigidLink, w: Vector) -> Articulated:
     """Return a rigid link with the angular velocity w, about its joint point."""
-    mass, (x, y, z), spread = joint_body(joint, link)
-    trace = spread[0][0] + spread[1][1] + spread[2][2]
-    tensor = [[(trace if i == j else 0.0) - spread[i][j] for j in range(3)] for i in range(3)]
+    x, y, z = link.moment
     return Articulated(
-        J=tensor,
+        J=link.inertia,
         H=[[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]],
-        M=[[mass if i == j else 0.0 for j in range(3)] for i in range(3)],
-        n0=cross(w, apply(tensor, w)),
-        f0=cross(w, cross(w, [x, y, z])),
+        M=[[link.mass if i == j else 0.0 for j in range(3)] for i in range(3)],
+        n0=cross(w, apply(link.inertia, w)),
+        f0=cross(w, cross(w, link.moment)),
     )
 
 
@@ -160,52 +187,45 @@ def _mirrored(matrix: Matrix) -> Matrix:
     return [[matrix[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)]
 
 
-def _joint_response(
-    body: Articulated, joint: Joint, rotor: float, tau: Scalar, biases: tuple[Vector, Vector]
-) -> JointResponse:
-    """Return the response of a body, about the joint point, to joint i, which is the z axis."""
-    if joint.revolute:
+def _joint_response(body: Articulated, step: JointStep, rotor: float, tau: Scalar) -> JointResponse:
+    """Return the response of a body, about the joint point, to its joint, which is the z axis."""
+    if step.revolute:
         n, f, own, bias = [row[2] for row in body.J], body.H[2], body.J, body.n0[2]
     else:
         n, f, own, bias = [row[2] for row in body.H], body.M[2], body.M, body.f0[2]
     pivot = Pivot(inertia=own[2][2] + rotor, size=own[0][0] + own[1][1] + own[2][2] + rotor)
-    return JointResponse(n, f, pivot, tau - bias, *biases)
+    return JointResponse(n, f, pivot, reciprocal(pivot.inertia), tau - bias)
 
 
-def _through_joint(body: Articulated, joint: Joint, response: JointResponse) -> Articulated:
-    """Return the apparent inertia of the body through joint i, which is free to move."""
-    mobility = reciprocal(response.pivot.inertia)
-    n, f = scale(mobility, response.n), scale(mobility, response.f)
+def _through_joint(body: Articulated, step: JointStep, response: JointResponse, coriolis: Vector) -> Articulated:
+    """Return the apparent inertia of the body through its joint, which is free to move."""
+    n, f = scale(response.mobility, response.n), scale(response.mobility, response.f)
     J = [[body.J[i][j] - n[min(i, j)] * response.n[max(i, j)] for j in range(3)] for i in range(3)]
     M = [[body.M[i][j] - f[min(i, j)] * response.f[max(i, j)] for j in range(3)] for i in range(3)]
     H = [[body.H[i][j] - n[i] * response.f[j] for j in range(3)] for i in range(3)]
-    moment, force = (J, transpose(H)) if joint.revolute else (H, M)
+    moment, force = (J, transpose(H)) if step.revolute else (H, M)
     return Articulated(
         J=J,
         H=H,
         M=M,
-        n0=add(body.n0, apply(moment, response.coriolis), scale(response.effort, n)),
-        f0=add(body.f0, apply(force, response.coriolis), scale(response.effort, f)),
+        n0=add(body.n0, apply(moment, coriolis), scale(response.effort, n)),
+        f0=add(body.f0, apply(force, coriolis), scale(response.effort, f)),
     )
 
 
-def _outward(arm: Arm, steps: Sequence[JointStep], responses: Sequence[JointResponse]) -> list[Scalar]:
-    w_dot: Vector = [0.0, 0.0, 0.0]
-    v_dot = base_frame_acceleration(arm)
-    accelerations: list[Scalar] = []
-    for joint, step, response in zip(arm.joints, steps, responses, strict=True):
-        v_dot = step.inward_axes(add(v_dot, cross(w_dot, step.lever), response.centripetal))
-        w_dot = step.inward_axes(w_dot)
-        if joint.revolute:
-            w_dot = add(w_dot, response.coriolis)
-        else:
-            v_dot = add(v_dot, response.coriolis)
-        net = response.effort - dot(response.n, w_dot) - dot(response.f, v_dot)
-        acceleration = reciprocal(response.pivot.inertia) * net
-        accelerations.append(acceleration)
-        along = [0.0, 0.0, acceleration]
-        if joint.revolute:
-            w_dot = add(w_dot, along)
-        else:
-            v_dot = add(v_dot, along)
-    return accelerations
+def _outward(
+    before: tuple[Vector, Vector], step: JointStep, velocity: LinkVelocity, response: JointResponse
+) -> tuple[tuple[Vector, Vector], Scalar]:
+    """Return the accelerations of a link, from those of the link before, and the acceleration of its joint."""
+    w_dot, v_dot = before
+    v_dot = step.inward_axes(add(v_dot, cross(w_dot, step.lever), velocity.centripetal))
+    w_dot = step.inward_axes(w_dot)
+    if step.revolute:
+        w_dot = add(w_dot, velocity.coriolis)
+    else:
+        v_dot = add(v_dot, velocity.coriolis)
+    acceleration = response.mobility * (response.effort - dot(response.n, w_dot) - dot(response.f, v_dot))
+    along = [0.0, 0.0, acceleration]
+    if step.revolute:
+        return (add(w_dot, along), v_dot), acceleration
+    return (w_dot, add(v_dot, along)), acceleration

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
-from armwright.dynamics.accelerations import check_pivots, less_friction
+from armwright.dynamics.accelerations import check_pivots
 from armwright.dynamics.arguments import Scalars, batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot
-from armwright.dynamics.newton_euler import drive_effort, newton_euler
+from armwright.dynamics.drives import less_friction, with_drives
+from armwright.dynamics.newton_euler import newton_euler
 from armwright.tracing.derivatives import jacobian, replaced
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph, Traced
@@ -144,9 +145,7 @@ def effort_partials(
         qd: n joint velocities, as well.
         qdd: n joint accelerations, as well.
     """
-    efforts = newton_euler(arm, q, qd, qdd)
-    drives = (drive_effort(*of_joint) for of_joint in zip(arm.motors, qd, qdd, strict=True))
-    efforts = [effort + drive for effort, drive in zip(efforts, drives, strict=True)]
+    efforts = with_drives(arm, newton_euler(arm, q, qd, qdd), qd, qdd)
     n = arm.n
     rows = jacobian(efforts, [*q, *qd, *qdd])
     M = [[rows[min(i, j)][2 * n + max(i, j)] for j in range(n)] for i in range(n)]

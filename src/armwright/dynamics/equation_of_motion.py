@@ -8,13 +8,14 @@ import numpy as np
 from armwright.arm.model import Arm, Link
 from armwright.arrays import Array, ArrayLike, read_only, reduce_by_fields
 from armwright.dynamics.arguments import batch, stack_matrix
+from armwright.dynamics.drives import dry_friction
 from armwright.dynamics.lagrange_euler import (
     gravity_coefficients,
     inertia_coefficients,
     pose_derivatives,
     speed_coefficients,
 )
-from armwright.dynamics.newton_euler import dry_friction, newton_euler
+from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.payloads import payload
 from armwright.errors import KindError, shown
 from armwright.kinematics.forward_kinematics import stack

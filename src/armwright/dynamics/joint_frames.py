@@ -7,15 +7,14 @@ transform, ``Joint.behind``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from armwright.arm.model import Arm, Joint, Link
 from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.tracing.scalar import Scalar, cos, sin
+from armwright.tracing.scan import scan
 from armwright.tracing.vectors import Matrix, Vector, add, apply, product, scale, transpose
-
-_IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class JointBody(NamedTuple):
@@ -51,36 +50,89 @@ def lever_behind(joint: Joint) -> Vector:
     return add(lever, [0.0, 0.0, joint.d]) if joint.revolute else list(lever)
 
 
+class Rotation(NamedTuple):
+    """A rotation about the first or the third axis, by its cosine and sine, over abstract scalars."""
+
+    about_x: bool
+    cosine: Scalar
+    sine: Scalar
+
+    def inward_axes(self, v: Vector) -> Vector:
+        """Return a vector along the rotated axes, given along those before."""
+        return self._replace(sine=-self.sine).outward_axes(v)
+
+    def outward_axes(self, v: Vector) -> Vector:
+        """Return a vector along the axes before, given along the rotated ones."""
+        (x, y, z), c, s = v, self.cosine, self.sine
+        return [x, c * y - s * z, s * y + c * z] if self.about_x else [c * x - s * y, s * x + c * y, z]
+
+    def outward_matrix(self, A: Matrix) -> Matrix:
+        """Return a tensor along the axes before, given along the rotated ones."""
+        c, s = self.cosine, self.sine
+        if isinstance(c, float) and isinstance(s, float) and c * s == 0:  # axes change places
+            return _rows_and_columns(self.outward_axes, A)
+        i, j, k = (1, 2, 0) if self.about_x else (0, 1, 2)
+        # Of the four numbers in the plane of the rotation, two follow from what does not change: their sum and their
+        # difference.
+        more = c * (A[i][i] - A[j][j]) - s * (A[i][j] + A[j][i])
+        B = [list(row) for row in A]
+        B[i][i] = A[j][j] + c * more
+        B[j][j] = A[i][i] + A[j][j] - B[i][i]
+        B[i][j], B[j][i] = A[i][j] + s * more, A[j][i] + s * more
+        B[i][k], B[j][k] = c * A[i][k] - s * A[j][k], s * A[i][k] + c * A[j][k]
+        B[k][i], B[k][j] = c * A[k][i] - s * A[k][j], s * A[k][i] + c * A[k][j]
+        return B
+
+
+class FixedRotation(NamedTuple):
+    """Any rotation, by its matrix."""
+
+    matrix: Sequence[Sequence[float]]
+
+    def inward_axes(self, v: Vector) -> Vector:
+        """Return a vector along the rotated axes, given along those before."""
+        return apply(transpose(self.matrix), v)
+
+    def outward_axes(self, v: Vector) -> Vector:
+        """Return a vector along the axes before, given along the rotated ones."""
+        return apply(self.matrix, v)
+
+    def outward_matrix(self, A: Matrix) -> Matrix:
+        """Return a tensor along the axes before, given along the rotated ones."""
+        return _rows_and_columns(self.outward_axes, A)
+
+
+def _rows_and_columns(rotate: Callable[[Vector], Vector], A: Matrix) -> Matrix:
+    columns = [rotate(column) for column in transpose(A)]
+    return [rotate(row) for row in transpose(columns)]
+
+
 class JointStep(NamedTuple):
     """The step from the joint before to a joint.
 
     Attributes:
-        fixed: (3, 3) constant rotation of the axes of the joint, before it moves, along those of the joint before.
-        cosine: of the angle of the joint.
-        sine: of it.
+        revolute: whether the joint rotates.
+        fixed: constant rotation of the axes of the joint, before it moves, along those of the joint before.
+        turn: rotation about the axis of the joint.
         lever: from joint point to joint point, along the axes of the joint before.
     """
 
-    fixed: Sequence[Sequence[float]]
-    cosine: Scalar
-    sine: Scalar
+    revolute: bool
+    fixed: Rotation | FixedRotation
+    turn: Rotation
     lever: Vector
 
     def inward_axes(self, v: Vector) -> Vector:
         """Return a vector along the axes of the joint, given along those of the joint before."""
-        x, y, z = apply(transpose(self.fixed), v)
-        c, s = self.cosine, self.sine
-        return [c * x + s * y, c * y - s * x, z]
+        return self.turn.inward_axes(self.fixed.inward_axes(v))
 
     def outward_axes(self, v: Vector) -> Vector:
         """Return a vector along the axes of the joint before, given along those of the joint."""
-        c, s = self.cosine, self.sine
-        return apply(self.fixed, [c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]])
+        return self.fixed.outward_axes(self.turn.outward_axes(v))
 
     def outward_matrix(self, A: Matrix) -> Matrix:
         """Return a tensor along the axes of the joint before, given along those of the joint."""
-        columns = [self.outward_axes(column) for column in transpose(A)]
-        return [self.outward_axes(row) for row in transpose(columns)]
+        return self.fixed.outward_matrix(self.turn.outward_matrix(A))
 
 
 def joint_steps(arm: Arm, q: Sequence[Scalar]) -> list[JointStep]:
@@ -90,18 +142,29 @@ def joint_steps(arm: Arm, q: Sequence[Scalar]) -> list[JointStep]:
         arm: the arm, with n joints.
         q: n joint positions.
     """
-    steps: list[JointStep] = []
-    fixed: Sequence[Sequence[float]] = _IDENTITY
+    at_rest: list[JointStep] = []
+    fixed: Rotation | FixedRotation = Rotation(True, 1.0, 0.0)
     lever: Vector = [0.0, 0.0, 0.0]
-    for joint, position in zip(arm.joints, q, strict=True):
-        if joint.revolute:
-            angle = joint.theta + position
-            steps.append(JointStep(fixed, cos(angle), sin(angle), lever))
-        else:
-            along = scale(joint.d + position, [row[2] for row in fixed])
-            steps.append(JointStep(fixed, exact_cosine(joint.theta), exact_sine(joint.theta), add(lever, along)))
-        fixed, lever = joint.behind[:3, :3].tolist(), lever_behind(joint)
-    return steps
+    for joint in arm.joints:
+        turn = Rotation(False, exact_cosine(joint.theta), exact_sine(joint.theta))
+        at_rest.append(JointStep(joint.revolute, fixed, turn, lever))
+        fixed, lever = _rotation_behind(joint), lever_behind(joint)
+    offsets = [joint.theta if joint.revolute else joint.d for joint in arm.joints]
+    return scan(_moved, (), at_rest, offsets, q)[1]
+
+
+def _rotation_behind(joint: Joint) -> Rotation | FixedRotation:
+    if joint.fixed is None:
+        return Rotation(True, exact_cosine(joint.alpha), exact_sine(joint.alpha))
+    return FixedRotation(joint.behind[:3, :3].tolist())
+
+
+def _moved(_: tuple[()], step: JointStep, offset: float, position: Scalar) -> tuple[tuple[()], JointStep]:
+    """Return the step to a joint that has moved."""
+    value = offset + position
+    if step.revolute:
+        return (), step._replace(turn=Rotation(False, cos(value), sin(value)))
+    return (), step._replace(lever=add(step.lever, scale(value, step.fixed.outward_axes([0.0, 0.0, 1.0]))))
 
 
 def at_previous_joint(body: JointBody, step: JointStep) -> JointBody:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from armwright.arm.model import Arm, Motor
+from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
+from armwright.dynamics.drives import with_drives
 from armwright.dynamics.joint_frames import JointBody, JointStep, joint_body, joint_steps, lever_behind
-from armwright.kinematics.forward_kinematics import link_frames, stack
-from armwright.tracing.scalar import Scalar, select
+from armwright.kinematics.forward_kinematics import stack
+from armwright.tracing.scalar import Scalar
+from armwright.tracing.scan import scan
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
 
 _STILL = (0.0, 0.0, 0.0)
@@ -25,8 +27,8 @@ def newton_euler(
 
     Arguments and sources are those of ``joint_wrenches``. The efforts are the components along or about each joint.
     """
-    wrenches = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
-    return [(n if joint.revolute else f)[2] for joint, (f, n) in zip(arm.joints, wrenches, strict=True)]
+    joints = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
+    return [effort for _, _, effort in joints]
 
 
 class JointWrench(NamedTuple):
@@ -63,7 +65,7 @@ def joint_wrenches(
     """
     wrenches = []
     found = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
-    for joint, position, (f, n) in zip(arm.joints, q, found, strict=True):
+    for joint, position, (f, n, _) in zip(arm.joints, q, found, strict=True):
         about = n if joint.revolute else add(n, cross([0.0, 0.0, joint.d + position], f))
         to_frame = transpose(joint.behind[:3, :3].tolist())
         wrenches.append(JointWrench(apply(to_frame, f), apply(to_frame, about), [row[2] for row in to_frame]))
@@ -72,8 +74,8 @@ def joint_wrenches(
 
 def _wrenches(
     arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars, *, base_acceleration: Scalars
-) -> list[tuple[Vector, Vector]]:
-    """Return force and moment of each link on the next, about the point and along the axes of its joint.
+) -> list[tuple[Vector, Vector, Scalar]]:
+    """Return force, moment and effort of each joint; about its point and along its axes, of a link on the next.
 
     Outward, from the base: angular velocity, angular acceleration and acceleration of each joint point, in the axes
     that rotate with the joint, of which z is its own. Gravity enters as an opposite acceleration of the base. Inward,
@@ -86,19 +88,26 @@ def _wrenches(
         joint and before its twist, in which a link is constant: Khalil & Kleinfinger (1987).
     """
     steps = joint_steps(arm, q)
-    motions = joint_motions(arm, steps, qd, qdd, base_acceleration)
-    links = [
-        _link_wrench(joint_body(joint, link), motion.U, motion.v_dot)
-        for joint, link, motion in zip(arm.joints, arm.links, motions, strict=True)
-    ]
-    f, n = tool_wrench(arm, q, wrench)
-    wrenches: list[tuple[Vector, Vector]] = []
-    for step, (force, moment) in zip(reversed(steps), reversed(links), strict=True):
-        f, n = add(f, force), add(n, moment)
-        wrenches.append((f, n))
-        f, n = step.outward_axes(f), step.outward_axes(n)
-        n = add(n, cross(step.lever, f))
-    return wrenches[::-1]
+    bodies = [joint_body(joint, link) for joint, link in zip(arm.joints, arm.links, strict=True)]
+    _, links = scan(_outward, _base_motion(arm, base_acceleration), steps, bodies, qd, qdd)
+    return scan(_inward, tool_wrench(arm, steps, wrench), steps, links, reverse=True)[1]
+
+
+def _outward(
+    motion: JointMotion, step: JointStep, body: JointBody, speed: Scalar, acceleration: Scalar
+) -> tuple[JointMotion, tuple[Vector, Vector]]:
+    """Return the motion of a link, from that of the link before, and the force and moment that accelerate it."""
+    motion = _next_motion(motion, step, speed, acceleration)
+    return motion, _link_wrench(body, motion.U, motion.v_dot)
+
+
+def _inward(
+    beyond: tuple[Vector, Vector], step: JointStep, link: tuple[Vector, Vector]
+) -> tuple[tuple[Vector, Vector], tuple[Vector, Vector, Scalar]]:
+    """Return force and moment at the joint before a link, and at its own with its effort, from those beyond."""
+    f, n = (add(x, own) for x, own in zip(beyond, link, strict=True))
+    force, moment = step.outward_axes(f), step.outward_axes(n)
+    return (force, add(moment, cross(step.lever, force))), (f, n, (n if step.revolute else f)[2])
 
 
 class JointMotion(NamedTuple):
@@ -119,8 +128,8 @@ class JointMotion(NamedTuple):
 
 def joint_motions(
     arm: Arm, steps: Sequence[JointStep], qd: Scalars, qdd: Scalars, base_acceleration: Scalars = _STILL
-) -> Iterator[JointMotion]:
-    """Give the motion of each link, from the base outward.
+) -> list[JointMotion]:
+    """Return the motion of each link, from the base outward.
 
     Args:
         arm: the arm, with n joints.
@@ -129,21 +138,30 @@ def joint_motions(
         qdd: n joint accelerations.
         base_acceleration: of the base, along its own axes.
     """
-    w: Vector = [0.0, 0.0, 0.0]
-    w_dot: Vector = [0.0, 0.0, 0.0]
-    v_dot = base_frame_acceleration(arm, base_acceleration)
-    U: Matrix = [[0.0, 0.0, 0.0] for _ in range(3)]
-    for joint, step, speed, acceleration in zip(arm.joints, steps, qd, qdd, strict=True):
-        v_dot = step.inward_axes(add(v_dot, apply(U, step.lever)))
-        w, w_dot = step.inward_axes(w), step.inward_axes(w_dot)
-        if joint.revolute:
-            w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
-            w = [w[0], w[1], w[2] + speed]
-        else:
-            twice = speed + speed
-            v_dot = add(v_dot, [w[1] * twice, -(w[0] * twice), acceleration])
-        U = point_accelerations(w, w_dot)
-        yield JointMotion(w, w_dot, v_dot, U)
+
+    def step_outward(motion: JointMotion, *of_joint: Any) -> tuple[JointMotion, JointMotion]:
+        motion = _next_motion(motion, *of_joint)
+        return motion, motion
+
+    return scan(step_outward, _base_motion(arm, base_acceleration), steps, qd, qdd)[1]
+
+
+def _base_motion(arm: Arm, base_acceleration: Scalars) -> JointMotion:
+    still = [0.0, 0.0, 0.0]
+    return JointMotion(still, still, base_frame_acceleration(arm, base_acceleration), [list(still) for _ in range(3)])
+
+
+def _next_motion(motion: JointMotion, step: JointStep, speed: Scalar, acceleration: Scalar) -> JointMotion:
+    """Return the motion of a link, from that of the link before."""
+    v_dot = step.inward_axes(add(motion.v_dot, apply(motion.U, step.lever)))
+    w, w_dot = step.inward_axes(motion.w), step.inward_axes(motion.w_dot)
+    if step.revolute:
+        w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
+        w = [w[0], w[1], w[2] + speed]
+    else:
+        twice = speed + speed
+        v_dot = add(v_dot, [w[1] * twice, -(w[0] * twice), acceleration])
+    return JointMotion(w, w_dot, v_dot, point_accelerations(w, w_dot))
 
 
 def point_accelerations(w: Vector, w_dot: Vector) -> Matrix:
@@ -173,43 +191,28 @@ def base_frame_acceleration(arm: Arm, base_acceleration: Scalars = _STILL) -> Ve
     return apply(arm.base[:3, :3].T.tolist(), subtract(base_acceleration, arm.gravity.tolist()))
 
 
-def tool_wrench(arm: Arm, q: Scalars, wrench: Scalars) -> tuple[Vector, Vector]:
-    """Return force and moment of the last link on the surroundings, about the point and along the axes of its joint."""
-    f, n = tool_reaction(arm, q, wrench)
-    if wrench is NO_WRENCH:
-        return f, n
-    joint = arm.joints[-1]
-    R = joint.behind[:3, :3].tolist()
-    f, n = apply(R, f), apply(R, n)
-    return f, add(n, cross(lever_behind(joint), f))
-
-
-def tool_reaction(arm: Arm, q: Scalars, wrench: Scalars) -> tuple[Vector, Vector]:
-    """Return force and moment of the last link on the surroundings, at its origin, in its frame.
+def tool_wrench(arm: Arm, steps: Sequence[JointStep], wrench: Scalars) -> tuple[Vector, Vector]:
+    """Return force and moment of the last link on the surroundings, about the point and along the axes of its joint.
 
     Args:
         arm: the arm, with n joints.
-        q: n joint positions.
+        steps: from joint to joint.
         wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
     """
     if wrench is NO_WRENCH:
         return [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-    R, _ = link_frames(arm, q)[-1]
-    Rt = transpose(R)
-    force, moment = apply(Rt, wrench[:3]), apply(Rt, wrench[3:])
+    to_base = transpose(arm.base[:3, :3].tolist())
+    outside = apply(to_base, wrench[:3]), apply(to_base, wrench[3:])
+    (force, moment), _ = scan(_along_next_axes, outside, steps)
+    joint = arm.joints[-1]
+    lever = add(lever_behind(joint), (joint.behind[:3, :3] @ arm.tool[:3, 3]).tolist())
     f = subtract([0.0, 0.0, 0.0], force)
-    n = subtract(cross(arm.tool[:3, 3].tolist(), f), moment)
-    return f, n
+    return f, subtract(cross(lever, f), moment)
 
 
-def drive_effort(motor: Motor, qd: Scalar, qdd: Scalar) -> Scalar:
-    """Return the effort of the drive itself: rotor inertia, viscous and dry friction, over abstract scalars."""
-    return motor.inertia * qdd + motor.viscous * qd + dry_friction(motor, qd)
-
-
-def dry_friction(motor: Motor, qd: Scalar) -> Scalar:
-    """Return the Coulomb friction of a moving joint, 0 at rest, over abstract scalars."""
-    return select(qd > 0, motor.coulomb_forward, select(qd < 0, -motor.coulomb_backward, 0.0))
+def _along_next_axes(vectors: tuple[Vector, Vector], step: JointStep) -> tuple[tuple[Vector, Vector], tuple[()]]:
+    a, b = vectors
+    return (step.inward_axes(a), step.inward_axes(b)), ()
 
 
 def coulomb_friction(arm: Arm, qd: Array) -> Array:
@@ -255,10 +258,7 @@ def inverse_dynamics(
     moved = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
     efforts = newton_euler(arm, q_, qd_, qdd_, push, base_acceleration=moved)
     if drives:
-        efforts = [
-            effort + drive_effort(motor, speed, acceleration)
-            for effort, motor, speed, acceleration in zip(efforts, arm.motors, qd_, qdd_, strict=True)
-        ]
+        efforts = with_drives(arm, efforts, qd_, qdd_)
     return stack(efforts, lead)
 
 

@@ -9,7 +9,7 @@ import attrs
 
 from armwright.errors import InvalidValueError, shown
 from armwright.tracing.emit_llvm import Column, Target, lanes_ir, rows_ir, single_ir
-from armwright.tracing.graph import Graph, Traced, operation_count, reachable
+from armwright.tracing.graph import Graph, Traced, operation_count, turned
 from armwright.tracing.machine import MachineCode, Watched, machine_code
 from armwright.tracing.scalar import Scalar
 
@@ -88,6 +88,7 @@ def emit(
     shapes: Sequence[Shape] | None = None,
     flags: Collection[int] = (),
     bounds: Mapping[str, Sequence[float]] | None = None,
+    rolled_from: int | None = None,
 ) -> Emitted:
     """Trace an equation and write its kernel.
 
@@ -99,6 +100,7 @@ def emit(
         shapes: shape of one value of each output; vectors when left out.
         flags: numbers of the outputs that are truth values.
         bounds: by the name of an input, how far from 0 each of its numbers usually is; farther numbers are reported.
+        rolled_from: the number of links from which scans are loops of the code; None if they never are.
 
     Raises:
         InvalidValueError: there is no input, or the name of one is no identifier, as which a caller may write it, or
@@ -109,7 +111,7 @@ def emit(
     for name in inputs:
         if name in _OPTIONS or not (name.isascii() and name.isidentifier()) or iskeyword(name):
             raise InvalidValueError(f"inputs: expected names such as 'qd', got {shown(name)}")
-    graph = Graph()
+    graph = Graph(rolled_from)
     input_shapes = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}
     scalars = {name: graph.inputs(math.prod(shape)) for name, shape in input_shapes.items()}
     result = equation(*scalars.values())
@@ -117,12 +119,11 @@ def emit(
     outputs = [[_node(graph, x) for x in row] for row in rows]
     flat = [node for row in outputs for node in row]
     are_flags = [i in flags for i, row in enumerate(outputs) for _ in row]
-    # The nodes that the argument of a sine or cosine comes of.
-    turned = set(reachable(graph, [node.operands[0] for node in graph.nodes if node.op in ("sin", "cos")]))
+    of_angles = turned(graph)
     nodes = [x.node for row in scalars.values() for x in row]
     watched = Watched(
-        angles=[node for node in nodes if node in turned],
-        others=[node for node in nodes if node not in turned],
+        angles=[node for node in nodes if node in of_angles],
+        others=[node for node in nodes if node not in of_angles],
         positive=[_node(graph, x) for x in positive],
         bounds={
             x.node: float(bound)
@@ -135,7 +136,7 @@ def emit(
         title=title,
         code=machine_code(graph, flat, watched, [i for i, flag in enumerate(are_flags) if flag]),
         inputs=input_shapes,
-        angles=frozenset(name for name, row in scalars.items() if turned.intersection(x.node for x in row)),
+        angles=frozenset(name for name, row in scalars.items() if of_angles.intersection(x.node for x in row)),
         outputs=tuple((len(row),) for row in outputs) if shapes is None else tuple(shapes),
         flags=tuple(flags),
         operations=operation_count(graph, flat),

@@ -1,4 +1,7 @@
-"""From the operations of a graph to LLVM IR: straight-line code, for one configuration and for many in vectors.
+"""From the operations of a graph to LLVM IR, for one configuration and for many in vectors.
+
+Code is straight but for the loops of a graph. The state of a loop stays in registers. What it takes of the links, and
+what it leaves for loops behind it, lies on the stack, a vector per link; constants of the links are a table.
 
 Inputs and outputs are arrays in C order, one row per configuration. For many, blocks of as many rows as a vector has
 lanes are transposed in registers, so that each lane is a configuration. Nothing is left to the compiler that would
@@ -7,10 +10,11 @@ batch and at any width of the vectors, on all processors that multiply and add i
 """
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
-from armwright.tracing.graph import Node
+from armwright.tracing.graph import Graph, Loop, Node, reachable
 from armwright.tracing.machine import MachineCode
 
 # What a kernel returns beside 0: some configuration is without meaning, or unusual.
@@ -32,6 +36,8 @@ _INSTRUCTIONS = {
     "not": "xor {truth} {0}, {holds}",
     "number": "uitofp {truth} {0} to {number}",
 }
+# What is no operation.
+_READ = frozenset({"constant", "input", "state", "each"})
 # Bytes of a number, and of a line of the cache.
 _DOUBLE, _LINE = 8, 64
 # Blocks of more bytes than this are not fetched ahead: they would drive out of the nearest cache what is worked on.
@@ -69,14 +75,21 @@ class _Text:
         self.lanes, self.has_fma = lanes, _ = target
         self.lines: list[str] = []
         self.intrinsics: set[str] = set()
+        self.ahead: list[_Ahead] = []
+        self.ahead_in: Loop | None = None
         self._count = 0
+        self._block = ""
+        self._tables: list[str] = []
+        self._scratch: list[str] = []
         self.number = self.of("double")
         self.suffix = "f64" if lanes == 1 else f"v{lanes}f64"
         self.never = self.splat("i1 false")
 
     def module(self) -> str:
         """Return all of it."""
-        return "\n".join([*sorted(self.intrinsics), "", *self.lines, ""])
+        entry = self.lines.index("entry:") + 1
+        body = [*self.lines[:entry], *self._scratch, *self.lines[entry:]]
+        return "\n".join([*sorted(self.intrinsics), *self._tables, "", *body, ""])
 
     def of(self, kind: str) -> str:
         """Return the type of a vector of a kind of element."""
@@ -87,8 +100,7 @@ class _Text:
         return element.partition(" ")[2] if self.lanes == 1 else f"<{', '.join([element] * self.lanes)}>"
 
     def constant(self, value: float) -> str:
-        (bits,) = struct.unpack("<Q", struct.pack("<d", value))
-        return self.splat(f"double 0x{bits:016X}")
+        return self.splat(f"double 0x{_bits(value):016X}")
 
     def let(self, expression: str) -> str:
         """Write an instruction, and return the name of its result."""
@@ -98,7 +110,11 @@ class _Text:
 
     def do(self, statement: str) -> None:
         """Write an instruction without a result, or a label."""
-        self.lines.append(statement if statement.endswith(":") else f"  {statement}")
+        if statement.endswith(":"):
+            self._block = statement.removesuffix(":")
+            self.lines.append(statement)
+        else:
+            self.lines.append(f"  {statement}")
 
     def call(self, name: str, *operands: str, suffix: str = "") -> str:
         suffix = suffix or self.suffix
@@ -117,23 +133,127 @@ class _Text:
         """Return the address of an element of an array."""
         return pointer if offset == 0 else self.let(f"getelementptr {kind}, ptr {pointer}, i64 {offset}")
 
+    def scratch(self, count: int) -> str:
+        """Return the address of as many vectors on the stack."""
+        name = f"%scratch{len(self._scratch)}"
+        self._scratch.append(f"  {name} = alloca [{count} x {self.number}], align {_LINE}")
+        return name
+
+    def load(self, vectors: str, place: str | int) -> str:
+        """Return a vector of an array in scratch memory."""
+        address = self.address(vectors, place, self.number)
+        return self.let(f"load {self.number}, ptr {address}, align {self.lanes * _DOUBLE}")
+
+    def store(self, x: str, vectors: str, place: str | int) -> None:
+        """Write a vector of an array in scratch memory."""
+        address = self.address(vectors, place, self.number)
+        self.do(f"store {self.number} {x}, ptr {address}, align {self.lanes * _DOUBLE}")
+
+    def table(self, kind: str, values: Sequence[str]) -> str:
+        """Return the address of constants."""
+        name = f"@table{len(self._tables)}"
+        elements = ", ".join(f"{kind} {x}" for x in values)
+        self._tables.append(
+            f"{name} = private unnamed_addr constant [{len(values)} x {kind}] [{elements}], align {_LINE}"
+        )
+        return name
+
+    def everywhere(self, table: str, place: str) -> str:
+        """Return a constant of a table in all lanes."""
+        one = self.let(f"load double, ptr {self.address(table, place)}, align {_DOUBLE}")
+        if self.lanes == 1:
+            return one
+        first = self.let(f"insertelement {self.number} poison, double {one}, i32 0")
+        mask = f"<{self.lanes} x i32> zeroinitializer"
+        return self.let(f"shufflevector {self.number} {first}, {self.number} poison, {mask}")
+
     # ---- the operations of a graph ----
 
-    def graph(self, code: MachineCode, inputs: Sequence[str]) -> dict[int, str]:
-        """Write all operations; return the names of their results by node."""
-        names: dict[int, str] = {}
-        for i in code.order:
-            node = code.graph.nodes[i]
-            if node.op == "constant":
-                names[i] = self.constant(node.value)
-            elif node.op == "input":
-                names[i] = inputs[int(node.value)]
+    def graph(self, graph: Graph, order: Sequence[int], values: "_Values") -> None:
+        """Write all operations; the names of their results are among the values then."""
+        for i in _straight_first(graph, order):
+            node = graph.nodes[i]
+            if node.op in _READ:
+                continue
+            if node.op == "loop":
+                values.loop(i)
             elif node.op == "bit":
-                place = int(code.graph.nodes[node.operands[1]].value)
-                names[i] = self._bit(names[node.operands[0]], place)
+                place = int(graph.nodes[node.operands[1]].value)
+                values.names[i] = self._bit(values[node.operands[0]], place)
             else:
-                names[i] = self._operation(node, [names[j] for j in node.operands])
-        return names
+                values.names[i] = self._operation(node, [values[j] for j in node.operands])
+
+    def loop(self, loop: Loop, start: Sequence[str], links: Sequence[str]) -> "_Left":
+        """Write a loop.
+
+        Args:
+            loop: what it does.
+            start: the state before it.
+            links: the addresses of the values of the links, each an array with a vector for every link.
+        """
+        n, kinds = len(loop.kinds), range(len(loop.steps))
+        kind_of = self.table("i8", [str(kind) for kind in loop.kinds])
+        width = max(map(len, loop.constants))
+        rows = [[*row, *[0.0] * (width - len(row))] for row in loop.constants]
+        constants = self.table("double", [f"0x{_bits(x):016X}" for row in rows for x in row])
+        each = [self.scratch(n) for _ in loop.steps[0].results[loop.carried :]]
+        self._count += 1
+        name, before = f"loop{self._count}", self._block
+        first, last, by = (n - 1, 0, -1) if loop.reverse else (0, n - 1, 1)
+        link = f"%{name}_link"
+        state = [f"%{name}_state{k}" for k in range(loop.carried)]
+        self.do(f"br label %{name}")
+        self.do(f"{name}:")
+        self.do(f"{link} = phi i64 [{first}, %{before}], [{link}_next, %{name}_end]")
+        for x, begin in zip(state, start, strict=True):
+            self.do(f"{x} = phi {self.number} [{begin}, %{before}], [{x}_next, %{name}_end]")
+        if loop is self.ahead_in:
+            self.fetch_ahead(link, n)
+        row = self.let(f"mul i64 {link}, {width}")
+        labels = [f"{name}_kind{kind}" for kind in kinds]
+        kind = self.let(f"load i8, ptr {self.address(kind_of, link, 'i8')}, align 1")
+        cases = " ".join(f"i8 {k}, label %{label}" for k, label in enumerate(labels))
+        self.do(f"switch i8 {kind}, label %{labels[-1]} [{cases}]" if len(labels) > 1 else f"br label %{labels[0]}")
+
+        def read(k: int) -> str:
+            if k < len(state):
+                return state[k]
+            k -= len(state)
+            if k < len(links):
+                return self.load(links[k], link)
+            return self.everywhere(constants, self.let(f"add i64 {row}, {k - len(links)}"))
+
+        new: list[list[str]] = []
+        for label, (graph, results) in zip(labels, loop.steps, strict=True):
+            self.do(f"{label}:")
+            values = _Values(self, graph, read)
+            self.graph(graph, reachable(graph, results), values)
+            names = [values[i] for i in results]
+            for x, array in zip(names[loop.carried :], each, strict=True):
+                self.store(x, array, link)
+            new.append(names[: loop.carried])
+            self.do(f"br label %{name}_end")
+        self.do(f"{name}_end:")
+        for x, of_kinds in zip(state, zip(*new, strict=True), strict=True):
+            ways = ", ".join(f"[{of_kind}, %{label}]" for of_kind, label in zip(of_kinds, labels, strict=True))
+            self.do(f"{x}_next = phi {self.number} {ways}")
+        self.do(f"{link}_next = add i64 {link}, {by}")
+        self.do(f"%{name}_done = icmp eq i64 {link}, {last}")
+        self.do(f"br i1 %{name}_done, label %{name}_left, label %{name}")
+        self.do(f"{name}_left:")
+        return _Left([f"{x}_next" for x in state], each)
+
+    def fetch_ahead(self, link: str = "0", links: int = 1) -> None:
+        """Ask for the memory of the next block while this one is worked on: a part of it at each link."""
+        self.intrinsics.add("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
+        for ahead in self.ahead:
+            lines = -(-ahead.size // (_LINE * links))
+            start = ahead.start
+            if links > 1:
+                start = self.address(start, self.let(f"mul i64 {link}, {lines * _LINE}"), "i8")
+            for line in range(lines):
+                address = self.address(start, line * _LINE, "i8")
+                self.do(f"call void @llvm.prefetch.p0(ptr {address}, i32 {int(ahead.is_written)}, i32 3, i32 1)")
 
     def _operation(self, node: Node, x: Sequence[str]) -> str:
         if node.op == "fma" and not self.has_fma:
@@ -153,42 +273,42 @@ class _Text:
 
     # ---- rows in memory, lanes in registers ----
 
-    def load_columns(self, pointer: str, width: int) -> list[str]:
-        """Return the columns of a block of rows (lanes, width), each a vector."""
+    def columns(self, pointer: str, width: int) -> Iterator[tuple[int, str]]:
+        """Give the columns of a block of rows (lanes, width), each a vector, with their numbers."""
         if self.lanes == 1 or width == 1:
-            return [self.let(f"load {self.number}, ptr {self.address(pointer, i)}, align 8") for i in range(width)]
-        columns: dict[int, str] = {}
+            for i in range(width):
+                yield i, self.let(f"load {self.number}, ptr {self.address(pointer, i)}, align 8")
+            return
         for start in _windows(width, self.lanes):
             rows = [self._load_row(pointer, r, start, width) for r in range(self.lanes)]
-            columns |= {start + k: x for k, x in enumerate(self._transposed(rows)) if start + k < width}
-        return [columns[i] for i in range(width)]
+            yield from ((start + k, x) for k, x in enumerate(self._transposed(rows)) if start + k < width)
 
-    def store_columns(self, pointer: str, columns: Sequence[str]) -> None:
+    def store_columns(self, pointer: str, values: "_Values", columns: Sequence[int]) -> None:
         """Write columns, each a vector, as a block of rows."""
         width = len(columns)
         if self.lanes == 1 or width == 1:
-            for i, x in enumerate(columns):
-                self.do(f"store {self.number} {x}, ptr {self.address(pointer, i)}, align 8")
+            for i, node in enumerate(columns):
+                self.do(f"store {self.number} {values[node]}, ptr {self.address(pointer, i)}, align 8")
             return
         for start in _windows(width, self.lanes):
-            block = [columns[start + k] if start + k < width else "poison" for k in range(self.lanes)]
+            block = [values[columns[start + k]] if start + k < width else "poison" for k in range(self.lanes)]
             # A row of fewer numbers than a vector begins where the one before it ends too far: it is written behind it.
             for r, row in enumerate(self._transposed(block)):
                 self._store_row(pointer, r, start, width, row)
 
-    def store_flags(self, pointer: str, columns: Sequence[str]) -> None:
+    def store_flags(self, pointer: str, values: "_Values", columns: Sequence[int]) -> None:
         """Write columns of truth values as a block of rows of bytes."""
         if len(columns) == _DOUBLE and self.lanes > 1:
             # A row of eight bytes is one word: each column sets a bit of it.
             words, truth, row = self.of("i64"), self.of("i1"), self.splat("i64 0")
-            for i, x in enumerate(columns):
-                one = self.let(
-                    f"select {truth} {x}, {words} {self.splat(f'i64 {1 << 8 * i}')}, {words} {self.splat('i64 0')}"
-                )
+            for i, node in enumerate(columns):
+                chosen = f"{words} {self.splat(f'i64 {1 << 8 * i}')}, {words} {self.splat('i64 0')}"
+                one = self.let(f"select {truth} {values[node]}, {chosen}")
                 row = self.let(f"or {words} {row}, {one}")
             self.do(f"store {words} {row}, ptr {pointer}, align 1")
             return
-        for i, x in enumerate(columns):
+        for i, node in enumerate(columns):
+            x = values[node]
             for r in range(self.lanes):
                 one = x if self.lanes == 1 else self.let(f"extractelement {self.of('i1')} {x}, i32 {r}")
                 place = self.address(pointer, r * len(columns) + i, "i8")
@@ -242,6 +362,96 @@ class _Text:
             return "poison"
         mask = ", ".join(f"i32 {k}" for k in picks)
         return self.let(f"shufflevector {self.number} {a}, {self.number} {b}, <{self.lanes} x i32> <{mask}>")
+
+
+class _Ahead(NamedTuple):
+    """Memory to ask for before it is needed: its address, its size [bytes], and whether it will be written."""
+
+    start: str
+    size: int
+    is_written: bool
+
+
+class _Left(NamedTuple):
+    """What a loop leaves: the names of the state's numbers, and the addresses of the results of the links."""
+
+    state: list[str]
+    each: list[str]
+
+
+class _Values:
+    """The names of the values of a graph, by node; what lies in memory is loaded wherever it is used."""
+
+    def __init__(self, text: _Text, graph: Graph, read: Callable[[int], str], inputs: str = "") -> None:
+        """Begin with the inputs.
+
+        Args:
+            text: where loads are written.
+            graph: whose values they are.
+            read: gives an input by its number.
+            inputs: the address of all inputs in scratch memory, if they are there.
+        """
+        self.names: dict[int, str] = {}
+        self._text, self._graph, self._read, self._inputs = text, graph, read, inputs
+        self._left: dict[int, _Left] = {}
+        self._copies: dict[tuple[int, ...], str] = {}
+
+    def __getitem__(self, i: int) -> str:
+        """Return the name of a value."""
+        op, operands, value = self._graph.nodes[i]
+        if op == "constant":
+            return self._text.constant(value)
+        if op == "input":
+            return self._read(int(value))
+        if op == "state":
+            return self._left[operands[0]].state[int(value)]
+        if op == "each":
+            return self._text.load(*self._place(operands[0], int(value)))
+        return self.names[i]
+
+    def loop(self, i: int) -> None:
+        """Write a loop."""
+        node = self._graph.nodes[i]
+        loop = self._graph.loops[int(node.value)]
+        links = [self._vectors(nodes) for nodes in loop.links(node.operands)]
+        self._left[i] = self._text.loop(loop, [self[k] for k in node.operands[: loop.carried]], links)
+
+    def _place(self, loop: int, value: int) -> tuple[str, int]:
+        """Return the array of a result of a loop, and which link's it is."""
+        k, link = divmod(value, len(self._graph.loops[int(self._graph.nodes[loop].value)].kinds))
+        return self._left[loop].each[k], link
+
+    def _vectors(self, nodes: tuple[int, ...]) -> str:
+        """Return the address of values one after the other, where they are already or where they are copied to."""
+        op, operands, first = self._graph.nodes[nodes[0]]
+        if op in ("each", "input") and all(
+            self._graph.nodes[k] == Node(op, operands, first + i) for i, k in enumerate(nodes)
+        ):
+            if op == "input" and self._inputs:
+                return self._text.address(self._inputs, int(first), self._text.number)
+            if op == "each" and (place := self._place(operands[0], int(first)))[1] == 0:
+                return place[0]
+        if nodes not in self._copies:
+            self._copies[nodes] = self._text.scratch(len(nodes))
+            for i, k in enumerate(nodes):
+                self._text.store(self[k], self._copies[nodes], i)
+        return self._copies[nodes]
+
+
+def _straight_first(graph: Graph, order: Sequence[int]) -> Sequence[int]:
+    """Return nodes in an order in which as much as possible stands before each loop."""
+    if not graph.loops:
+        return order
+    behind: dict[int, int] = {}
+    for i in order:
+        node = graph.nodes[i]
+        behind[i] = max((behind[k] for k in node.operands), default=0) + (node.op == "loop")
+    return sorted(order, key=behind.__getitem__)
+
+
+def _bits(value: float) -> int:
+    (bits,) = struct.unpack("<Q", struct.pack("<d", value))
+    return int(bits)
 
 
 def _windows(width: int, lanes: int) -> Iterator[int]:
@@ -302,7 +512,16 @@ def rows_ir(code: MachineCode, inputs: Sequence[Column], outputs: Sequence[Colum
     _copy_last_rows(text, inputs, here, spare)
     text.do("work:")
     places = [text.let(f"phi ptr [{a}, %block], [{b}, %copy]") for a, b in zip(here, spare, strict=True)]
-    _fetch_next_block(text, inputs, outputs, here)
+    text.ahead = [
+        _Ahead(text.address(start, lanes * one.size, "i8"), lanes * one.size, i >= len(inputs))
+        for i, (start, one) in enumerate(zip(here, arrays, strict=True))
+    ]
+    if code.graph.loops:
+        # The longest loop has the most time for it.
+        text.ahead_in = max(code.graph.loops, key=lambda loop: sum(len(step.graph.nodes) for step in loop.steps))
+    else:
+        text.ahead = [one for one in text.ahead if one.size <= _FETCHED]
+        text.fetch_ahead()
     bad, odd = _body(text, code, inputs, outputs, places)
     text.do(f"%bad_now = or {truth} %bad, {bad}")
     text.do(f"%odd_now = or {truth} %odd, {odd}")
@@ -338,16 +557,6 @@ def _copy_last_rows(text: _Text, inputs: Sequence[Column], here: Sequence[str], 
     text.do("br i1 %k_done, label %work, label %copy")
 
 
-def _fetch_next_block(text: _Text, inputs: Sequence[Column], outputs: Sequence[Column], here: Sequence[str]) -> None:
-    """Ask for the memory of the next block while this one is worked on."""
-    text.intrinsics.add("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
-    for i, (place, one) in enumerate(zip(here, [*inputs, *outputs], strict=True)):
-        block = text.lanes * one.size
-        for line in range(0, block if block <= _FETCHED else 0, _LINE):
-            ahead, is_written = text.address(place, block + line, "i8"), int(i >= len(inputs))
-            text.do(f"call void @llvm.prefetch.p0(ptr {ahead}, i32 {is_written}, i32 3, i32 1)")
-
-
 def lanes_ir(code: MachineCode, inputs: int, count: int, target: Target) -> str:
     """Return the IR of ``lanes(x, y)``, for configurations that lie side by side in memory.
 
@@ -368,7 +577,8 @@ def lanes_ir(code: MachineCode, inputs: int, count: int, target: Target) -> str:
     x, y = (text.address(array, "%first") for array in ("%x", "%y"))
     kind = text.number
     values = [text.let(f"load {kind}, ptr {text.address(x, i * count)}, align 8") for i in range(inputs)]
-    names = text.graph(code, values)
+    names = _Values(text, code.graph, values.__getitem__)
+    text.graph(code.graph, code.order, names)
     for i, node in enumerate(code.outputs):
         text.do(f"store {kind} {names[node]}, ptr {text.address(y, i * count)}, align 8")
     text.do(f"%next = add i64 %first, {target.lanes}")
@@ -385,13 +595,24 @@ def _body(
 ) -> tuple[str, str]:
     """Write the work on one block; return whether configurations are invalid, and unusual."""
     read, written = pointers[: len(inputs)], pointers[len(inputs) :]
-    values = [x for place, one in zip(read, inputs, strict=True) for x in text.load_columns(place, one.width)]
-    names = text.graph(code, values)
-    results = iter(code.outputs)
+    columns = [text.columns(place, one.width) for place, one in zip(read, inputs, strict=True)]
+    starts = [0, *accumulate(one.width for one in inputs)]
+    if code.graph.loops:
+        memory = text.scratch(starts[-1])
+        for start, of_input in zip(starts, columns, strict=False):
+            for i, x in of_input:
+                text.store(x, memory, start + i)
+        values = _Values(text, code.graph, lambda k: text.load(memory, k), memory)
+    else:
+        names = {start + i: x for start, of_input in zip(starts, columns, strict=False) for i, x in of_input}
+        values = _Values(text, code.graph, names.__getitem__)
+    text.graph(code.graph, code.order, values)
+    first = 0
     for place, one in zip(written, outputs, strict=True):
-        columns = [names[next(results)] for _ in range(one.width)]
-        (text.store_flags if one.flag else text.store_columns)(place, columns)
-    return tuple(text.never if x is None else names[x] for x in (code.invalid, code.unusual))  # type: ignore[return-value]
+        write = text.store_flags if one.flag else text.store_columns
+        write(place, values, code.outputs[first : first + one.width])
+        first += one.width
+    return tuple(text.never if x is None else values[x] for x in (code.invalid, code.unusual))  # type: ignore[return-value]
 
 
 def _status(text: _Text, bad: str, odd: str) -> str:

@@ -7,10 +7,12 @@ an arm's twists and offsets cost nothing.
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 _COMMUTE = frozenset({"add", "multiply"})
+# The values that a loop leaves.
+_OF_LOOPS = frozenset({"state", "each"})
 
 
 class Node(NamedTuple):
@@ -21,12 +23,59 @@ class Node(NamedTuple):
     value: float = 0.0
 
 
-class Graph:
-    """Nodes in an order in which each comes after its operands."""
+class LoopStep(NamedTuple):
+    """What a loop does for one kind of link.
 
-    def __init__(self) -> None:
+    Attributes:
+        graph: its inputs are the state, then the values of the link, then the constants of the link.
+        results: the nodes of the new state, then of the results of the link.
+    """
+
+    graph: "Graph"
+    results: tuple[int, ...]
+
+
+class Loop(NamedTuple):
+    """A loop over links.
+
+    Its node, ``loop``, has the number of the loop as its value, and takes the numbers of the state at the beginning,
+    and then, value by value, those of all links. Nodes that take it are the numbers of the last ``state``, and those of
+    ``each`` link: the value of link i of n for result k is k n + i.
+
+    Attributes:
+        steps: by the kind of link.
+        kinds: the kind of each link.
+        constants: of each link, as many as its kind has.
+        carried: how many numbers the state has.
+        reverse: whether the last link comes first.
+    """
+
+    steps: tuple[LoopStep, ...]
+    kinds: tuple[int, ...]
+    constants: tuple[tuple[float, ...], ...]
+    carried: int
+    reverse: bool
+
+    def links(self, operands: Sequence[int]) -> list[tuple[int, ...]]:
+        """Return the operands of the loop's node that are values of links: those of all links, for each value."""
+        n, values = len(self.kinds), operands[self.carried :]
+        return [tuple(values[k : k + n]) for k in range(0, len(values), n)]
+
+
+class Graph:
+    """Nodes in an order in which each comes after its operands.
+
+    Attributes:
+        nodes: all of them.
+        loops: what the nodes of loops do.
+        rolled_from: the number of links from which a scan becomes a loop; None if it never does.
+    """
+
+    def __init__(self, rolled_from: int | None = None) -> None:
         """Begin empty."""
         self.nodes: list[Node] = []
+        self.loops: list[Loop] = []
+        self.rolled_from = rolled_from
         self._known: dict[tuple[Any, ...], int] = {}
 
     def inputs(self, count: int) -> list["Traced"]:
@@ -48,17 +97,31 @@ class Graph:
             operands = tuple(sorted(operands))
         return self.record(Node(op, operands))
 
+    def loop(self, loop: Loop, operands: Sequence[int]) -> int:
+        """Return the node of a loop."""
+        self.loops.append(loop)
+        return self.record(Node("loop", tuple(operands), float(len(self.loops) - 1)))
+
     def value(self, node: int) -> float | None:
         """Return the value of a constant, None for any other node."""
         return self.nodes[node].value if self.nodes[node].op == "constant" else None
 
+    def known(self, node: Node) -> int | None:
+        """Return the number of a node, None if there is none like it."""
+        return self._known.get(_key(node))
+
     def record(self, node: Node) -> int:
         """Return the node of an operation as it is, the same one for the same operation."""
-        key = (node.op, node.operands, node.value, math.copysign(1.0, node.value))
+        key = _key(node)
         if key not in self._known:
             self._known[key] = len(self.nodes)
             self.nodes.append(node)
         return self._known[key]
+
+
+def _key(node: Node) -> tuple[Any, ...]:
+    """Tell a node from others; -0.0 is another constant than 0.0."""
+    return node.op, node.operands, node.value, math.copysign(1.0, node.value)
 
 
 _Operator: TypeAlias = Callable[["Traced", Any], "Traced"]
@@ -132,10 +195,47 @@ def reachable(graph: Graph, outputs: Iterable[int]) -> list[int]:
     return sorted(needed)
 
 
+def turned(graph: Graph) -> set[int]:
+    """Return the nodes that the argument of a sine or cosine comes of."""
+    angles: list[int] = []
+    for op, operands, value in graph.nodes:
+        if op in ("sin", "cos"):
+            angles.append(operands[0])
+        elif op == "loop":
+            angles += _turned_by_loop(graph.loops[int(value)], operands)
+    return set(reachable(graph, angles))
+
+
+def _turned_by_loop(loop: Loop, operands: Sequence[int]) -> list[int]:
+    """Return the operands of a loop of which the arguments of its sines and cosines come."""
+    angles: list[int] = []
+    values = loop.links(operands)
+    for kind, step in enumerate(loop.steps):
+        nodes = [step.graph.nodes[i] for i in turned(step.graph)]
+        inputs = {int(node.value) for node in nodes if node.op == "input"}
+        # An angle that comes of the state may come of anything.
+        if any(k < loop.carried for k in inputs):
+            return list(operands)
+        used = [values[k - loop.carried] for k in inputs if k - loop.carried < len(values)]
+        angles += [of_links[i] for of_links in used for i, of in enumerate(loop.kinds) if of == kind]
+    return angles
+
+
 def operation_count(graph: Graph, outputs: Iterable[int]) -> dict[str, int]:
-    """Count the operations that the outputs need, by kind; inputs and constants cost nothing."""
-    nodes = (graph.nodes[i] for i in reachable(graph, outputs))
-    return dict(sorted(Counter(node.op for node in nodes if node.operands).items()))
+    """Count the operations that the outputs need, by kind; inputs and constants cost nothing.
+
+    Those of a loop are counted for every link.
+    """
+    count: Counter[str] = Counter()
+    for node in (graph.nodes[i] for i in reachable(graph, outputs)):
+        if node.op == "loop":
+            loop = graph.loops[int(node.value)]
+            of_kinds = [operation_count(*step) for step in loop.steps]
+            for kind in loop.kinds:
+                count.update(of_kinds[kind])
+        elif node.operands and node.op not in _OF_LOOPS:
+            count[node.op] += 1
+    return dict(sorted(count.items()))
 
 
 def _ratio(a: float, b: float) -> float:

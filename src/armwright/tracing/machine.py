@@ -10,6 +10,8 @@ The operations are those of a ``Graph`` without ``sin``, ``cos``, ``atan2`` and 
 - ``bit``: whether a bit of the representation of a number is set; its number is the value of the second operand.
 - ``both``, ``either``, ``differ``, ``not``: of truth values.
 - ``number``: 1 for a truth value that holds, else 0.
+
+The steps of loops are translated in the same way, each by itself; only numbers come in and go out.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,7 +19,7 @@ from typing import NamedTuple
 
 from armwright.arrays import LARGEST
 from armwright.tracing.elementary import arc_tangent, root, rounded, sine_cosine
-from armwright.tracing.graph import Graph, Node, Traced, reachable
+from armwright.tracing.graph import Graph, Loop, LoopStep, Node, Traced, reachable
 
 # The operations whose result is a truth value.
 TRUTHS = frozenset({"less", "less_equal", "bit", "both", "either", "differ", "not"})
@@ -79,24 +81,28 @@ def machine_code(
         flags: which outputs, by their places, are truth values.
     """
     watched = watched or Watched()
-    required = [*outputs, *watched.positive]
-    order = reachable(graph, [*watched.angles, *watched.others, *required])
-    joined = fused(graph, order, required)
     target = _Target(Graph())
-    new: dict[int, int] = {}
-    absorbed = set(joined.values())
-    for i in order:
-        if i not in absorbed:
-            new[i] = target.translate(graph.nodes[i], new, _product(graph, joined.get(i)))
+    new = target.translated(graph, [*watched.angles, *watched.others], [*outputs, *watched.positive])
     truths = set(flags)
     ends = [target.truth(new[i]) if k in truths else target.number(new[i]) for k, i in enumerate(outputs)]
     invalid, unusual = target.verdicts(watched, new)
     all_ends = [*ends, *(x for x in (invalid, unusual) if x is not None)]
-    return MachineCode(target.graph, reachable(target.graph, all_ends), ends, invalid, unusual, len(joined))
+    return MachineCode(target.graph, reachable(target.graph, all_ends), ends, invalid, unusual, target.joined)
 
 
 def _product(graph: Graph, number: int | None) -> tuple[int, Node] | None:
     return None if number is None else (number, graph.nodes[number])
+
+
+def _used_results(graph: Graph, order: Iterable[int]) -> dict[int, list[int]]:
+    """Return which results of the links are used, by the node of the loop."""
+    used: dict[int, set[int]] = {}
+    for i in order:
+        op, operands, value = graph.nodes[i]
+        if op == "each":
+            loop = graph.loops[int(graph.nodes[operands[0]].value)]
+            used.setdefault(operands[0], set()).add(int(value) // len(loop.kinds))
+    return {i: sorted(results) for i, results in used.items()}
 
 
 class _Target:
@@ -104,7 +110,41 @@ class _Target:
 
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
+        self.joined = 0
         self._circles: dict[int, tuple[Traced, Traced]] = {}
+
+    def translated(self, graph: Graph, inputs: Sequence[int], required: Sequence[int]) -> dict[int, int]:
+        """Translate what inputs and required nodes of a traced graph need; return the new nodes by the old ones."""
+        order = reachable(graph, [*inputs, *required])
+        joined = fused(graph, order, required)
+        self.joined += len(joined)
+        new: dict[int, int] = {}
+        absorbed = set(joined.values())
+        used = _used_results(graph, order)
+        for i in order:
+            node = graph.nodes[i]
+            if node.op == "loop":
+                new[i] = self._loop(graph.loops[int(node.value)], used.get(i, []), [new[k] for k in node.operands])
+            elif node.op == "each":
+                (loop,) = node.operands
+                links = len(graph.loops[int(graph.nodes[loop].value)].kinds)
+                k, link = divmod(int(node.value), links)
+                place = used[loop].index(k) * links + link
+                new[i] = self.graph.record(Node("each", (new[loop],), float(place)))
+            elif i not in absorbed:
+                new[i] = self.translate(node, new, _product(graph, joined.get(i)))
+        return new
+
+    def _loop(self, loop: Loop, used: Sequence[int], operands: Sequence[int]) -> int:
+        """Return the node of a loop that leaves of the results of the links those that are used."""
+        steps = []
+        for step in loop.steps:
+            results = [*step.results[: loop.carried], *(step.results[loop.carried + k] for k in used)]
+            target = _Target(Graph())
+            new = target.translated(step.graph, [], results)
+            steps.append(LoopStep(target.graph, tuple(target.number(new[i]) for i in results)))
+            self.joined += target.joined * loop.kinds.count(len(steps) - 1)
+        return self.graph.loop(loop._replace(steps=tuple(steps)), [self.number(i) for i in operands])
 
     def translate(self, node: Node, new: Mapping[int, int], product: tuple[int, Node] | None) -> int:
         """Return the node for one of the traced graph, whose operands are translated; ``product``: what it takes in."""
@@ -115,6 +155,8 @@ class _Target:
         operands = [new[i] for i in node.operands]
         if node.op == "select":
             return self._op("select", self.truth(operands[0]), *map(self.number, operands[1:]))
+        if node.op == "state":
+            return self.graph.record(node._replace(operands=tuple(operands)))
         operands = [self.number(i) for i in operands]
         if node.op in _WRITTEN_OUT:
             return _WRITTEN_OUT[node.op](*(Traced(self.graph, i) for i in operands)).node

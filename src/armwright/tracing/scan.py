@@ -1,0 +1,252 @@
+"""Loops over links: written once as a step, run link by link, or left as a loop in the graph of a long arm.
+
+On floats and arrays a scan is a loop of Python, and so it is on traced scalars unless their graph rolls: its code then
+has every link written out, with all that is 0 or 1 there left away. For a long arm that is too much code to be fast.
+There the step is traced once for each kind of link, and the graph holds a loop.
+"""
+
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from armwright.tracing.graph import Graph, Loop, LoopStep, Node, Traced
+
+# A scalar, or lists, tuples and named tuples of trees. What is no number (a truth value) tells kinds of links apart.
+Tree = Any
+
+
+def scan(
+    step: Callable[..., tuple[Tree, Tree]], state: Tree, *per_link: Sequence[Tree], reverse: bool = False
+) -> tuple[Tree, list[Tree]]:
+    """Apply a step to one link after the other.
+
+    Args:
+        step: takes the state and the tree of each of ``per_link`` for one link; returns the new state, whose shape
+            is that of the old one, and a tree of results. It may ask what kind a link is by truth values in its
+            trees, not by numbers.
+        state: before the first link.
+        per_link: sequences of trees, each with one for every link.
+        reverse: whether the last link comes first.
+
+    Returns:
+        The state after the last step, and the results of every link in the order of the links.
+    """
+    links = list(zip(*per_link, strict=True))
+    graph = next((x.graph for x in _numbers((state, links)) if isinstance(x, Traced)), None)
+    if graph is not None and graph.rolled_from is not None and len(links) >= graph.rolled_from:
+        return _Rolled(graph, step, state, links, reverse=reverse).result()
+    results: list[Tree] = [None] * len(links)
+    for i in reversed(range(len(links))) if reverse else range(len(links)):
+        state, results[i] = step(state, *links[i])
+    return state, results
+
+
+def _is_number(leaf: Tree) -> bool:
+    return not (leaf is None or isinstance(leaf, bool | str))
+
+
+def _numbers(tree: Tree) -> Iterator[Any]:
+    """Give the numbers of a tree, in order."""
+    if isinstance(tree, list | tuple):
+        for part in tree:
+            yield from _numbers(part)
+    elif _is_number(tree):
+        yield tree
+
+
+def _replaced(tree: Tree, numbers: Iterator[Any]) -> Tree:
+    """Return a tree with other numbers."""
+    if not isinstance(tree, list | tuple):
+        return next(numbers) if _is_number(tree) else tree
+    parts = [_replaced(part, numbers) for part in tree]
+    return type(tree)(*parts) if hasattr(tree, "_fields") else type(tree)(parts)
+
+
+def _kind(tree: Tree) -> Hashable:
+    """Return what trees have in common for which a step does the same operations."""
+    if isinstance(tree, list | tuple):
+        return type(tree), *map(_kind, tree)
+    return isinstance(tree, Traced) if _is_number(tree) else (tree,)
+
+
+class _Links(NamedTuple):
+    """The links of one kind.
+
+    Attributes:
+        tree: of one of them.
+        numbers: of all of them, by the link.
+    """
+
+    tree: Tree
+    numbers: dict[int, list[Any]]
+
+    def columns(self) -> list[tuple[Any, ...]]:
+        """Return the values of each number in all of the links."""
+        return list(zip(*self.numbers.values(), strict=True))
+
+
+class _TracedStep(NamedTuple):
+    """A step as it is traced for one kind of link: its graph, and the nodes of the new state and of the results."""
+
+    graph: Graph
+    state: list[int]
+    results: list[int]
+    tree: Tree
+
+
+class _Rolled:
+    """A scan that becomes a loop of a graph.
+
+    The inputs of the graph of a step are the state, then what is traced of every link, then the constants of a link. A
+    number that is the same in all links of a kind is no input but a constant of the step.
+    """
+
+    def __init__(
+        self, graph: Graph, step: Callable[..., tuple[Tree, Tree]], state: Tree, links: Sequence[Tree], *, reverse: bool
+    ) -> None:
+        self.graph, self.step, self.state, self.count, self.reverse = graph, step, state, len(links), reverse
+        found: dict[Hashable, _Links] = {}
+        for i, link in enumerate(links):
+            found.setdefault(_kind(link), _Links(link, {})).numbers[i] = list(_numbers(link))
+        self.kinds = list(found.values())
+        self.sequences = self._sequences()
+        self.tables = [self._table(kind) for kind in self.kinds]
+
+    def result(self) -> tuple[Tree, list[Tree]]:
+        """Leave the loop in the graph; return what ``scan`` does."""
+        start = _nodes(self.graph, self.state)
+        places, steps = self._traced_steps(start)
+        carried = max(places, default=-1) + 1
+        inputs = carried + len(self.sequences)
+        stored = [list(dict.fromkeys(r for r in one.results if self._is_computed(one, r, carried))) for one in steps]
+        outputs = max(map(len, stored))
+        # A kind with fewer results than another has anything in their place.
+        filled = [
+            [*of, *[one.graph.constant(0.0)] * (outputs - len(of))] for one, of in zip(steps, stored, strict=True)
+        ]
+        constants = [list(table) for table in self.tables]
+        rows: list[tuple[float, ...]] = [()] * self.count
+        kind_of = [0] * self.count
+        for k, kind in enumerate(self.kinds):
+            for j, i in enumerate(kind.numbers):
+                rows[i], kind_of[i] = tuple(column[j] for column in constants[k]), k
+        firsts = [places.index(k) for k in range(carried)]
+        loop = Loop(
+            steps=tuple(
+                LoopStep(one.graph, (*(one.state[f] for f in firsts), *results))
+                for one, results in zip(steps, filled, strict=True)
+            ),
+            kinds=tuple(kind_of),
+            constants=tuple(rows),
+            carried=carried,
+            reverse=self.reverse,
+        )
+        operands = [*(start[f] for f in firsts), *(node for sequence in self.sequences.values() for node in sequence)]
+        node = self.graph.loop(loop, operands)
+        state = _replaced(self.state, iter([self._of_loop("state", node, k) for k in places]))
+        results: list[Tree] = [None] * self.count
+        sequences = list(self.sequences.values())
+        for one, kind, store, table in zip(steps, self.kinds, stored, constants, strict=True):
+            for j, i in enumerate(kind.numbers):
+                values: list[Any] = []
+                for r in one.results:
+                    op, _, value = one.graph.nodes[r]
+                    if r in store:
+                        values.append(self._of_loop("each", node, store.index(r) * self.count + i))
+                    elif op == "constant":
+                        values.append(value)
+                    elif value < inputs:
+                        values.append(Traced(self.graph, sequences[int(value) - carried][i]))
+                    else:
+                        values.append(table[int(value) - inputs][j])
+                results[i] = _replaced(one.tree, iter(values))
+        return state, results
+
+    def _sequences(self) -> dict[Hashable, list[int]]:
+        """Return the nodes of all links for what is traced of a link, by where these come from."""
+        sequences: dict[Hashable, list[int]] = {}
+        for kind in self.kinds:
+            for column in kind.columns():
+                if isinstance(column[0], Traced):
+                    source = self._source(kind, column)
+                    sequence = sequences.setdefault(source, self._from(source))
+                    for i, x in zip(kind.numbers, column, strict=True):
+                        sequence[i] = x.node
+        return sequences
+
+    def _source(self, kind: _Links, column: Sequence[Traced]) -> Hashable:
+        """Return where the values of a number come from: a loop before this one, neighbouring inputs, or anywhere."""
+        sources: set[Hashable] = set()
+        for i, x in zip(kind.numbers, column, strict=True):
+            op, operands, value = self.graph.nodes[x.node]
+            sources.add((op, operands, value - i) if op in ("each", "input") else None)
+        (source, *others) = sources
+        # Other scalars come one by one; each is known by itself where it is used again.
+        return tuple(x.node for x in column) if others or source is None else source
+
+    def _from(self, source: Any) -> list[int]:
+        """Return the nodes of all links of a source; for links that do not use it, where there is none, a constant."""
+        zero = self.graph.constant(0.0)
+        if source[0] not in ("each", "input"):
+            return [zero] * self.count
+        op, operands, first = source
+        if op == "each":
+            return [self.graph.record(Node(op, operands, first + i)) for i in range(self.count)]
+        inputs = [self.graph.known(Node(op, operands, first + i)) for i in range(self.count)]
+        return [zero if x is None else x for x in inputs]
+
+    @staticmethod
+    def _table(kind: _Links) -> list[tuple[float, ...]]:
+        """Return the constants that differ from link to link, each once: their values in all links."""
+        constants = (tuple(map(float, c)) for c in kind.columns() if not isinstance(c[0], Traced))
+        return list(dict.fromkeys(c for c in constants if any(x != c[0] for x in c)))
+
+    def _traced_steps(self, start: Sequence[int]) -> tuple[list[int], list[_TracedStep]]:
+        """Trace the step for all kinds; return where in the loop's state each number of the state is, too.
+
+        Numbers of the state that are equal in every link, such as both halves of a symmetric matrix, are one there:
+        those that begin equal are taken to be, until a step makes them differ.
+        """
+        places = _numbered(start)
+        while True:
+            steps = [self._traced_step(k, places) for k in range(len(self.kinds))]
+            finer = _numbered(zip(places, *(one.state for one in steps), strict=True))
+            if finer == places:
+                return places, steps
+            places = finer
+
+    def _traced_step(self, k: int, places: Sequence[int]) -> _TracedStep:
+        kind, table = self.kinds[k], self.tables[k]
+        graph = Graph()
+        state = graph.inputs(max(places, default=-1) + 1)
+        traced = dict(zip(self.sequences, graph.inputs(len(self.sequences)), strict=True))
+        constants = dict(zip(table, graph.inputs(len(table)), strict=True))
+        numbers: list[Any] = []
+        for column in kind.columns():
+            if isinstance(column[0], Traced):
+                numbers.append(traced[self._source(kind, column)])
+            else:
+                numbers.append(constants.get(tuple(map(float, column)), column[0]))
+        new, results = self.step(
+            _replaced(self.state, iter([state[p] for p in places])), *_replaced(kind.tree, iter(numbers))
+        )
+        return _TracedStep(graph, _nodes(graph, new), _nodes(graph, results), results)
+
+    @staticmethod
+    def _is_computed(step: _TracedStep, result: int, carried: int) -> bool:
+        """Whether a result must be stored: not where it is a constant or an input of the link, as it came in."""
+        op, _, value = step.graph.nodes[result]
+        return not (op == "constant" or (op == "input" and value >= carried))
+
+    def _of_loop(self, op: str, loop: int, value: int) -> Traced:
+        return Traced(self.graph, self.graph.record(Node(op, (loop,), float(value))))
+
+
+def _nodes(graph: Graph, tree: Tree) -> list[int]:
+    """Return the nodes of the numbers of a tree."""
+    return [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in _numbers(tree)]
+
+
+def _numbered(values: Iterable[Hashable]) -> list[int]:
+    """Return for each value the number of its like, in the order in which they come first."""
+    known: dict[Hashable, int] = {}
+    return [known.setdefault(value, len(known)) for value in values]
