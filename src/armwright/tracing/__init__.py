@@ -2,8 +2,8 @@
 
 An equation is a plain function of scalars. What a scalar is, the caller decides: a float gives one value, and a NumPy
 array one value per configuration, all in one sweep. A traced scalar leaves a graph of the operations (``graph``), in
-which shared terms are one node and constants are folded. A graph can be differentiated (``derivatives``), evaluated with
-NumPy (``evaluation``), and compiled (``emit``, ``native``) into a kernel that is called with arrays (``kernel``).
+which shared terms are one node and constants are folded. A graph can be differentiated (``derivatives``), evaluated
+with NumPy (``evaluation``), and compiled (``emit``, ``native``) into a kernel that takes arrays (``kernel``).
 
 The functions of this namespace are those that an equation may use beside + - * /, abs and comparisons.
 """
