@@ -9,15 +9,18 @@ import pytest
 
 import armwright
 from armwright.arm.load import load_arm
+from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.compiled.derivatives import derivative
+from armwright.dynamics.derivatives import forward_dynamics_derivatives, inverse_dynamics_derivatives
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
+from armwright.dynamics.regressors import regressor
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError
 from armwright.tracing import atan2, cos, select, sin, sqrt
 from armwright.tracing.scalar import Scalar
-from oracles.arms import random_arm
+from oracles.arms import of_all_kinds, random_arm
 
 ROUNDING = 1e-12  # relative to the largest number
 STEP = 1e-5
@@ -152,6 +155,29 @@ def test_mistakes(arguments: dict[str, object], error: type[Exception], message:
 
     with pytest.raises(error, match=message):
         derivative(given.pop("equation"), given.pop("inputs"), **given)  # type: ignore[arg-type]
+
+
+def test_arms_of_all_kinds(rng: np.random.Generator) -> None:
+    """Compiled derivatives and regressors of arms with fixed transforms, weightless links and friction are the plain.
+
+    Among the velocities are those of joints at rest.
+    """
+    arm = of_all_kinds(random_arm(rng, 4), rng)
+    fast, motion = armwright.compile_arm(arm), rng.normal(size=(3, 21, 4))
+    motion[1, ::4, ::2] = 0.0
+    for plain in (inverse_dynamics_derivatives, forward_dynamics_derivatives, regressor):
+        found, expected = getattr(fast, plain.__name__)(*motion), plain(arm, *motion)
+
+        for one, other in zip(*((x,) if isinstance(x, np.ndarray) else x for x in (found, expected)), strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-10 * np.abs(other).max())
+
+
+def test_inputs_that_no_derivative_needs() -> None:
+    """An acceleration that is NaN is refused, though derivatives may not depend on it."""
+    slide = Arm(name="slide", joints=[Joint(kind="prismatic")], links=[Link(mass=1.0)])
+
+    with pytest.raises(InvalidValueError, match="qdd: every number must be finite"):
+        armwright.compile_arm(slide).inverse_dynamics_derivatives([0.0], [0.0], [np.nan])
 
 
 def test_catalogue_arm_by_the_class(rng: np.random.Generator) -> None:

@@ -10,8 +10,9 @@ from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.dynamics.accelerations import forward_dynamics
 from armwright.dynamics.derivatives import effort_partials, forward_dynamics_derivatives, inverse_dynamics_derivatives
+from armwright.dynamics.drives import with_drives
 from armwright.dynamics.inertia_matrix import mass_matrix
-from armwright.dynamics.newton_euler import drive_effort, newton_euler
+from armwright.dynamics.newton_euler import newton_euler
 from armwright.errors import InvalidValueError, ShapeError, UnitWarning, UnsupportedArmError
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph
@@ -69,7 +70,8 @@ def test_forward_dynamics_against_pinocchio(sample: Sample) -> None:
             found = forward_dynamics_derivatives(arm, q, qd, tau)
 
             M = mass_matrix(arm, q)
-            friction = [drive_effort(motor, speed, 0.0) for motor, speed in zip(arm.motors, qd.tolist(), strict=True)]
+            still = [0.0] * arm.n
+            friction = with_drives(arm, still, qd.tolist(), still)
             pin.computeABADerivatives(model, data, q, qd, tau - friction)
             inverse = np.triu(data.Minv) + np.triu(data.Minv, 1).T
             tolerance = max(AGREEMENT, OF_INVERSE * np.linalg.cond(M))
@@ -99,9 +101,7 @@ def test_against_complex_steps(rng: np.random.Generator) -> None:
     arm = of_all_kinds(random_arm(rng, 4), rng)
     graph = Graph()
     inputs = [graph.inputs(4) for _ in range(3)]
-    efforts = [
-        x + drive_effort(*of) for x, *of in zip(newton_euler(arm, *inputs), arm.motors, *inputs[1:], strict=True)
-    ]
+    efforts = with_drives(arm, newton_euler(arm, *inputs), *inputs[1:])
     values = rng.normal(size=12).tolist()
 
     matrices = effort_partials(arm, *inputs)

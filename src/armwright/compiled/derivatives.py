@@ -52,7 +52,7 @@ def derivative(
             identifier.
 
     Source:
-        Griewank & Walther (2008), Evaluating Derivatives, chapters 3 to 5.
+        Griewank & Walther (2008), Evaluating Derivatives, chapters 3 and 5.
     """
     shapes = {name: _shape(name, value) for name, value in inputs.items()}
     names = [of] if isinstance(of, str) else list(of)

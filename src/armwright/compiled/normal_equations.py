@@ -60,7 +60,7 @@ def normal_equations(
         UnsupportedArmError: the mass of a link is unknown.
 
     Source:
-        Khalil & Dombre (2002), section 12.4.
+        Khalil & Dombre (2002), chapter 12.
     """
     fast = arm if isinstance(arm, CompiledArm) else compile_arm(arm)
     n = fast.arm.n

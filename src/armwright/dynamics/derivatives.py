@@ -115,12 +115,12 @@ def _evaluated(traced: _TracedMatrices, scalars: Sequence[Scalars]) -> list[Matr
     return [[[next(values) for _ in row] for row in A] for A in traced.matrices]
 
 
-@lru_cache(maxsize=16)  # to trace takes a tenth of a second, and an arm does not change
+@lru_cache(maxsize=4)  # to trace takes a tenth of a second, and an arm does not change
 def _traced_efforts(arm: Arm) -> _TracedMatrices:
     return _traced(arm, effort_partials)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=4)
 def _traced_accelerations(arm: Arm) -> _TracedMatrices:
     def matrices(arm: Arm, q: list[Traced], qd: list[Traced], tau: list[Traced]) -> list[Matrix]:
         partials, pivots = acceleration_partials(arm, q, qd, tau)

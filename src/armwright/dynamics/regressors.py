@@ -41,7 +41,7 @@ def regressor(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         UnsupportedArmError: the mass of a link is unknown.
 
     Source:
-        Khalil & Dombre (2002), section 9.4.
+        Khalil & Dombre (2002), chapter 12; the columns by partial velocities, Kane & Levinson (1985).
     """
     lead, scalars, _ = batch(arm, q=q, qd=qd, qdd=qdd)
     return stack_matrix(effort_regressor(arm, *scalars), lead)

@@ -12,7 +12,7 @@ Where an operation has no derivative, the one here is
 - 0 for a root at 0 and below, where ``sqrt`` itself is 0.
 
 Source:
-    Griewank & Walther (2008), Evaluating Derivatives, chapters 3 and 6.
+    Griewank & Walther (2008), Evaluating Derivatives, chapter 3.
 """
 
 from collections.abc import Callable, Mapping, Sequence
