@@ -3,6 +3,7 @@
 import copy
 import gc
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -188,6 +189,7 @@ def test_arrays_that_cannot_be_filled(both: Callable[..., Any], double: Callable
         r"\(4, 2\) float64": x[:, :2].copy(),
         r"\(3,\) float64": np.empty(3),
         r"\[\[1\], \[1, 2\]\]": [[1], [1, 2]],
+        r"\(4, 3\) float64 masked": np.ma.array(x),
         "5": 5,
         "none": (),
     }
@@ -292,6 +294,8 @@ def test_a_function_keeps_its_kernel_and_no_longer() -> None:
     for one in (function, *copies):
         np.testing.assert_array_equal(one(np.ones(3), np.ones((2, 2)))[0], (2, 0, 2))
     assert (function.__name__, function.__doc__) == ("both", "Return.")
+    with pytest.raises(TypeError, match="cannot be pickled"):
+        pickle.dumps(function)
     del function, copies, one
     gc.collect()
     assert gone() is None

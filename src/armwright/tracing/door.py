@@ -13,7 +13,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -54,8 +54,23 @@ class Passed(NamedTuple):
     kind: type
 
 
+# A function and its arguments, which make an object in another process.
+Origin: TypeAlias = tuple[Callable[..., object], tuple[object, ...]]
+
+
 class _Table(bytes):
-    """What a function needs to know, as it reads it; and, as an attribute, what must live as long."""
+    """What a function needs to know, as it reads it; and, as attributes, what must live as long, and its origin.
+
+    For Python it is the object of which the function is a method: a function is pickled as that object and its name.
+    """
+
+    keep: tuple[object, ...]
+    origin: Origin | None
+
+    def __reduce__(self) -> Origin:
+        if self.origin is None:
+            raise TypeError("the function of a kernel cannot be pickled: pickle what it was made of")
+        return self.origin
 
 
 class Door:
@@ -79,13 +94,16 @@ class Door:
         for table in self._tables:
             ctypes.c_uint64.from_address(_address_of(table) + _PLACE[part]).value = address
 
-    def open(self, name: str, doc: str, careful: Callable[..., Any]) -> Callable[..., Any]:
+    def open(
+        self, name: str, doc: str, careful: Callable[..., Any], origin: Origin | None = None
+    ) -> Callable[..., Any]:
         """Return a built-in function, or the careful one where the arrays are of a shape it does not know.
 
         Args:
             name: of the function.
             doc: its docstring, behind its signature in the form of built-in functions.
             careful: takes the same arguments in all other cases.
+            origin: makes an object that has the function as its method, for another process; None where none does.
         """
         arrays = [*self._inputs, *self._outputs]
         if not layout_is_known() or not all(1 <= len(one.shape) <= _AXES_MAX for one in arrays):
@@ -105,7 +123,8 @@ class Door:
         definition = [_address_of(texts[0]), address, _METH_FASTCALL | _METH_KEYWORDS, _address_of(texts[1])]
         table = _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())
         # The object of the function owns the table, and the table all that it points to.
-        table.keep = (careful, shapes, kinds, texts, np.empty, _OUT, _THREADS)  # type: ignore[attr-defined]
+        table.keep = (careful, shapes, kinds, texts, np.empty, _OUT, _THREADS)
+        table.origin = origin
         self._tables.append(table)
         for part, place in self._kernels.items():  # another thread may have compiled it meanwhile
             self.connect(part, place)
