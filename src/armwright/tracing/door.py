@@ -21,6 +21,7 @@ from armwright.tracing.native import function_address
 
 # Where the fields of objects are, behind what every object begins with [bytes].
 _HEAD = object.__basicsize__
+_TYPE = _HEAD - 8
 _TUPLE_SIZE, _TUPLE_ITEMS = _HEAD, tuple.__basicsize__
 _BYTES_DATA = bytes.__basicsize__ - 1
 # Of an array: its numbers, how many axes, their lengths, the kind of its numbers, and what is so of it.
@@ -158,7 +159,7 @@ def layout_is_known() -> bool:
 
     lengths = word(array, _LENGTHS)
     found = (
-        word(array, 8 + _HEAD - 16), word(array, _DATA), word(array, _AXES, ctypes.c_int32),
+        word(array, _TYPE), word(array, _DATA), word(array, _AXES, ctypes.c_int32),
         ctypes.c_int64.from_address(lengths).value, ctypes.c_int64.from_address(lengths + 8).value,
         word(array, _KIND), word(array, _FLAGS, ctypes.c_int32) & _WRITABLE,
         word(pair, _TUPLE_SIZE), word(pair, _TUPLE_ITEMS), ctypes.string_at(id(text) + _BYTES_DATA),
@@ -256,7 +257,7 @@ def _ir(inputs: int, outputs: int) -> str:
     text.do(f"%alone = phi i1 [false, %start], [{one_thread}, %named_end]")
     objects = [text.load("ptr", "%args", 8 * k) for k in ins]
     text.unless(
-        text.all([text.equal(text.load("ptr", x, _HEAD - 8), text.known("array_type")) for x in objects]), "careful"
+        text.all([text.equal(text.load("ptr", x, _TYPE), text.known("array_type")) for x in objects]), "careful"
     )
     text.unless(text.all([_is_plain(text, x, k, _READABLE) for k, x in enumerate(objects)]), "careful")
     axes = [text.let(f"sext i32 {text.load('i32', x, _AXES)} to i64") for x in objects]
@@ -333,11 +334,11 @@ def _case(text: _Text, objects: Sequence[str], axes: Sequence[str], ins: range, 
     text.do(f"{case}_given:")
     given = ["%out"]
     if len(outs) > 1:
-        text.unless(text.equal(text.load("ptr", "%out", _HEAD - 8), text.known("tuple_type")), "careful")
+        text.unless(text.equal(text.load("ptr", "%out", _TYPE), text.known("tuple_type")), "careful")
         text.unless(text.equal(text.load("i64", "%out", _TUPLE_SIZE), len(outs), "i64"), "careful")
         given = [text.load("ptr", "%out", _TUPLE_ITEMS + 8 * i) for i in range(len(outs))]
     text.unless(
-        text.all([text.equal(text.load("ptr", x, _HEAD - 8), text.known("array_type")) for x in given]), "careful"
+        text.all([text.equal(text.load("ptr", x, _TYPE), text.known("array_type")) for x in given]), "careful"
     )
     text.unless(text.all([_is_plain(text, x, k, _WRITABLE) for k, x in zip(outs, given, strict=True)]), "careful")
     for k, x in zip(outs, given, strict=True):
