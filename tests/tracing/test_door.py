@@ -348,6 +348,24 @@ def test_a_signal_ends_a_call_and_its_work(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(ended) == so_far
 
 
+def test_no_more_threads(double: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
+    """Where the system gives one thread and then none, the work is done without."""
+    pool, given = kernels._pool(), []
+
+    class Limited:
+        def submit(self, *work: Any) -> Any:
+            if given:
+                raise RuntimeError("can't start new thread")
+            given.append(pool.submit(*work))
+            return given[0]
+
+    monkeypatch.setattr(kernels, "_pool", Limited)
+    x = rng.standard_normal((20_000, 3))
+
+    np.testing.assert_array_equal(double(x, threads=3), 2 * x)
+    assert given[0].done()
+
+
 _FORKED = """
 import os, signal, sys, threading
 import numpy as np

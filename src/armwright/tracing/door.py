@@ -337,9 +337,7 @@ def _case(text: _Text, objects: Sequence[str], axes: Sequence[str], ins: range, 
         text.unless(text.equal(text.load("ptr", "%out", _TYPE), text.known("tuple_type")), "careful")
         text.unless(text.equal(text.load("i64", "%out", _TUPLE_SIZE), len(outs), "i64"), "careful")
         given = [text.load("ptr", "%out", _TUPLE_ITEMS + 8 * i) for i in range(len(outs))]
-    text.unless(
-        text.all([text.equal(text.load("ptr", x, _TYPE), text.known("array_type")) for x in given]), "careful"
-    )
+    text.unless(text.all([text.equal(text.load("ptr", x, _TYPE), text.known("array_type")) for x in given]), "careful")
     text.unless(text.all([_is_plain(text, x, k, _WRITABLE) for k, x in zip(outs, given, strict=True)]), "careful")
     for k, x in zip(outs, given, strict=True):
         text.unless(text.all(_fits(text, x, k, many)), "careful")

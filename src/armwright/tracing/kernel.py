@@ -4,7 +4,7 @@ import ctypes
 import math
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache, cached_property, reduce
 from inspect import Parameter, Signature
 from itertools import combinations, pairwise
@@ -184,14 +184,19 @@ class Kernel:
         parts = _parts(rows, threads, max(rows // _ROWS_PER_THREAD, 1))
         if len(parts) == 1:
             return work(0, rows)
-        jobs = [_pool().submit(work, first, last) for first, last in parts]
+        jobs: list[Future[int]] = []
         try:
+            for first, last in parts:
+                jobs.append(_pool().submit(work, first, last))
             return reduce(or_, (job.result() for job in jobs))
-        except BaseException:
+        except BaseException as error:
             # Nothing is written to the caller's arrays after a signal has ended the call.
             called_off.append(True)
             wait(jobs)
-            raise
+            if not isinstance(error, RuntimeError):
+                raise
+        # The system gives no more threads, or the process is about to end.
+        return self._run(arrays, lead, results, 1)
 
 
 # The functions of a kernel; what they are given is let go of by the interpreter meanwhile.
