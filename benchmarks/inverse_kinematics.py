@@ -10,7 +10,7 @@ from armwright.arm.load import load_arm
 from armwright.compiled.arm import compile_arm
 from armwright.kinematics.forward_kinematics import link_poses
 
-ROWS = 200_000
+ROWS = 8_000
 FEW = 5_000
 SLOW = 100
 ARMS = ("puma560", "ur5")

@@ -12,7 +12,7 @@ from armwright.compiled.arm import compile_arm
 from armwright.kinematics.forward_kinematics import link_poses
 from oracles.with_pinocchio import pinocchio_model
 
-ROWS = 200_000
+ROWS = 8_000
 FEW = 2_000  # for the peers that are called row by row
 SLOW = 100
 ARMS = ("stanford", "puma560", "ur5")

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 # Before NumPy is loaded: one thread, and one core for everything this process starts.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -40,6 +41,24 @@ def per_call(*works: Callable[[], object], calls: int = 5000, repeats: int = REP
         return run
 
     return [taken / calls for taken in in_turn(*map(many, works), repeats=repeats)]
+
+
+def compiled_for(arm: Any, lanes: int) -> Any:
+    """Return an arm compiled for vectors of 8 numbers (AVX-512) or of 4, as for a processor with AVX2 and FMA alone."""
+    from armwright.compiled.arm import CompiledArm
+    from armwright.tracing import kernel, native
+    from armwright.tracing.emit_llvm import Target
+
+    host = native.processor()
+    if lanes < host.target.lanes:
+        host = native.Processor("haswell", "", Target(lanes, has_fma=True))
+    native.processor = kernel.processor = lambda: host
+    return CompiledArm(arm=arm)
+
+
+def call_cost(function: Callable[..., object], *arguments: object, calls: int = 20_000) -> float:
+    """Return what a call from Python costs that does nothing [s], such as of a getter of the same binding."""
+    return per_call(lambda: function(*arguments), calls=calls)[0]
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

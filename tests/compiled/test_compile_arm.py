@@ -17,8 +17,10 @@ from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.compiled.quantities import emit_quantity, quantity_names
 from armwright.dynamics.accelerations import forward_dynamics
+from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
@@ -51,6 +53,12 @@ PLAIN: dict[str, Callable[..., Any]] = {
     "forward_dynamics": forward_dynamics,
     "mass_matrix": mass_matrix,
     "mass_and_bias": _mass_and_bias,
+    "tool_jacobian": lambda arm, q: jacobian(arm, q, "tool"),
+    "bias": lambda arm, q, qd: inverse_dynamics(arm, q, qd, np.zeros_like(q), drives=False),
+    "gravity_efforts": gravity_efforts,
+    "coriolis_efforts": coriolis_efforts,
+    "kinetic_energy": kinetic_energy,
+    "potential_energy": potential_energy,
 }
 
 
@@ -66,7 +74,7 @@ def _all(values: Any) -> tuple[Array, ...]:
 
 
 @pytest.mark.parametrize("name", PLAIN)
-@pytest.mark.drawn(0.12)
+@pytest.mark.drawn(0.34)
 def test_agrees_with_the_plain_function(name: str, sample: Sample) -> None:
     """A compiled quantity has the values and shapes of the plain function, for many configurations and for one."""
     rng = np.random.default_rng(sample.seed)
@@ -215,12 +223,15 @@ def test_unknown_quantity() -> None:
 
 
 def test_right_angles_make_it_cheaper() -> None:
-    """The Stanford arm, with two lengths fewer than the UR5, takes fewer operations for every quantity."""
+    """The Stanford arm, with two lengths fewer than the UR5, takes fewer operations for every quantity.
+
+    But for the kinetic energy, where its slide costs what they save.
+    """
 
     def total(arm: Arm, quantity: str) -> int:
         return sum(emit_quantity(arm, quantity).operations.values())
 
-    for quantity in quantity_names():
+    for quantity in set(quantity_names()) - {"kinetic_energy"}:
         assert total(load_arm("stanford"), quantity) < total(load_arm("ur5"), quantity)
 
 

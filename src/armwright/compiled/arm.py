@@ -148,6 +148,19 @@ class CompiledArm:
         """
 
     @_kernel_method
+    def tool_jacobian(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
+        """Return the Jacobian of the tool point along the axes of the tool.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            threads: how many cores to use; all when None.
+            out: (..., 6, n) to fill.
+
+        Returns:
+            J: (..., 6, n), linear rows first: velocity [m/s] and angular velocity [rad/s] per joint velocity.
+        """
+
+    @_kernel_method
     def pose_and_jacobian(
         self, q: ArrayLike, *, threads: int | None = None, out: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
@@ -284,6 +297,93 @@ class CompiledArm:
         Returns:
             M: (..., n, n) mass matrix, rotor inertia included [kg m²], [kg m] or [kg].
             bias: (..., n) efforts [N m] or [N].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+
+    @_kernel_method
+    def bias(self, q: ArrayLike, qd: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
+        """Return the efforts that velocities and gravity take, friction left out.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            threads: how many cores to use; all when None.
+            out: (..., n) to fill.
+
+        Returns:
+            (..., n) efforts [N m] or [N].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+
+    @_kernel_method
+    def gravity_efforts(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
+        """Return the efforts that hold the arm against gravity.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            threads: how many cores to use; all when None.
+            out: (..., n) to fill.
+
+        Returns:
+            G: (..., n) efforts [N m] or [N].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+
+    @_kernel_method
+    def coriolis_efforts(
+        self, q: ArrayLike, qd: ArrayLike, *, threads: int | None = None, out: Array | None = None
+    ) -> Array:
+        """Return the centrifugal and Coriolis efforts.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            threads: how many cores to use; all when None.
+            out: (..., n) to fill.
+
+        Returns:
+            H: (..., n) efforts [N m] or [N].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+
+    @_kernel_method
+    def kinetic_energy(
+        self, q: ArrayLike, qd: ArrayLike, *, threads: int | None = None, out: Array | None = None
+    ) -> Array:
+        """Return the kinetic energy, that of the rotors included.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            threads: how many cores to use; all when None.
+            out: (...) to fill.
+
+        Returns:
+            (...) energy [J].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+
+    @_kernel_method
+    def potential_energy(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
+        """Return the potential energy in the field of gravity; that of a mass at the base origin is 0.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            threads: how many cores to use; all when None.
+            out: (...) to fill.
+
+        Returns:
+            (...) energy [J].
 
         Raises:
             UnsupportedArmError: nothing is known of the mass of some link.

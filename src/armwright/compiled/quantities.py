@@ -12,13 +12,15 @@ from armwright.arrays import Array
 from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics, less_friction
 from armwright.dynamics.arguments import weighed
 from armwright.dynamics.articulated_body import articulated_body
+from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy, rotor_energy
 from armwright.dynamics.inertia_matrix import composite_rigid_body
 from armwright.dynamics.newton_euler import drive_effort, newton_euler
+from armwright.dynamics.shares import gravity_shares, speed_shares
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward_kinematics import link_frames, tool_frame
 from armwright.kinematics.inverse_kinematics.branches import branches, merged
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
-from armwright.kinematics.jacobians import frame_columns
+from armwright.kinematics.jacobians import frame_columns, tool_columns
 from armwright.tracing.emit import Emitted, Equation, Guarded, emit
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar
@@ -42,7 +44,7 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
     if name not in _QUANTITIES:
         raise UnknownNameError("quantity", name, _QUANTITIES)
     quantity = _QUANTITIES[name]
-    if name in _WEIGH:
+    if name not in _GEOMETRY:
         weighed(arm)
     outputs = [tuple(_size(arm, x) for x in shape) for shape in quantity.outputs]
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
@@ -98,6 +100,11 @@ def _jacobian(arm: Arm, q: Numbers) -> Rows:
     return _pose_and_jacobian(arm, q)[1:]
 
 
+def _tool_jacobian(arm: Arm, q: Numbers) -> Rows:
+    columns = tool_columns(arm, q)
+    return [[column[i] for i in range(6) for column in columns]]
+
+
 def _inverse_branches(arm: Arm, X_BT: Numbers, near: Numbers) -> Rows:
     R = [list(X_BT[4 * i : 4 * i + 3]) for i in range(3)]
     q, singular = merged(branches(arm, closed_form_geometry(arm), R, [X_BT[4 * i + 3] for i in range(3)], near))
@@ -124,6 +131,26 @@ def _mass_matrix(arm: Arm, q: Numbers) -> Rows:
 
 def _mass_and_bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
     return [*_mass_matrix(arm, q), newton_euler(arm, q, qd, [0.0] * arm.n)]
+
+
+def _bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
+    return [newton_euler(arm, q, qd, [0.0] * arm.n)]
+
+
+def _gravity_efforts(arm: Arm, q: Numbers) -> Rows:
+    return [gravity_shares(arm, q)]
+
+
+def _coriolis_efforts(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
+    return [speed_shares(arm, q, qd)]
+
+
+def _kinetic_energy(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
+    return [[link_kinetic_energy(arm, q, qd) + rotor_energy(arm, qd)]]
+
+
+def _potential_energy(arm: Arm, q: Numbers) -> Rows:
+    return [[link_potential_energy(arm, q)]]
 
 
 def _pose(frame: tuple[Matrix, Vector]) -> Vector:
@@ -158,12 +185,13 @@ _POSITIONS = ("q", "near")
 _STATE: dict[str, tuple[str | int, ...]] = {"q": ("n",), "qd": ("n",)}
 _MOTION = {**_STATE, "qdd": ("n",)}
 _Q = {"q": ("n",)}
-# Those that ask for masses and inertias.
-_WEIGH = ("inverse_dynamics", "inverse_dynamics_with_wrench", "forward_dynamics", "mass_matrix", "mass_and_bias")
+# Those that ask for no masses and inertias.
+_GEOMETRY = {"forward", "link_poses", "jacobian", "tool_jacobian", "pose_and_jacobian", "inverse_branches"}
 _QUANTITIES = {
     "forward": _Quantity(_forward, _Q, ((4, 4),)),
     "link_poses": _Quantity(_link_poses, _Q, (("f", 4, 4),)),
     "jacobian": _Quantity(_jacobian, _Q, ((6, "n"),)),
+    "tool_jacobian": _Quantity(_tool_jacobian, _Q, ((6, "n"),)),
     "pose_and_jacobian": _Quantity(_pose_and_jacobian, _Q, ((4, 4), (6, "n"))),
     "inverse_branches": _Quantity(_inverse_branches, {"pose": (4, 4), "near": (6,)}, ((8, 6), (8,)), flags=(1,)),
     "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),)),
@@ -171,4 +199,9 @@ _QUANTITIES = {
     "forward_dynamics": _Quantity(_forward_dynamics, {**_STATE, "tau": ("n",)}, (("n",),), plain=forward_dynamics),
     "mass_matrix": _Quantity(_mass_matrix, _Q, (("n", "n"),)),
     "mass_and_bias": _Quantity(_mass_and_bias, _STATE, (("n", "n"), ("n",))),
+    "bias": _Quantity(_bias, _STATE, (("n",),)),
+    "gravity_efforts": _Quantity(_gravity_efforts, _Q, (("n",),)),
+    "coriolis_efforts": _Quantity(_coriolis_efforts, _STATE, (("n",),)),
+    "kinetic_energy": _Quantity(_kinetic_energy, _STATE, ((),)),
+    "potential_energy": _Quantity(_potential_energy, _Q, ((),)),
 }

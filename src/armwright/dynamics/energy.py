@@ -49,6 +49,11 @@ def _lever(joint: Joint, q: Scalar) -> Vector:
     return [joint.a, exact_sine(joint.alpha) * d, exact_cosine(joint.alpha) * d]
 
 
+def rotor_energy(arm: Arm, qd: Sequence[Scalar]) -> Scalar:
+    """Return the kinetic energy of the rotors, over abstract scalars."""
+    return sum((0.5 * motor.inertia * speed * speed for motor, speed in zip(arm.motors, qd, strict=True)), start=0.0)
+
+
 def link_potential_energy(arm: Arm, q: Sequence[Scalar]) -> Scalar:
     """Return the potential energy of the links, over abstract scalars; that of a mass at the base origin is 0.
 
@@ -84,8 +89,7 @@ def kinetic_energy(arm: Arm, q: ArrayLike, qd: ArrayLike, *, drives: bool = True
     lead, (q_, qd_), _ = batch(arm, q=q, qd=qd)
     energy = link_kinetic_energy(arm, q_, qd_)
     if drives:
-        for motor, speed in zip(arm.motors, qd_, strict=True):
-            energy = energy + 0.5 * motor.inertia * speed * speed
+        energy = energy + rotor_energy(arm, qd_)
     return np.array(np.broadcast_to(energy, lead), dtype=np.float64)
 
 

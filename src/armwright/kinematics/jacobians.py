@@ -30,6 +30,12 @@ def jacobian_columns(arm: Arm, q: Sequence[Scalar]) -> list[Vector]:
     return frame_columns(arm, frames, tool_frame(arm, frames[-1])[1])
 
 
+def tool_columns(arm: Arm, q: Sequence[Scalar]) -> list[Vector]:
+    """Return the columns of ``jacobian_columns`` along the axes of the tool, over abstract scalars."""
+    R_TB = _base_rotation_in_tool(arm, q)
+    return [_rotated(R_TB, column) for column in jacobian_columns(arm, q)]
+
+
 def frame_columns(arm: Arm, frames: Sequence[tuple[Matrix, Vector]], p_tool: Vector) -> list[Vector]:
     """Return the columns of ``jacobian_columns``, given the frames 0 to n and the tool point."""
     columns = []
@@ -96,10 +102,7 @@ def jacobian(arm: Arm, q: ArrayLike, frame: Axes = "base") -> Array:
     known_axes(frame)
     q = positions(arm, q)
     scalars = per_joint(q)
-    columns = jacobian_columns(arm, scalars)
-    if frame == "tool":
-        R_TB = _base_rotation_in_tool(arm, scalars)
-        columns = [_rotated(R_TB, column) for column in columns]
+    columns = tool_columns(arm, scalars) if frame == "tool" else jacobian_columns(arm, scalars)
     return _stack_columns(columns, q.shape[:-1])
 
 

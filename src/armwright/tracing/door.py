@@ -107,7 +107,7 @@ class Door:
             origin: makes an object that has the function as its method, for another process; None where none does.
         """
         arrays = [*self._inputs, *self._outputs]
-        if not layout_is_known() or not all(1 <= len(one.shape) <= _AXES_MAX for one in arrays):
+        if not layout_is_known() or any(len(one.shape) > _AXES_MAX for one in arrays):
             return careful
         known: dict[str, int] = {
             **self._kernels, "careful": id(careful), "empty": id(np.empty), "array_type": id(np.ndarray),
@@ -285,6 +285,8 @@ def _fits(text: _Text, array: str, k: int, many: bool, axes: str = "") -> list[s
     own = text.of(k, "axes")
     text.unless(text.equal(axes, text.let(f"add i64 {own}, {int(many)}"), "i64"), "careful")
     lengths = text.load("ptr", array, _LENGTHS)
+    if not many:  # an array without axes has none
+        lengths = text.let(f"select i1 {text.equal(own, 0, 'i64')}, ptr %table, ptr {lengths}")
     fits = []
     for i in range(_AXES_MAX):
         # Behind the axes that there are nothing is read.

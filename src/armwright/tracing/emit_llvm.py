@@ -176,6 +176,16 @@ class _Text:
 
     def store_flags(self, pointer: str, columns: Sequence[str]) -> None:
         """Write columns of truth values as a block of rows of bytes."""
+        if len(columns) == _DOUBLE and self.lanes > 1:
+            # A row of eight bytes is one word: each column sets a bit of it.
+            words, truth, row = self.of("i64"), self.of("i1"), self.splat("i64 0")
+            for i, x in enumerate(columns):
+                one = self.let(
+                    f"select {truth} {x}, {words} {self.splat(f'i64 {1 << 8 * i}')}, {words} {self.splat('i64 0')}"
+                )
+                row = self.let(f"or {words} {row}, {one}")
+            self.do(f"store {words} {row}, ptr {pointer}, align 1")
+            return
         for i, x in enumerate(columns):
             for r in range(self.lanes):
                 one = x if self.lanes == 1 else self.let(f"extractelement {self.of('i1')} {x}, i32 {r}")
