@@ -70,8 +70,8 @@ def main() -> None:
             calls.append([f"`{name}`", what, f"{cold:.2f}", f"{warm:.2f}"])
     section(
         "First call",
-        "Of `puma560` in a new process, the loading of Numba included, once with an empty cache and then with what "
-        "that left.",
+        "Of `puma560` in a new process, the loading of the compiler included, once with an empty cache and then with "
+        "what that left.",
         table(["function", "for", "empty cache, s", "full cache, s"], calls),
     )
 

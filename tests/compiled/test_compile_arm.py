@@ -341,3 +341,10 @@ def test_to_another_process(rng: np.random.Generator) -> None:
     X = fast.forward(q)
 
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(fast)).forward(q), X)
+
+
+def test_one_function_to_another_process() -> None:
+    """So can one of its functions, which is there the function of the same arm."""
+    fast = compile_arm(load_arm("stanford"))
+
+    assert pickle.loads(pickle.dumps(fast.forward)) == fast.forward

@@ -3,6 +3,7 @@
 import copy
 import gc
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -188,6 +189,7 @@ def test_arrays_that_cannot_be_filled(both: Callable[..., Any], double: Callable
         r"\(4, 2\) float64": x[:, :2].copy(),
         r"\(3,\) float64": np.empty(3),
         r"\[\[1\], \[1, 2\]\]": [[1], [1, 2]],
+        r"\(4, 3\) float64 masked": np.ma.array(x),
         "5": 5,
         "none": (),
     }
@@ -292,6 +294,8 @@ def test_a_function_keeps_its_kernel_and_no_longer() -> None:
     for one in (function, *copies):
         np.testing.assert_array_equal(one(np.ones(3), np.ones((2, 2)))[0], (2, 0, 2))
     assert (function.__name__, function.__doc__) == ("both", "Return.")
+    with pytest.raises(TypeError, match="cannot be pickled"):
+        pickle.dumps(function)
     del function, copies, one
     gc.collect()
     assert gone() is None
@@ -342,6 +346,24 @@ def test_a_signal_ends_a_call_and_its_work(monkeypatch: pytest.MonkeyPatch) -> N
     assert 1 <= so_far < 10
     while_interrupted.wait(0.5)
     assert len(ended) == so_far
+
+
+def test_no_more_threads(double: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
+    """Where the system gives one thread and then none, the work is done without."""
+    pool, given = kernels._pool(), []
+
+    class Limited:
+        def submit(self, *work: Any) -> Any:
+            if given:
+                raise RuntimeError("can't start new thread")
+            given.append(pool.submit(*work))
+            return given[0]
+
+    monkeypatch.setattr(kernels, "_pool", Limited)
+    x = rng.standard_normal((20_000, 3))
+
+    np.testing.assert_array_equal(double(x, threads=3), 2 * x)
+    assert given[0].done()
 
 
 _FORKED = """

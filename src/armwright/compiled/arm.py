@@ -76,7 +76,7 @@ class _KernelMethod:
         method, name = self._method, self._method.__name__
         if compiled is None:
             return wraps(method)(lambda arm, *inputs, **options: getattr(arm, name)(*inputs, **options))
-        function = compiled.kernel(name).function(name, str(method.__doc__))
+        function = compiled.kernel(name).function(name, str(method.__doc__), compiled.__reduce__())
         # Found there before this descriptor from now on.
         compiled.__dict__[name] = function
         return function

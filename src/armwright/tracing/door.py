@@ -13,7 +13,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from armwright.tracing.native import function_address
 
 # Where the fields of objects are, behind what every object begins with [bytes].
 _HEAD = object.__basicsize__
+_TYPE = _HEAD - 8
 _TUPLE_SIZE, _TUPLE_ITEMS = _HEAD, tuple.__basicsize__
 _BYTES_DATA = bytes.__basicsize__ - 1
 # Of an array: its numbers, how many axes, their lengths, the kind of its numbers, and what is so of it.
@@ -54,8 +55,23 @@ class Passed(NamedTuple):
     kind: type
 
 
+# A function and its arguments, which make an object in another process.
+Origin: TypeAlias = tuple[Callable[..., object], tuple[object, ...]]
+
+
 class _Table(bytes):
-    """What a function needs to know, as it reads it; and, as an attribute, what must live as long."""
+    """What a function needs to know, as it reads it; and, as attributes, what must live as long, and its origin.
+
+    For Python it is the object of which the function is a method: a function is pickled as that object and its name.
+    """
+
+    keep: tuple[object, ...]
+    origin: Origin | None
+
+    def __reduce__(self) -> Origin:
+        if self.origin is None:
+            raise TypeError("the function of a kernel cannot be pickled: pickle what it was made of")
+        return self.origin
 
 
 class Door:
@@ -79,13 +95,16 @@ class Door:
         for table in self._tables:
             ctypes.c_uint64.from_address(_address_of(table) + _PLACE[part]).value = address
 
-    def open(self, name: str, doc: str, careful: Callable[..., Any]) -> Callable[..., Any]:
+    def open(
+        self, name: str, doc: str, careful: Callable[..., Any], origin: Origin | None = None
+    ) -> Callable[..., Any]:
         """Return a built-in function, or the careful one where the arrays are of a shape it does not know.
 
         Args:
             name: of the function.
             doc: its docstring, behind its signature in the form of built-in functions.
             careful: takes the same arguments in all other cases.
+            origin: makes an object that has the function as its method, for another process; None where none does.
         """
         arrays = [*self._inputs, *self._outputs]
         if not layout_is_known() or any(len(one.shape) > _AXES_MAX for one in arrays):
@@ -105,7 +124,8 @@ class Door:
         definition = [_address_of(texts[0]), address, _METH_FASTCALL | _METH_KEYWORDS, _address_of(texts[1])]
         table = _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())
         # The object of the function owns the table, and the table all that it points to.
-        table.keep = (careful, shapes, kinds, texts, np.empty, _OUT, _THREADS)  # type: ignore[attr-defined]
+        table.keep = (careful, shapes, kinds, texts, np.empty, _OUT, _THREADS)
+        table.origin = origin
         self._tables.append(table)
         for part, place in self._kernels.items():  # another thread may have compiled it meanwhile
             self.connect(part, place)
@@ -139,7 +159,7 @@ def layout_is_known() -> bool:
 
     lengths = word(array, _LENGTHS)
     found = (
-        word(array, 8 + _HEAD - 16), word(array, _DATA), word(array, _AXES, ctypes.c_int32),
+        word(array, _TYPE), word(array, _DATA), word(array, _AXES, ctypes.c_int32),
         ctypes.c_int64.from_address(lengths).value, ctypes.c_int64.from_address(lengths + 8).value,
         word(array, _KIND), word(array, _FLAGS, ctypes.c_int32) & _WRITABLE,
         word(pair, _TUPLE_SIZE), word(pair, _TUPLE_ITEMS), ctypes.string_at(id(text) + _BYTES_DATA),
@@ -237,7 +257,7 @@ def _ir(inputs: int, outputs: int) -> str:
     text.do(f"%alone = phi i1 [false, %start], [{one_thread}, %named_end]")
     objects = [text.load("ptr", "%args", 8 * k) for k in ins]
     text.unless(
-        text.all([text.equal(text.load("ptr", x, _HEAD - 8), text.known("array_type")) for x in objects]), "careful"
+        text.all([text.equal(text.load("ptr", x, _TYPE), text.known("array_type")) for x in objects]), "careful"
     )
     text.unless(text.all([_is_plain(text, x, k, _READABLE) for k, x in enumerate(objects)]), "careful")
     axes = [text.let(f"sext i32 {text.load('i32', x, _AXES)} to i64") for x in objects]
@@ -316,12 +336,10 @@ def _case(text: _Text, objects: Sequence[str], axes: Sequence[str], ins: range, 
     text.do(f"{case}_given:")
     given = ["%out"]
     if len(outs) > 1:
-        text.unless(text.equal(text.load("ptr", "%out", _HEAD - 8), text.known("tuple_type")), "careful")
+        text.unless(text.equal(text.load("ptr", "%out", _TYPE), text.known("tuple_type")), "careful")
         text.unless(text.equal(text.load("i64", "%out", _TUPLE_SIZE), len(outs), "i64"), "careful")
         given = [text.load("ptr", "%out", _TUPLE_ITEMS + 8 * i) for i in range(len(outs))]
-    text.unless(
-        text.all([text.equal(text.load("ptr", x, _HEAD - 8), text.known("array_type")) for x in given]), "careful"
-    )
+    text.unless(text.all([text.equal(text.load("ptr", x, _TYPE), text.known("array_type")) for x in given]), "careful")
     text.unless(text.all([_is_plain(text, x, k, _WRITABLE) for k, x in zip(outs, given, strict=True)]), "careful")
     for k, x in zip(outs, given, strict=True):
         text.unless(text.all(_fits(text, x, k, many)), "careful")

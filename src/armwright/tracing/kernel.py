@@ -4,7 +4,7 @@ import ctypes
 import math
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache, cached_property, reduce
 from inspect import Parameter, Signature
 from itertools import combinations, pairwise
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from armwright.arrays import LARGEST, Array, ArrayLike, cores, floats, leading_axes
 from armwright.errors import InvalidValueError, ShapeError, shown
-from armwright.tracing.door import Door, Passed
+from armwright.tracing.door import Door, Origin, Passed
 from armwright.tracing.emit import Emitted, Shape
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
 from armwright.tracing.machine import LARGEST_ANGLE
@@ -59,7 +59,7 @@ class Kernel:
 
         return callable_from_numba(self._address("single"), *self._passed)
 
-    def function(self, name: str, doc: str = "") -> Callable[..., Any]:
+    def function(self, name: str, doc: str = "", origin: Origin | None = None) -> Callable[..., Any]:
         """Return the function that evaluates the equation for one configuration or many.
 
         It takes one array (..., *shape) per input, leading axes are broadcast; by name only, ``threads``, how many
@@ -74,6 +74,7 @@ class Kernel:
         Args:
             name: what to call it.
             doc: its docstring.
+            origin: makes an object that has the function as its method, where it is unpickled.
         """
         inputs = self.emitted.inputs
         by_name = [Parameter(one, Parameter.KEYWORD_ONLY, default=None) for one in ("threads", "out")]
@@ -85,7 +86,7 @@ class Kernel:
 
         careful.__name__, careful.__qualname__, careful.__doc__ = name, name, doc
         careful.__signature__ = signature  # type: ignore[attr-defined]
-        return self._door.open(name, f"{name}{signature}\n--\n\n{doc}", careful)
+        return self._door.open(name, f"{name}{signature}\n--\n\n{doc}", careful, origin)
 
     @cached_property
     def _passed(self) -> tuple[list[Passed], list[Passed]]:
@@ -155,7 +156,7 @@ class Kernel:
             return [np.empty((*lead, *shape), kind) for shape, kind in outputs]
         to_fill = list(out) if isinstance(out, tuple) else [out]
         expected = [((*lead, *shape), np.dtype(kind)) for shape, kind in outputs]
-        fit = [isinstance(x, np.ndarray) and x.flags.carray for x in to_fill]
+        fit = [isinstance(x, np.ndarray) and x.flags.carray and not np.ma.isMaskedArray(x) for x in to_fill]
         if not all(fit) or [(x.shape, x.dtype) for x in to_fill] != expected:
             needed = ", ".join(f"{shape} {kind}" for shape, kind in expected)
             got = ", ".join(map(_described, to_fill)) or "none"
@@ -183,14 +184,19 @@ class Kernel:
         parts = _parts(rows, threads, max(rows // _ROWS_PER_THREAD, 1))
         if len(parts) == 1:
             return work(0, rows)
-        jobs = [_pool().submit(work, first, last) for first, last in parts]
+        jobs: list[Future[int]] = []
         try:
+            for first, last in parts:
+                jobs.append(_pool().submit(work, first, last))
             return reduce(or_, (job.result() for job in jobs))
-        except BaseException:
+        except BaseException as error:
             # Nothing is written to the caller's arrays after a signal has ended the call.
             called_off.append(True)
             wait(jobs)
-            raise
+            if not isinstance(error, RuntimeError):
+                raise
+        # The system gives no more threads, or the process is about to end.
+        return self._run(arrays, lead, results, 1)
 
 
 # The functions of a kernel; what they are given is let go of by the interpreter meanwhile.
@@ -215,8 +221,13 @@ def _described(value: object) -> str:
     if not isinstance(value, np.ndarray):
         return shown(value)
     flags = value.flags
-    words = {"read-only": flags.writeable, "not in C order": flags.c_contiguous, "not aligned": flags.aligned}
-    return " ".join([f"{value.shape} {value.dtype}", *(word for word, holds in words.items() if not holds)])
+    words = {
+        "read-only": not flags.writeable,
+        "not in C order": not flags.c_contiguous,
+        "not aligned": not flags.aligned,
+        "masked": np.ma.isMaskedArray(value),
+    }
+    return " ".join([f"{value.shape} {value.dtype}", *(word for word, holds in words.items() if holds)])
 
 
 def _plain(array: Array) -> Array:
