@@ -26,7 +26,7 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def _rolled(equation: Equation, **inputs: int) -> Emitted:
-    return emit("loops", equation, inputs or {"x": LINKS}, rolled_from=1)
+    return emit("loops", equation, inputs or {"x": LINKS}, max_straight=1)
 
 
 def _agree(equation: Any, rng: np.random.Generator, **inputs: int) -> None:
@@ -122,7 +122,7 @@ def test_equal_numbers_are_carried_once() -> None:
         a = A[0][1] * x + A[1][1]
         return [[A[0][0] + x, a], [a, A[1][1] * x]], []
 
-    graph = Graph(rolled_from=1)
+    graph = Graph(rolls=True)
     A, _ = scan(step, [[0.0, 0.0], [0.0, 0.0]], graph.inputs(LINKS))
 
     assert A[0][1].node == A[1][0].node
@@ -136,7 +136,7 @@ def test_length_of_the_code() -> None:
         return state * x, state + x
 
     def written(links: int) -> tuple[dict[str, int], int]:
-        graph = Graph(rolled_from=1)
+        graph = Graph(rolls=True)
         state, results = scan(step, 1.0, graph.inputs(links))
         (loop,) = graph.loops
         return operation_count(graph, [state.node, results[0].node]), len(loop.steps[0].graph.nodes)
@@ -147,17 +147,22 @@ def test_length_of_the_code() -> None:
     assert short == long
 
 
-def test_below_the_limit() -> None:
-    """Fewer links than the limit, or no limit, and every link is written out."""
+def test_short_enough() -> None:
+    """Up to the limit every link is written out, and beyond it the code has a loop."""
 
     def step(state: Scalar, x: Scalar) -> tuple[Scalar, Scalar]:
         return state * x, state + x
 
-    for graph in (Graph(), Graph(rolled_from=LINKS + 1)):
-        state, _ = scan(step, 1.0, graph.inputs(LINKS))
+    def equation(x: Sequence[Scalar]) -> list[list[Scalar]]:
+        return [[scan(step, 1.0, x)[0]]]
 
-        assert not graph.loops
-        assert operation_count(graph, [state.node]) == {"multiply": LINKS - 1}
+    # The inputs, the 1 at the beginning, and of each further link its product and its sum.
+    nodes = LINKS + 1 + 2 * LINKS - 1
+    straight, loop = (emit("product", equation, {"x": LINKS}, max_straight=nodes - k) for k in (0, 1))
+    assert not straight.code.graph.loops
+    assert straight.operations == {"multiply": LINKS - 1}
+    assert len(loop.code.graph.loops) == 1
+    assert loop.operations["multiply"] == LINKS
 
 
 def test_watched_inputs(rng: np.random.Generator) -> None:

@@ -62,7 +62,7 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
         shapes=outputs,
         flags=quantity.flags,
         bounds=bounds,
-        rolled_from=quantity.rolled_from,
+        max_straight=quantity.max_straight,
     )
 
 
@@ -195,7 +195,8 @@ class _Quantity(NamedTuple):
         outputs: their shapes.
         flags: which outputs are truth values.
         plain: the plain function, which raises what belongs to inputs that break a condition; None without conditions.
-        rolled_from: the number of joints from which its loops over links are loops of the code; None if they never are.
+        max_straight: the number of nodes of the graph beyond which loops over links are loops of the code; measured
+            as where these are faster. None if they never are.
     """
 
     equation: Callable[..., Rows | Guarded]
@@ -203,7 +204,7 @@ class _Quantity(NamedTuple):
     outputs: tuple[tuple[str | int, ...], ...]
     flags: tuple[int, ...] = ()
     plain: Callable[..., object] | None = None
-    rolled_from: int | None = None
+    max_straight: int | None = None
 
 
 def _size(arm: Arm, letter: str | int) -> int:
@@ -228,11 +229,11 @@ _QUANTITIES = {
     "tool_jacobian": _Quantity(_tool_jacobian, _Q, ((6, "n"),)),
     "pose_and_jacobian": _Quantity(_pose_and_jacobian, _Q, ((4, 4), (6, "n"))),
     "inverse_branches": _Quantity(_inverse_branches, {"pose": (4, 4), "near": (6,)}, ((8, 6), (8,)), flags=(1,)),
-    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),), rolled_from=11),
+    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),), max_straight=2300),
     "inverse_dynamics_with_wrench": _Quantity(
-        _inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),), rolled_from=11
+        _inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),), max_straight=2300
     ),
-    "forward_dynamics": _Quantity(_forward_dynamics, _FORCED, (("n",),), plain=forward_dynamics, rolled_from=18),
+    "forward_dynamics": _Quantity(_forward_dynamics, _FORCED, (("n",),), plain=forward_dynamics, max_straight=10_000),
     "mass_matrix": _Quantity(_mass_matrix, _Q, (("n", "n"),)),
     "mass_and_bias": _Quantity(_mass_and_bias, _STATE, (("n", "n"), ("n",))),
     "bias": _Quantity(_bias, _STATE, (("n",),)),

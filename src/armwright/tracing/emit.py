@@ -9,7 +9,7 @@ import attrs
 
 from armwright.errors import InvalidValueError, shown
 from armwright.tracing.emit_llvm import Column, Target, lanes_ir, rows_ir, single_ir
-from armwright.tracing.graph import Graph, Traced, operation_count, turned
+from armwright.tracing.graph import Graph, TooManyNodesError, Traced, operation_count, turned
 from armwright.tracing.machine import MachineCode, Watched, machine_code
 from armwright.tracing.scalar import Scalar
 
@@ -88,7 +88,7 @@ def emit(
     shapes: Sequence[Shape] | None = None,
     flags: Collection[int] = (),
     bounds: Mapping[str, Sequence[float]] | None = None,
-    rolled_from: int | None = None,
+    max_straight: int | None = None,
 ) -> Emitted:
     """Trace an equation and write its kernel.
 
@@ -100,7 +100,8 @@ def emit(
         shapes: shape of one value of each output; vectors when left out.
         flags: numbers of the outputs that are truth values.
         bounds: by the name of an input, how far from 0 each of its numbers usually is; farther numbers are reported.
-        rolled_from: the number of links from which scans are loops of the code; None if they never are.
+        max_straight: the number of nodes of the graph beyond which scans are loops of the code, and not written out;
+            None if they never are.
 
     Raises:
         InvalidValueError: there is no input, or the name of one is no identifier, as which a caller may write it, or
@@ -111,11 +112,11 @@ def emit(
     for name in inputs:
         if name in _OPTIONS or not (name.isascii() and name.isidentifier()) or iskeyword(name):
             raise InvalidValueError(f"inputs: expected names such as 'qd', got {shown(name)}")
-    graph = Graph(rolled_from)
     input_shapes = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}
-    scalars = {name: graph.inputs(math.prod(shape)) for name, shape in input_shapes.items()}
-    result = equation(*scalars.values())
-    rows, positive = result if isinstance(result, Guarded) else (result, ())
+    try:
+        graph, scalars, (rows, positive) = _traced(Graph(max_nodes=max_straight), equation, input_shapes)
+    except TooManyNodesError:
+        graph, scalars, (rows, positive) = _traced(Graph(rolls=True), equation, input_shapes)
     outputs = [[_node(graph, x) for x in row] for row in rows]
     flat = [node for row in outputs for node in row]
     are_flags = [i in flags for i, row in enumerate(outputs) for _ in row]
@@ -141,6 +142,15 @@ def emit(
         flags=tuple(flags),
         operations=operation_count(graph, flat),
     )
+
+
+def _traced(
+    graph: Graph, equation: Equation, shapes: Mapping[str, Shape]
+) -> tuple[Graph, dict[str, list[Traced]], Guarded]:
+    """Run an equation on the inputs of a graph; return the graph, the inputs and the result."""
+    scalars = {name: graph.inputs(math.prod(shape)) for name, shape in shapes.items()}
+    result = equation(*scalars.values())
+    return graph, scalars, result if isinstance(result, Guarded) else Guarded(result, ())
 
 
 @attrs.frozen(kw_only=True)

@@ -192,7 +192,6 @@ class _Text:
             links: the addresses of the values of the links, each an array with a vector for every link.
         """
         n, kinds = len(loop.kinds), range(len(loop.steps))
-        kind_of = self.table("i8", [str(kind) for kind in loop.kinds])
         width = max(map(len, loop.constants))
         rows = [[*row, *[0.0] * (width - len(row))] for row in loop.constants]
         constants = self.table("double", [f"0x{_bits(x):016X}" for row in rows for x in row])
@@ -211,9 +210,13 @@ class _Text:
             self.fetch_ahead(link, n)
         row = self.let(f"mul i64 {link}, {width}")
         labels = [f"{name}_kind{kind}" for kind in kinds]
-        kind = self.let(f"load i8, ptr {self.address(kind_of, link, 'i8')}, align 1")
-        cases = " ".join(f"i8 {k}, label %{label}" for k, label in enumerate(labels))
-        self.do(f"switch i8 {kind}, label %{labels[-1]} [{cases}]" if len(labels) > 1 else f"br label %{labels[0]}")
+        if len(labels) > 1:
+            kind_of = self.table("i8", [str(kind) for kind in loop.kinds])
+            kind = self.let(f"load i8, ptr {self.address(kind_of, link, 'i8')}, align 1")
+            cases = " ".join(f"i8 {k}, label %{label}" for k, label in enumerate(labels))
+            self.do(f"switch i8 {kind}, label %{labels[-1]} [{cases}]")
+        else:
+            self.do(f"br label %{labels[0]}")
 
         def read(k: int) -> str:
             if k < len(state):

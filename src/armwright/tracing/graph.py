@@ -23,6 +23,10 @@ class Node(NamedTuple):
     value: float = 0.0
 
 
+class TooManyNodesError(Exception):
+    """A graph has become larger than whoever builds it wants."""
+
+
 class LoopStep(NamedTuple):
     """What a loop does for one kind of link.
 
@@ -68,14 +72,20 @@ class Graph:
     Attributes:
         nodes: all of them.
         loops: what the nodes of loops do.
-        rolled_from: the number of links from which a scan becomes a loop; None if it never does.
+        rolls: whether a scan becomes a loop.
     """
 
-    def __init__(self, rolled_from: int | None = None) -> None:
-        """Begin empty."""
+    def __init__(self, *, rolls: bool = False, max_nodes: int | None = None) -> None:
+        """Begin empty.
+
+        Args:
+            rolls: whether a scan becomes a loop; otherwise it is written out link by link.
+            max_nodes: another node is refused with ``TooManyNodesError``; None for any number.
+        """
         self.nodes: list[Node] = []
         self.loops: list[Loop] = []
-        self.rolled_from = rolled_from
+        self.rolls = rolls
+        self._max_nodes = max_nodes
         self._known: dict[tuple[Any, ...], int] = {}
 
     def inputs(self, count: int) -> list["Traced"]:
@@ -114,6 +124,8 @@ class Graph:
         """Return the node of an operation as it is, the same one for the same operation."""
         key = _key(node)
         if key not in self._known:
+            if len(self.nodes) == self._max_nodes:
+                raise TooManyNodesError
             self._known[key] = len(self.nodes)
             self.nodes.append(node)
         return self._known[key]

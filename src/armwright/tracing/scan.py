@@ -31,8 +31,9 @@ def scan(
         The state after the last step, and the results of every link in the order of the links.
     """
     links = list(zip(*per_link, strict=True))
-    graph = next((x.graph for x in _numbers((state, links)) if isinstance(x, Traced)), None)
-    if graph is not None and graph.rolled_from is not None and len(links) >= graph.rolled_from:
+    # One link shows what all of them are; a loop that is written out where it need not be is right, too.
+    graph = next((x.graph for x in _numbers((state, links[:1])) if isinstance(x, Traced)), None)
+    if graph is not None and graph.rolls:
         return _Rolled(graph, step, state, links, reverse=reverse).result()
     results: list[Tree] = [None] * len(links)
     for i in reversed(range(len(links))) if reverse else range(len(links)):
