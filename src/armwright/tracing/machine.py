@@ -10,6 +10,11 @@ The operations are those of a ``Graph`` without ``sin``, ``cos``, ``atan2`` and 
 - ``bit``: whether a bit of the representation of a number is set; its number is the value of the second operand.
 - ``both``, ``either``, ``differ``, ``not``: of truth values.
 - ``number``: 1 for a truth value that holds, else 0.
+
+Code for other types of numbers than double keeps ``sin``, ``cos``, ``atan2`` and ``round``, which the library of its
+language has for each type. It has one more operation:
+
+- ``limit``: a constant that may be beyond the range of the type, which then has a limit of its own.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,6 +28,8 @@ from armwright.tracing.graph import Graph, Node, Traced, reachable
 TRUTHS = frozenset({"less", "less_equal", "bit", "both", "either", "differ", "not"})
 # The operations that may take in a multiplication.
 _SUMS = frozenset({"add", "subtract"})
+# What the library of a language has for each type of numbers.
+_OF_A_LIBRARY = frozenset({"sin", "cos", "atan2", "round"})
 
 # No input whose sine is taken is larger: less than ten digits would be right.
 LARGEST_ANGLE = 1e12
@@ -69,6 +76,8 @@ def machine_code(
     outputs: Sequence[int],
     watched: Watched | None = None,
     flags: Iterable[int] = (),
+    *,
+    any_type: bool = False,
 ) -> MachineCode:
     """Translate a traced graph.
 
@@ -77,12 +86,13 @@ def machine_code(
         outputs: the nodes whose values are asked for.
         watched: what is watched, if anything.
         flags: which outputs, by their places, are truth values.
+        any_type: whether it is for any type of numbers, not for double alone.
     """
     watched = watched or Watched()
     required = [*outputs, *watched.positive]
     order = reachable(graph, [*watched.angles, *watched.others, *required])
     joined = fused(graph, order, required)
-    target = _Target(Graph())
+    target = _Target(Graph(), any_type=any_type)
     new: dict[int, int] = {}
     absorbed = set(joined.values())
     for i in order:
@@ -102,8 +112,9 @@ def _product(graph: Graph, number: int | None) -> tuple[int, Node] | None:
 class _Target:
     """The graph under construction."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
+    def __init__(self, graph: Graph, *, any_type: bool) -> None:
+        self.graph, self._any_type = graph, any_type
+        self._kept = _OF_A_LIBRARY if any_type else frozenset()
         self._circles: dict[int, tuple[Traced, Traced]] = {}
 
     def translate(self, node: Node, new: Mapping[int, int], product: tuple[int, Node] | None) -> int:
@@ -116,6 +127,8 @@ class _Target:
         if node.op == "select":
             return self._op("select", self.truth(operands[0]), *map(self.number, operands[1:]))
         operands = [self.number(i) for i in operands]
+        if node.op in self._kept:
+            return self._op(node.op, *operands)
         if node.op in _WRITTEN_OUT:
             return _WRITTEN_OUT[node.op](*(Traced(self.graph, i) for i in operands)).node
         return self._circle(operands[0], node.op) if node.op in ("sin", "cos") else self._op(node.op, *operands)
@@ -153,7 +166,7 @@ class _Target:
                         if i is not inputs[0]
                         else self._op("multiply", new[i], new[i])
                     )
-                valid.append(self._op("less_equal", size, self.graph.constant(largest**2)))
+                valid.append(self._op("less_equal", size, self._limit(largest**2)))
         zero = self.graph.constant(0.0)
         valid += [self._op("less", zero, new[i]) for i in watched.positive]
         usual = [
@@ -162,6 +175,9 @@ class _Target:
         ]
         invalid, unusual = (self._not_all(conditions) for conditions in (valid, usual))
         return invalid, unusual
+
+    def _limit(self, value: float) -> int:
+        return self.graph.record(Node("limit", (), value)) if self._any_type else self.graph.constant(value)
 
     def _not_all(self, conditions: Sequence[int]) -> int | None:
         if not conditions:
