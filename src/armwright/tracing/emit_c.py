@@ -16,7 +16,7 @@ import numpy as np
 
 from armwright.errors import InvalidValueError
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
-from armwright.tracing.graph import Graph, Node, traced
+from armwright.tracing.graph import Graph, traced
 from armwright.tracing.machine import TRUTHS, MachineCode, machine_code
 from armwright.version import __version__
 
@@ -117,11 +117,10 @@ def cpp_header(functions: Sequence[Function]) -> str:
     space = f"detail_{_digest(helpers)[:8]}"
     bodies = [_function(each, each.any_type(), _cpp(space), "template <class Real>\ninline int") for each in functions]
     guard = f"ARMWRIGHT_{space.upper()}"
-    helpers = (
-        f"#ifndef {guard}\n#define {guard}\nnamespace armwright {{\nnamespace {space} {{\n{helpers}}}\n}}\n#endif\n"
-    )
+    start = f"#ifndef {guard}\n#define {guard}\nnamespace armwright {{\nnamespace {space} {{\n"
     includes = "#include <cmath>\n#include <cstdint>\n#include <cstring>\n#include <limits>\n\n"
-    return _guarded(_comment(_CPP_RULES, "Real"), includes + helpers, ["namespace armwright {\n", *bodies, "}\n"])
+    helpers = f"{includes}{start}{helpers}}}\n}}\n#endif\n"
+    return _guarded(_comment(_CPP_RULES, "Real"), helpers, ["namespace armwright {\n", *bodies, "}\n"])
 
 
 def cuda_source(functions: Sequence[Function]) -> str:
@@ -133,7 +132,7 @@ def cuda_source(functions: Sequence[Function]) -> str:
     bodies = []
     for each in functions:
         of_row = each._replace(name=f"{each.name}_row", description=())
-        body = _function(of_row, each.code, _CUDA, "static __device__ __forceinline__ int")
+        body = _function(of_row, each.code, _CUDA, _ON_DEVICE)
         bodies.append(f"{body}\n{_comment_of(each)}{_cuda_kernel(each)}")
     return _guarded(_comment(_CUDA_RULES, "double"), _CUDA_HELPERS, bodies)
 
@@ -171,19 +170,19 @@ def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> lis
             place = int(code.graph.nodes[node.operands[1]].value)
             expression = dialect.calls["bit"].format(names[node.operands[0]], place)
         else:
-            expression = (_OPERATORS | dialect.calls)[node.op].format(*(names[j] for j in node.operands))
+            expression = {**_OPERATORS, **dialect.calls}[node.op].format(*(names[j] for j in node.operands))
         names[i] = f"v{i}"
         lines.append(f"const {dialect.truth if node.op in TRUTHS else dialect.real} v{i} = {expression};")
     # Inputs on which nothing depends.
     lines[:0] = [f"(void){x.name};" for x in function.inputs if x.name not in read]
     targets = [(x, i) for x in function.outputs for i in range(x.width)]
-    for (x, i), node_of in zip(targets, code.outputs, strict=True):
-        value = f"(unsigned char){names[node_of]}" if x.flag else names[node_of]
+    for (x, i), result in zip(targets, code.outputs, strict=True):
+        value = f"(unsigned char){names[result]}" if x.flag else names[result]
         lines.append(f"{x.name}[{i}] = {value};")
     status = "0"
-    for condition, value in ((code.unusual, UNUSUAL), (code.invalid, MEANINGLESS)):
+    for condition, bit in ((code.unusual, UNUSUAL), (code.invalid, MEANINGLESS)):
         if condition is not None:
-            status = f"{names[condition]} ? {value} : {status}"
+            status = f"{names[condition]} ? {bit} : {status}"
     return [*lines, f"return {status};"]
 
 
@@ -328,7 +327,7 @@ def _has_fma(letter: str, of_arm: int) -> str:
 
 
 _BIT = """\
-{kind} armwright_bit(double x, int place)
+{kind} {name}(double x, int place)
 {{
     {whole} bits;
     {memcpy}(&bits, &x, sizeof bits);
@@ -347,7 +346,7 @@ _C_HELPERS = {
 #else
 #define ARMWRIGHT_FMA(a, b, c) ((a) * (b) + (c))
 #endif
-{_BIT.format(kind="static inline int", whole="uint64_t", memcpy="memcpy")}#endif
+{_BIT.format(kind="static inline int", name="armwright_bit", whole="uint64_t", memcpy="memcpy")}#endif
 """,
     "float": f"""\
 #include <math.h>
@@ -361,11 +360,9 @@ _C_HELPERS = {
 #endif
 """,
 }
-_CUDA_HELPERS = f"""\
-#ifndef ARMWRIGHT_CUDA
-#define ARMWRIGHT_CUDA
-{_BIT.format(kind="static __device__ __forceinline__ int", whole="unsigned long long", memcpy="memcpy")}#endif
-"""
+_ON_DEVICE = "static __device__ __forceinline__ int"
+_CUDA_BIT = _BIT.format(kind=_ON_DEVICE, name="armwright_bit", whole="unsigned long long", memcpy="memcpy")
+_CUDA_HELPERS = f"#ifndef ARMWRIGHT_CUDA\n#define ARMWRIGHT_CUDA\n{_CUDA_BIT}#endif\n"
 _CPP_GENERAL = """\
 template <class Real>
 inline Real {op}_of(const Real& x)
@@ -415,9 +412,7 @@ inline float limit<float>(double value)
     return float(value < {_LIMIT_OF_FLOAT!r} ? value : {_LIMIT_OF_FLOAT!r});
 }}
 """
-    text += _BIT.format(kind="inline int", whole="std::uint64_t", memcpy="std::memcpy").replace(
-        "armwright_bit", "bit_of"
-    )
+    text += _BIT.format(kind="inline int", name="bit_of", whole="std::uint64_t", memcpy="std::memcpy")
     dialect = _DOUBLE._replace(
         truth="bool",
         calls={
