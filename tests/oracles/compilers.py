@@ -1,7 +1,6 @@
 """Compilers of C, C++ and CUDA, and functions of texts that they have compiled."""
 
 import ctypes
-import glob
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -37,28 +36,45 @@ _DEVICE = """\
 struct Three { unsigned x; };
 static Three blockIdx, blockDim, threadIdx;
 """
+# Undefined behaviour ends a program: with a message, or in clang without its library with a signal.
+SANITIZED = {
+    "gcc": ["-fsanitize=undefined", "-fno-sanitize-recover=all"],
+    "clang": ["-fsanitize=undefined", "-fsanitize-trap=undefined"],
+}
 # As a processor with multiply-adds is told of them; others have them always, or never.
 _FMA = ["-mfma"] if processor().target.has_fma and "sse" in processor().features else []
 
 
 def build(compiler: str, text: str, target: Path, *options: str) -> Path:
-    """Compile a text, with all warnings as errors; a compiler that is missing is an error."""
+    """Compile a text, with all warnings as errors; a compiler that is missing is an error.
+
+    Args:
+        compiler: one of ``COMPILERS``.
+        text: what is compiled.
+        target: an object where it ends in .o, a library where it ends in .so, a program otherwise.
+        options: for the compiler.
+    """
     command, ending = COMPILERS[compiler]
-    source = target.with_suffix(ending)
+    source, made = target.with_suffix(ending), target.with_suffix(".o")
     source.write_text(text, encoding="ascii")
-    done = subprocess.run(
-        [*command, *_STRICT, *options, str(source), "-o", str(target), "-lm"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    _run(*command, *_STRICT, *options, "-fPIC", "-c", str(source), "-o", str(made))
+    if target != made:
+        # ziglang would build a library of C++ of its own first, which takes a minute.
+        shared = ["-shared"] if target.suffix == ".so" else []
+        sanitized = [option for option in options if option.startswith("-fsanitize=")]
+        linker = "gcc" if ending == ".c" else "g++"
+        _run(linker, *shared, *(sanitized if compiler in ("gcc", "g++") else []), str(made), "-o", str(target), "-lm")
     return target
+
+
+def _run(*command: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def sizes_on_cortex_m7(text: str, folder: Path) -> tuple[int, int, int]:
     """Return the bytes of code and constants, of data and of zeroed data of a text for a microcontroller."""
-    build("clang", text, folder / "m7.o", *_CORTEX_M7, "-O2", "-c")
+    build("clang", text, folder / "m7.o", *_CORTEX_M7, "-O2")
     done = subprocess.run(["size", str(folder / "m7.o")], capture_output=True, text=True, check=True)
     text_size, data, bss = map(int, done.stdout.splitlines()[1].split()[:3])
     return text_size, data, bss
@@ -84,7 +100,7 @@ class Compiled:
         loops = "\n".join(_loop(each, language, real) for each in self._functions.values())
         before = _DEVICE if language == "cuda" else ""
         target = folder / f"{compiler}_{language}_{real}.so"
-        build(compiler, f"{before}{text}\n{loops}", target, "-O2", "-shared", "-fPIC", *_FMA)
+        build(compiler, f"{before}{text}\n{loops}", target, "-O2", *_FMA)
         self._library = ctypes.CDLL(str(target))
 
     def __call__(self, quantity: str, *inputs: Array) -> tuple[list[Array], Array]:
@@ -121,8 +137,8 @@ def _loop(function: Function, language: Language, real: Real) -> str:
 
 def compiled_for_device(text: str) -> str:
     """Compile kernels of CUDA for a device, and return what the compiler reports of them."""
-    (library,) = glob.glob(f"{nvidia.cuda_nvrtc.__path__[0]}/lib/libnvrtc.so*")
-    nvrtc = ctypes.CDLL(library)
+    (library,) = Path(nvidia.cuda_nvrtc.__path__[0]).glob("lib/libnvrtc.so*")
+    nvrtc = ctypes.CDLL(str(library))
     program, size = ctypes.c_void_p(), ctypes.c_size_t()
     options = [b"--gpu-architecture=sm_90", b"--fmad=false", b"--ptxas-options=-v"]
     created = nvrtc.nvrtcCreateProgram(ctypes.byref(program), text.encode(), b"kernels.cu", 0, None, None)

@@ -10,8 +10,8 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import ranges
 from armwright.arrays import Array
-from armwright.compiled.quantities import emit_quantity, evaluate_quantity
-from armwright.compiled.source_text import Language, arm_functions, refuse_float, source_text
+from armwright.compiled.quantities import evaluate_quantity
+from armwright.compiled.source_text import Language, arm_functions, text_of
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.tracing.emit_c import Function, Real
@@ -44,13 +44,11 @@ def check_text(arm: Arm, quantities: Sequence[str], language: Language, real: Re
     """
     if language not in {"c", "cpp"}:
         raise InvalidValueError(f"test: expected c or cpp as the language, got {language}")
-    if real == "float":
-        refuse_float(quantities)
-    functions = arm_functions(arm, quantities)
+    functions = arm_functions(arm, quantities, real)
     taken = [each.name for each in functions]
     checks = [identifier(f"check_{name}", taken) for name in taken]
     rng = np.random.default_rng(0)
-    parts = [source_text(arm, quantities, language, real), _START.format(tolerance=_TOLERANCES[real])]
+    parts = [text_of(functions, language, real), _START.format(tolerance=_TOLERANCES[real])]
     for quantity, function, check in zip(quantities, functions, checks, strict=True):
         parts.append(_check(arm, quantity, function, check, rng, language=language, real=real))
     calls = " + ".join(f"{check}()" for check in checks)
@@ -62,7 +60,7 @@ def _check(
     arm: Arm, quantity: str, function: Function, check: str, rng: np.random.Generator, *, language: str, real: Real
 ) -> str:
     """Return the function that compares a quantity; it returns in how many rows something is wrong."""
-    rows = [_inputs(arm, quantity, rng, real) for _ in range(_ROWS)]
+    rows = [_inputs(arm, function, rng, real) for _ in range(_ROWS)]
     expected = [[x for output in evaluate_quantity(arm, quantity, *row) for x in output] for row in rows]
     starts = np.cumsum([0, *(x.width for x in function.inputs)]).tolist()
     arrays = [f"x + {start}" for start in starts[:-1]] + [x.name for x in function.outputs]
@@ -97,10 +95,9 @@ static int {check}(void)
 """
 
 
-def _inputs(arm: Arm, quantity: str, rng: np.random.Generator, real: Real) -> list[list[float]]:
+def _inputs(arm: Arm, function: Function, rng: np.random.Generator, real: Real) -> list[list[float]]:
     """Return the inputs of one configuration, as numbers that the type can hold."""
-    shapes = emit_quantity(arm, quantity).inputs
-    values = [_drawn(arm, name, math.prod(shape), rng) for name, shape in shapes.items()]
+    values = [_drawn(arm, x.name, x.width, rng) for x in function.inputs]
     return [np.asarray(x, dtype=np.float32 if real == "float" else float).ravel().tolist() for x in values]
 
 

@@ -41,9 +41,11 @@ def source_text(arm: Arm, quantities: Sequence[str], language: Language, real: R
         InvalidValueError: a quantity occurs twice, CUDA is asked for in float, or a number of the arm is beyond the
             range of float.
     """
-    functions = arm_functions(arm, quantities)
-    if real == "float":
-        refuse_float(quantities)
+    return text_of(arm_functions(arm, quantities, real), language, real)
+
+
+def text_of(functions: Sequence[Function], language: Language, real: Real = "double") -> str:
+    """Return functions as text of a language: see ``source_text``."""
     if language == "cpp":
         return cpp_header(functions)
     if language == "c":
@@ -53,28 +55,24 @@ def source_text(arm: Arm, quantities: Sequence[str], language: Language, real: R
     return cuda_source(functions)
 
 
-def refuse_float(quantities: Sequence[str]) -> None:
-    """Refuse quantities that need the digits of double."""
-    for name in quantities:
-        if name in _FOR_DOUBLE:
-            raise UnsupportedArmError(f"{name} in float: whether a position is in reach takes the digits of double")
-
-
-def arm_functions(arm: Arm, quantities: Sequence[str]) -> list[Function]:
+def arm_functions(arm: Arm, quantities: Sequence[str], real: Real = "double") -> list[Function]:
     """Return what becomes functions; all names in it are identifiers.
 
     Args:
         arm: the arm.
         quantities: names of functions of ``CompiledArm``.
+        real: the type of numbers that they are for.
 
     Raises:
         UnknownNameError: no such quantity.
-        UnsupportedArmError: the arm has no such quantity.
+        UnsupportedArmError: the arm has no such quantity, or it has none in float.
         InvalidValueError: a quantity occurs twice.
     """
     for i, name in enumerate(quantities):
         if name in quantities[:i]:
             raise InvalidValueError(f"quantities: expected each once, got {name} twice")
+        if real == "float" and name in _FOR_DOUBLE:
+            raise UnsupportedArmError(f"{name} in float: whether a position is in reach takes the digits of double")
     prefix = identifier(arm.name, otherwise="arm")
     return [_function(arm, name, f"{prefix}_{name}") for name in quantities]
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from armwright.errors import InvalidValueError
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
-from armwright.tracing.graph import Graph, traced
+from armwright.tracing.graph import Graph, reachable, traced
 from armwright.tracing.machine import TRUTHS, MachineCode, machine_code
 from armwright.version import __version__
 
@@ -158,7 +158,9 @@ def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> lis
     places = [f"{x.name}[{i}]" for x in function.inputs for i in range(x.width)]
     names: dict[int, str] = {}
     lines, read = [], set()
-    for i in code.order:
+    # What makes a configuration valid comes first: at the end it would keep all inputs in registers until then.
+    first = reachable(code.graph, [x for x in (code.invalid, code.unusual) if x is not None])
+    for i in [*first, *sorted(set(code.order).difference(first))]:
         node = code.graph.nodes[i]
         if node.op in ("constant", "limit"):
             names[i] = (dialect.literal if node.op == "constant" else dialect.limit)(node.value)
