@@ -14,7 +14,7 @@ from typing import Literal, TypeAlias
 from armwright.arm.model import Arm
 from armwright.compiled.arm import CompiledArm
 from armwright.compiled.quantities import emit_quantity
-from armwright.errors import InvalidValueError, UnsupportedArmError
+from armwright.errors import InvalidValueError
 from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header, cuda_source
 from armwright.tracing.identifiers import identifier
 
@@ -37,9 +37,9 @@ def source_text(arm: Arm, quantities: Sequence[str], language: Language, real: R
 
     Raises:
         UnknownNameError: no such quantity.
-        UnsupportedArmError: the arm has no such quantity, or it has none in float.
-        InvalidValueError: a quantity occurs twice, CUDA is asked for in float, or a number of the arm is beyond the
-            range of float.
+        UnsupportedArmError: the arm has no such quantity.
+        InvalidValueError: a quantity occurs twice, CUDA or ``inverse_branches`` is asked for in float, or a number of
+            the arm is beyond the range of float.
     """
     return text_of(arm_functions(arm, quantities, real), language, real)
 
@@ -65,14 +65,16 @@ def arm_functions(arm: Arm, quantities: Sequence[str], real: Real = "double") ->
 
     Raises:
         UnknownNameError: no such quantity.
-        UnsupportedArmError: the arm has no such quantity, or it has none in float.
-        InvalidValueError: a quantity occurs twice.
+        UnsupportedArmError: the arm has no such quantity.
+        InvalidValueError: a quantity occurs twice, or it takes more digits than float has.
     """
     for i, name in enumerate(quantities):
         if name in quantities[:i]:
             raise InvalidValueError(f"quantities: expected each once, got {name} twice")
         if real == "float" and name in _FOR_DOUBLE:
-            raise UnsupportedArmError(f"{name} in float: whether a position is in reach takes the digits of double")
+            raise InvalidValueError(
+                f"real: expected double for {name}, got float, whose digits do not tell what is in reach"
+            )
     prefix = identifier(arm.name, otherwise="arm")
     return [_function(arm, name, f"{prefix}_{name}") for name in quantities]
 
