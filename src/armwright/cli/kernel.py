@@ -46,7 +46,7 @@ def kernel(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Print the compiled kernel of a quantity for an arm, and its operation count, or write it in another language.
+    """Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.
 
     **Example:** `armwright kernel ur5 inverse_dynamics,jacobian --language c -o ur5.h`
     """
