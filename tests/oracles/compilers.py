@@ -57,10 +57,10 @@ def build(compiler: str, text: str, target: Path, *options: str) -> Path:
     command, ending = COMPILERS[compiler]
     source, made = target.with_suffix(ending), target.with_suffix(".o")
     source.write_text(text, encoding="ascii")
-    _run(*command, *_STRICT, *options, "-fPIC", "-c", str(source), "-o", str(made))
+    shared = ["-shared", "-fPIC"] if target.suffix == ".so" else []
+    _run(*command, *_STRICT, *options, *shared[1:], "-c", str(source), "-o", str(made))
     if target != made:
         # ziglang would build a library of C++ of its own first, which takes a minute.
-        shared = ["-shared"] if target.suffix == ".so" else []
         sanitized = [option for option in options if option.startswith("-fsanitize=")]
         linker = "gcc" if ending == ".c" else "g++"
         _run(linker, *shared, *(sanitized if compiler in ("gcc", "g++") else []), str(made), "-o", str(target), "-lm")
@@ -69,7 +69,7 @@ def build(compiler: str, text: str, target: Path, *options: str) -> Path:
 
 def _run(*command: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
 
 
 def sizes_on_cortex_m7(text: str, folder: Path) -> tuple[int, int, int]:
@@ -109,10 +109,14 @@ class Compiled:
         numbers = np.float32 if self._real == "float" else np.float64
         arrays = [np.ascontiguousarray(x.reshape(rows, -1), dtype=numbers) for x in inputs]
         outputs = [np.empty((rows, x.width), bool if x.flag else numbers) for x in function.outputs]
-        status = np.empty(rows, dtype=np.intc)
-        pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*arrays, *outputs, status)]
-        self._library[f"rows_{function.name}"](ctypes.c_longlong(rows), *pointers)
-        return outputs, status
+        return outputs, self.into(quantity, *arrays, *outputs)
+
+    def into(self, quantity: str, *arrays: Array) -> Array:
+        """Fill the outputs, which stand behind the inputs, and return the statuses."""
+        status = np.empty(len(arrays[0]), dtype=np.intc)
+        pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*arrays, status)]
+        self._library[f"rows_{self._functions[quantity].name}"](ctypes.c_long(len(status)), *pointers)
+        return status
 
 
 def _loop(function: Function, language: Language, real: Real) -> str:

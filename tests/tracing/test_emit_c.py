@@ -19,6 +19,7 @@ from armwright.compiled.source_text import Language, arm_functions, source_text
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.jacobians import jacobian
 from armwright.tracing.emit import Emitted, emit
 from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
 from armwright.tracing.identifiers import identifier
@@ -185,6 +186,71 @@ def test_whole_numbers_angles_and_flags(header: object, tmp_path: Path) -> None:
     )
     program = build("g++" if language else "gcc", text + main, tmp_path / "program")
     assert subprocess.run([program], check=False).returncode == 0
+
+
+# A number and its derivative, as a library for automatic differentiation has it.
+DUAL = """
+struct Dual {
+    double x, d;
+    Dual(double value = 0.0, double slope = 0.0) : x(value), d(slope) {}
+};
+inline Dual operator-(Dual a) { return Dual(-a.x, -a.d); }
+inline Dual operator+(Dual a, Dual b) { return Dual(a.x + b.x, a.d + b.d); }
+inline Dual operator-(Dual a, Dual b) { return Dual(a.x - b.x, a.d - b.d); }
+inline Dual operator*(Dual a, Dual b) { return Dual(a.x * b.x, a.x * b.d + a.d * b.x); }
+inline Dual operator/(Dual a, Dual b) { return Dual(a.x / b.x, (a.d * b.x - a.x * b.d) / (b.x * b.x)); }
+inline bool operator<(Dual a, Dual b) { return a.x < b.x; }
+inline bool operator<=(Dual a, Dual b) { return a.x <= b.x; }
+inline Dual sin(Dual a) { return Dual(std::sin(a.x), a.d * std::cos(a.x)); }
+inline Dual cos(Dual a) { return Dual(std::cos(a.x), -a.d * std::sin(a.x)); }
+inline Dual abs(Dual a) { return a.x < 0.0 ? -a : a; }
+"""
+
+
+def test_template_on_another_type(tmp_path: Path) -> None:
+    """With dual numbers the template of the tool pose gives the linear rows of the Jacobian."""
+    arm = load_arm("stanford")
+    text = source_text(arm, ["forward", "jacobian"], "cpp")
+    main = """
+#include <cstdio>
+int main() {
+    double q[6] = {0.3, -0.7, 0.5, 1.1, -0.4, 2.0}, J[36], error = 0.0;
+    int bad = armwright::stanford_jacobian(q, J);
+    for (int k = 0; k < 6; k++) {
+        Dual at[6], X[16];
+        for (int i = 0; i < 6; i++) at[i] = Dual(q[i], i == k);
+        bad += armwright::stanford_forward(at, X);
+        for (int r = 0; r < 3; r++) error = std::fmax(error, std::fabs(X[4 * r + 3].d - J[6 * r + k]));
+    }
+    std::printf("%d %.17g %.17g\\n", bad, error, J[0]);
+}
+"""
+    done = subprocess.run([build("g++", text + DUAL + main, tmp_path / "dual")], capture_output=True, check=True)
+
+    bad, error, first = map(float, done.stdout.split())
+    assert (bad, error < 1e-15) == (0, True)
+    assert first == pytest.approx(jacobian(arm, [0.3, -0.7, 0.5, 1.1, -0.4, 2.0])[0, 0], abs=1e-15)
+
+
+@pytest.mark.parametrize("target", ["aarch64-linux-musl", "x86_64-windows-gnu", "riscv64-linux-musl", "wasm32-wasi"])
+@pytest.mark.drawn(0.25)
+def test_other_processors(target: str, tmp_path: Path) -> None:
+    """The header compiles without a warning for other processors and systems."""
+    text = source_text(load_arm("ur5"), ["inverse_dynamics", "forward_dynamics"], "c")
+    build("clang", text, tmp_path / "other.o", "-target", target)
+
+
+def test_output_in_the_place_of_an_input(tmp_path: Path) -> None:
+    """An array may be input and output of one call."""
+    arm = load_arm("ur5")
+    of_arm = Compiled(arm, ["inverse_dynamics"], tmp_path)
+    q, qd, qdd = np.linspace(-1.0, 1.0, 18).reshape(3, 1, 6)
+    (expected,), _ = of_arm("inverse_dynamics", q, qd, qdd)
+    shared = qd.copy()
+
+    of_arm.into("inverse_dynamics", q, shared, qdd, shared)
+
+    assert shared.tolist() == expected.tolist()
 
 
 def test_cortex_m7(tmp_path: Path) -> None:
