@@ -237,7 +237,10 @@ int main() {
 def test_other_processors(target: str, tmp_path: Path) -> None:
     """The header compiles without a warning for other processors and systems."""
     text = source_text(load_arm("ur5"), ["inverse_dynamics", "forward_dynamics"], "c")
-    build("clang", text, tmp_path / "other.o", "-target", target)
+    (tmp_path / "ur5.h").write_text(text, encoding="ascii")
+    sums = "ur5_inverse_dynamics(x, x, x, x) + ur5_forward_dynamics(x, x, x, x)"
+    call = f"int f(double *x);\nint f(double *x) {{ return {sums}; }}\n"
+    build("clang", f'#include "ur5.h"\n#include "ur5.h"\n{call}', tmp_path / "other.o", "-target", target)
 
 
 def test_output_in_the_place_of_an_input(tmp_path: Path) -> None:
