@@ -243,6 +243,25 @@ def test_other_processors(target: str, tmp_path: Path) -> None:
     build("clang", f'#include "ur5.h"\n#include "ur5.h"\n{call}', tmp_path / "other.o", "-target", target)
 
 
+def test_stack(tmp_path: Path) -> None:
+    """Without optimisation the stack holds what the comment says, and with it less than a fifth of that."""
+    text = source_text(load_arm("puma560"), ["inverse_dynamics"], "c")
+    found = re.search(
+        r"On the stack are at most (\d+) numbers and (\d+) truth values", unwrapped(text.replace("*", ""))
+    )
+    assert found is not None
+    numbers, truths = map(int, found.groups())
+    bound = 8 * numbers + 4 * truths
+    used = []
+    for level in ("-O0", "-O2"):
+        build("gcc", text + "int f(double *x) { return puma560_inverse_dynamics(x, x, x, x); }\n", tmp_path / "s.o",
+              level, "-fstack-usage")  # fmt: skip
+        used.append(sum(int(line.split()[1]) for line in (tmp_path / "s.su").read_text().splitlines()))
+
+    assert 0.9 * bound < used[0] < bound + 512
+    assert used[1] < 0.2 * bound
+
+
 def test_output_in_the_place_of_an_input(tmp_path: Path) -> None:
     """An array may be input and output of one call."""
     arm = load_arm("ur5")

@@ -133,7 +133,7 @@ def cuda_source(functions: Sequence[Function]) -> str:
     for each in functions:
         of_row = each._replace(name=f"{each.name}_row", description=())
         body = _function(of_row, each.code, _CUDA, _ON_DEVICE)
-        bodies.append(f"{body}\n{_comment_of(each)}{_cuda_kernel(each)}")
+        bodies.append(f"{body}\n{_comment_of(each, each.code)}{_cuda_kernel(each)}")
     return _guarded(_comment(_CUDA_RULES, "double"), _CUDA_HELPERS, bodies)
 
 
@@ -150,7 +150,7 @@ def _function(function: Function, code: MachineCode, dialect: _Dialect, kind: st
     above, _, kind = kind.rpartition("\n")
     head = textwrap.wrap(f"{kind} {function.name}({', '.join(parameters)})", _LINE, subsequent_indent="    ")
     body = (f"    {line}" for line in _statements(function, code, dialect))
-    comment = _comment_of(function) if function.description else ""
+    comment = _comment_of(function, code) if function.description else ""
     return comment + "\n".join([*above.splitlines(), *head, "{", *body, "}", ""])
 
 
@@ -188,12 +188,17 @@ def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> lis
     return [*lines, f"return {status};"]
 
 
-def _comment_of(function: Function) -> str:
+def _comment_of(function: Function, code: MachineCode) -> str:
     total = sum(function.operations.values())
     counts = ", ".join(f"{number} {op}" for op, number in function.operations.items())
-    joined = f"{function.code.joined} additions are joined with a multiplication."
-    wrapped = textwrap.wrap(f"{total} operations ({counts}); {joined}", _LINE - 4)
-    return _block([*function.description, *wrapped])
+    ops = [code.graph.nodes[i].op for i in code.order]
+    truths = sum(op in TRUTHS for op in ops)
+    numbers = sum(op not in {"constant", "limit"} for op in ops) - truths
+    text = (
+        f"{total} operations ({counts}); {code.joined} additions are joined with a multiplication. On the stack are at "
+        f"most {numbers} numbers and {truths} truth values; far fewer where the compiler optimises."
+    )
+    return _block([*function.description, *textwrap.wrap(text, _LINE - 4)])
 
 
 # ---- the text around it ----
