@@ -32,7 +32,7 @@ COMMANDS = {
     "calibrate": "Identify the geometric errors of an arm from measured points of its tool, and write the corrected arm.",
     "plan-poses": "Propose measurement configurations at which the errors of an arm are most observable.",
     "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
-    "kernel": "Print the compiled kernel of a quantity for an arm, and its operation count.",
+    "kernel": "Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.",
     "clearance": "Simulate, estimate and correct linkages with clearance in their revolute joints.",
 }
 # Commands whose module has another name.

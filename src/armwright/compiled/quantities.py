@@ -82,6 +82,21 @@ def quantity_kernel(arm: Arm, name: str) -> Kernel:
     return Kernel(emitted=emitted, raise_for_invalid=plain and partial(plain, arm), remark=remark)
 
 
+def evaluate_quantity(arm: Arm, name: str, *inputs: Sequence[float]) -> Rows:
+    """Return the values of a quantity for one configuration, by its equation on plain numbers.
+
+    Args:
+        arm: the arm.
+        name: of a quantity that the arm has.
+        inputs: the numbers of each input, a matrix row by row.
+
+    Returns:
+        The numbers of each output.
+    """
+    result = _QUANTITIES[name].equation(arm, *inputs)
+    return [list(row) for row in (result.values if isinstance(result, Guarded) else result)]
+
+
 def quantity_names() -> tuple[str, ...]:
     """Return the names of the quantities that can be compiled."""
     return tuple(_QUANTITIES)

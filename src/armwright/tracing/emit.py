@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from keyword import iskeyword
 from typing import NamedTuple, TypeAlias
 
@@ -47,6 +48,7 @@ class Emitted:
     Attributes:
         title: what it computes, in words.
         code: the operations of the processor.
+        any_type: gives the operations for any type of numbers: see ``machine``.
         inputs: shape of one value of each input, by its name.
         angles: the names of inputs that hold a number whose sine is taken.
         outputs: shape of one value of each output.
@@ -56,6 +58,7 @@ class Emitted:
 
     title: str
     code: MachineCode
+    any_type: Callable[[], MachineCode]
     inputs: dict[str, Shape]
     angles: frozenset[str]
     outputs: tuple[Shape, ...]
@@ -133,9 +136,11 @@ def emit(
             if math.isfinite(bound)
         },
     )
+    translate = partial(machine_code, graph, flat, watched, [i for i, flag in enumerate(are_flags) if flag])
     return Emitted(
         title=title,
-        code=machine_code(graph, flat, watched, [i for i, flag in enumerate(are_flags) if flag]),
+        code=translate(),
+        any_type=partial(translate, any_type=True),
         inputs=input_shapes,
         angles=frozenset(name for name, row in scalars.items() if of_angles.intersection(x.node for x in row)),
         outputs=tuple((len(row),) for row in outputs) if shapes is None else tuple(shapes),

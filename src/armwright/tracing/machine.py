@@ -12,6 +12,11 @@ The operations are those of a ``Graph`` without ``sin``, ``cos``, ``atan2`` and 
 - ``number``: 1 for a truth value that holds, else 0.
 
 The steps of loops are translated in the same way, each by itself; only numbers come in and go out.
+
+Code for other types of numbers than double keeps ``sin``, ``cos``, ``atan2`` and ``round``, which the library of its
+language has for each type. It has one more operation:
+
+- ``limit``: a constant that may be beyond the range of the type, which then has a limit of its own.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -25,6 +30,8 @@ from armwright.tracing.graph import Graph, Loop, LoopStep, Node, Traced, reachab
 TRUTHS = frozenset({"less", "less_equal", "bit", "both", "either", "differ", "not"})
 # The operations that may take in a multiplication.
 _SUMS = frozenset({"add", "subtract"})
+# What the library of a language has for each type of numbers.
+_OF_A_LIBRARY = frozenset({"sin", "cos", "atan2", "round"})
 
 # No input whose sine is taken is larger: less than ten digits would be right.
 LARGEST_ANGLE = 1e12
@@ -71,6 +78,8 @@ def machine_code(
     outputs: Sequence[int],
     watched: Watched | None = None,
     flags: Iterable[int] = (),
+    *,
+    any_type: bool = False,
 ) -> MachineCode:
     """Translate a traced graph.
 
@@ -79,9 +88,10 @@ def machine_code(
         outputs: the nodes whose values are asked for.
         watched: what is watched, if anything.
         flags: which outputs, by their places, are truth values.
+        any_type: whether it is for any type of numbers, not for double alone.
     """
     watched = watched or Watched()
-    target = _Target(Graph())
+    target = _Target(Graph(), any_type=any_type)
     new = target.translated(graph, [*watched.angles, *watched.others], [*outputs, *watched.positive])
     truths = set(flags)
     ends = [target.truth(new[i]) if k in truths else target.number(new[i]) for k, i in enumerate(outputs)]
@@ -108,8 +118,9 @@ def _used_results(graph: Graph, order: Iterable[int]) -> dict[int, list[int]]:
 class _Target:
     """The graph under construction."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
+    def __init__(self, graph: Graph, *, any_type: bool) -> None:
+        self.graph, self._any_type = graph, any_type
+        self._kept = _OF_A_LIBRARY if any_type else frozenset()
         self.joined = 0
         self._circles: dict[int, tuple[Traced, Traced]] = {}
 
@@ -140,7 +151,7 @@ class _Target:
         steps = []
         for step in loop.steps:
             results = [*step.results[: loop.carried], *(step.results[loop.carried + k] for k in used)]
-            target = _Target(Graph())
+            target = _Target(Graph(), any_type=self._any_type)
             new = target.translated(step.graph, [], results)
             steps.append(LoopStep(target.graph, tuple(target.number(new[i]) for i in results)))
             self.joined += target.joined * loop.kinds.count(len(steps) - 1)
@@ -158,6 +169,8 @@ class _Target:
         if node.op == "state":
             return self.graph.record(node._replace(operands=tuple(operands)))
         operands = [self.number(i) for i in operands]
+        if node.op in self._kept:
+            return self._op(node.op, *operands)
         if node.op in _WRITTEN_OUT:
             return _WRITTEN_OUT[node.op](*(Traced(self.graph, i) for i in operands)).node
         return self._circle(operands[0], node.op) if node.op in ("sin", "cos") else self._op(node.op, *operands)
@@ -195,7 +208,7 @@ class _Target:
                         if i is not inputs[0]
                         else self._op("multiply", new[i], new[i])
                     )
-                valid.append(self._op("less_equal", size, self.graph.constant(largest**2)))
+                valid.append(self._op("less_equal", size, self._limit(largest**2)))
         zero = self.graph.constant(0.0)
         valid += [self._op("less", zero, self.number(new[i])) for i in watched.positive]
         usual = [
@@ -204,6 +217,9 @@ class _Target:
         ]
         invalid, unusual = (self._not_all(conditions) for conditions in (valid, usual))
         return invalid, unusual
+
+    def _limit(self, value: float) -> int:
+        return self.graph.record(Node("limit", (), value)) if self._any_type else self.graph.constant(value)
 
     def _not_all(self, conditions: Sequence[int]) -> int | None:
         if not conditions:

@@ -1,0 +1,469 @@
+"""From the operations of a graph to text for other compilers: C99, a C++ template and CUDA.
+
+The text is straight-line code for one configuration, and computes what the kernel of this processor computes: the same
+operations in the same order, so the same bits in double, wherever multiply-adds are one instruction there and here.
+
+What it holds of the user's are numbers, and names as identifiers only.
+"""
+
+import hashlib
+import math
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from armwright.errors import InvalidValueError
+from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
+from armwright.tracing.graph import Graph, reachable, traced
+from armwright.tracing.machine import TRUTHS, MachineCode, machine_code
+from armwright.version import __version__
+
+Real: TypeAlias = Literal["double", "float"]
+
+# What float may hold, so that products of a few such numbers stay in its range: squares of inputs may be no larger.
+_LIMIT_OF_FLOAT = 1e30
+_LINE = 116
+
+
+class Argument(NamedTuple):
+    """An array of a function: how many numbers it holds, and whether they are truth values, of one byte each."""
+
+    name: str
+    width: int
+    flag: bool = False
+
+
+class Function(NamedTuple):
+    """What becomes a function.
+
+    Attributes:
+        name: an identifier, as those of the arguments are.
+        code: its operations in double.
+        any_type: gives its operations for any type of numbers.
+        inputs: what it reads, in the order of the inputs of the code.
+        outputs: what it writes.
+        operations: how many of each kind it takes.
+        description: what it computes, and what its arguments are: lines of text that come from nobody but us.
+    """
+
+    name: str
+    code: MachineCode
+    any_type: Callable[[], MachineCode]
+    inputs: Sequence[Argument]
+    outputs: Sequence[Argument]
+    operations: Mapping[str, int]
+    description: Sequence[str] = ()
+
+
+class _Dialect(NamedTuple):
+    """How a language writes operations.
+
+    Attributes:
+        real: the type of numbers.
+        truth: that of truth values.
+        literal: writes a constant.
+        limit: writes a limit.
+        calls: operations that are calls of a function.
+    """
+
+    real: str
+    truth: str
+    literal: Callable[[float], str]
+    limit: Callable[[float], str]
+    calls: Mapping[str, str]
+
+
+_OPERATORS = {
+    "add": "{0} + {1}",
+    "subtract": "{0} - {1}",
+    "multiply": "{0} * {1}",
+    "divide": "{0} / {1}",
+    "negate": "-{0}",
+    "less": "{0} < {1}",
+    "less_equal": "{0} <= {1}",
+    "select": "{0} ? {1} : {2}",
+    "both": "{0} && {1}",
+    "either": "{0} || {1}",
+    "differ": "{0} != {1}",
+    "not": "!{0}",
+}
+
+
+def c_header(functions: Sequence[Function], real: Real = "double") -> str:
+    """Return a C99 header of functions, which is also one of C++.
+
+    Args:
+        functions: what becomes a function, their names unlike.
+        real: the type of their numbers.
+
+    Raises:
+        InvalidValueError: a constant is beyond the range of float.
+    """
+    dialect = _FLOAT if real == "float" else _DOUBLE
+    bodies = [_function(each, _code(each, real), dialect, "static inline int") for each in functions]
+    return _guarded(_comment(_C_RULES, real), _C_HELPERS[real], bodies)
+
+
+def cpp_header(functions: Sequence[Function]) -> str:
+    """Return a header of C++11: templates on the type of numbers, in the namespace ``armwright``.
+
+    Args:
+        functions: what becomes a function, their names unlike.
+    """
+    helpers = _cpp_helpers()
+    # Headers of several versions may meet in one program: each finds the helpers that it was written with.
+    space = f"detail_{_digest(helpers)[:8]}"
+    bodies = [_function(each, each.any_type(), _cpp(space), "template <class Real>\ninline int") for each in functions]
+    guard = f"ARMWRIGHT_{space.upper()}"
+    start = f"#ifndef {guard}\n#define {guard}\nnamespace armwright {{\nnamespace {space} {{\n"
+    includes = "#include <cmath>\n#include <cstdint>\n#include <cstring>\n#include <limits>\n\n"
+    helpers = f"{includes}{start}{helpers}}}\n}}\n#endif\n"
+    return _guarded(_comment(_CPP_RULES, "Real"), helpers, ["namespace armwright {\n", *bodies, "}\n"])
+
+
+def cuda_source(functions: Sequence[Function]) -> str:
+    """Return a source of CUDA: a kernel for each function, of which every thread does one row.
+
+    Args:
+        functions: what becomes a kernel, their names unlike.
+    """
+    bodies = []
+    for each in functions:
+        of_row = each._replace(name=f"{each.name}_row", description=())
+        body = _function(of_row, each.code, _CUDA, _ON_DEVICE)
+        bodies.append(f"{body}\n{_comment_of(each, each.code)}{_cuda_kernel(each)}")
+    return _guarded(_comment(_CUDA_RULES, "double"), _CUDA_HELPERS, bodies)
+
+
+def _code(function: Function, real: Real) -> MachineCode:
+    return function.code if real == "double" else function.any_type()
+
+
+# ---- a function ----
+
+
+def _function(function: Function, code: MachineCode, dialect: _Dialect, kind: str) -> str:
+    parameters = [f"const {dialect.real} {x.name}[{x.width}]" for x in function.inputs]
+    parameters += [f"{'unsigned char' if x.flag else dialect.real} {x.name}[{x.width}]" for x in function.outputs]
+    above, _, kind = kind.rpartition("\n")
+    head = textwrap.wrap(f"{kind} {function.name}({', '.join(parameters)})", _LINE, subsequent_indent="    ")
+    body = (f"    {line}" for line in _statements(function, code, dialect))
+    comment = _comment_of(function, code) if function.description else ""
+    return comment + "\n".join([*above.splitlines(), *head, "{", *body, "}", ""])
+
+
+def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> list[str]:
+    places = [f"{x.name}[{i}]" for x in function.inputs for i in range(x.width)]
+    names: dict[int, str] = {}
+    lines, read = [], set()
+    # What makes a configuration valid comes first: at the end it would keep all inputs in registers until then.
+    first = reachable(code.graph, [x for x in (code.invalid, code.unusual) if x is not None])
+    for i in [*first, *sorted(set(code.order).difference(first))]:
+        node = code.graph.nodes[i]
+        if node.op in ("constant", "limit"):
+            names[i] = (dialect.literal if node.op == "constant" else dialect.limit)(node.value)
+            continue
+        if node.op == "input":
+            expression = places[int(node.value)]
+            read.add(expression.partition("[")[0])
+        elif node.op == "bit":
+            place = int(code.graph.nodes[node.operands[1]].value)
+            expression = dialect.calls["bit"].format(names[node.operands[0]], place)
+        else:
+            expression = {**_OPERATORS, **dialect.calls}[node.op].format(*(names[j] for j in node.operands))
+        names[i] = f"v{i}"
+        lines.append(f"const {dialect.truth if node.op in TRUTHS else dialect.real} v{i} = {expression};")
+    # Inputs on which nothing depends.
+    lines[:0] = [f"(void){x.name};" for x in function.inputs if x.name not in read]
+    targets = [(x, i) for x in function.outputs for i in range(x.width)]
+    for (x, i), result in zip(targets, code.outputs, strict=True):
+        value = f"(unsigned char){names[result]}" if x.flag else names[result]
+        lines.append(f"{x.name}[{i}] = {value};")
+    status = "0"
+    for condition, bit in ((code.unusual, UNUSUAL), (code.invalid, MEANINGLESS)):
+        if condition is not None:
+            status = f"{names[condition]} ? {bit} : {status}"
+    return [*lines, f"return {status};"]
+
+
+def _comment_of(function: Function, code: MachineCode) -> str:
+    total = sum(function.operations.values())
+    counts = ", ".join(f"{number} {op}" for op, number in function.operations.items())
+    ops = [code.graph.nodes[i].op for i in code.order]
+    truths = sum(op in TRUTHS for op in ops)
+    numbers = sum(op not in {"constant", "limit"} for op in ops) - truths
+    text = (
+        f"{total} operations ({counts}); {code.joined} additions are joined with a multiplication. On the stack are at "
+        f"most {numbers} numbers and {truths} truth values; far fewer where the compiler optimises."
+    )
+    return _block([*function.description, *textwrap.wrap(text, _LINE - 4)])
+
+
+# ---- the text around it ----
+
+_CONTRACT = """\
+Each function computes one configuration and returns a status:
+{status}
+Units are SI, angles in radians. A matrix stands row by row, and what a function takes many of one after the other.
+All inputs are read before an output is written, so an array may be both. Nothing is allocated, no state is kept,
+and any thread may call at any time."""
+_STATUS = {
+    0: "all is well.",
+    MEANINGLESS: "the outputs mean nothing: an input is not finite or too large ({largest}), or the equation has no "
+    "answer, as where a joint moves nothing that resists an acceleration.",
+    UNUSUAL: "the outputs are right, but a joint is far beyond its limits: is its position in degrees?",
+}
+_LARGEST = {
+    "double": "an angle beyond 1e12, anything else beyond 1e100",
+    "float": "an angle beyond 1e12, anything else beyond 1e15",
+    "Real": "an angle beyond 1e12, anything else beyond 1e100; in float beyond 1e15",
+}
+_C_RULES = """\
+A multiplication and an addition are one instruction, rounded once, where the processor has one (ARMWRIGHT_FMA).
+Results have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, which
+-std=c99 includes for gcc, and no -ffast-math."""
+_CPP_RULES = """\
+A multiplication and an addition are one instruction, rounded once, where the processor has one. Results in double
+have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, and no -ffast-math.
+Sines, cosines and arc tangents of double are written out here; those of another type are found as sin(x) and so on,
+in the namespace of the type or in std."""
+_CUDA_RULES = """\
+Each kernel computes rows of arrays in C order, one row per thread, in blocks of 128 threads; status has one number
+per row and may be null. Results have the same bits as on the processor, if the compiler joins no multiplications and
+additions on its own: --fmad=false, and no --use_fast_math."""
+
+
+def _comment(rules: str, real: str) -> list[str]:
+    status = [
+        line
+        for value, meaning in _STATUS.items()
+        for line in textwrap.wrap(
+            meaning.format(largest=_LARGEST[real]), _LINE, initial_indent=f"  {value}  ", subsequent_indent="     "
+        )
+    ]
+    return [*_CONTRACT.format(status="\n".join(status)).splitlines(), *rules.splitlines()]
+
+
+def _block(lines: Sequence[str]) -> str:
+    return "\n".join(["/*", *(f" * {line}".rstrip() for line in lines), " */", ""])
+
+
+def _guarded(contract: Sequence[str], helpers: str, bodies: Sequence[str]) -> str:
+    text = "\n".join([helpers, *bodies])
+    digest = _digest(text)
+    guard = f"ARMWRIGHT_{digest[:16].upper()}_H"
+    first = f"Written by armwright {__version__}. SHA-256 of the code: {digest}"
+    return f"{_block([first, '', *contract])}#ifndef {guard}\n#define {guard}\n\n{text}\n#endif\n"
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+# ---- numbers ----
+
+
+def _double(value: float) -> str:
+    if math.isnan(value):
+        return "NAN"
+    if math.isinf(value):
+        return "HUGE_VAL" if value > 0 else "(-HUGE_VAL)"
+    return _in_brackets(repr(value))
+
+
+def _float(value: float) -> str:
+    if not math.isfinite(value):
+        return f"(float){_double(value)}"
+    if abs(value) > float(np.finfo(np.float32).max):
+        raise InvalidValueError(f"real: expected double, as the number {value!r} is beyond the range of float")
+    return _in_brackets(f"{np.float32(value)!s}f")
+
+
+def _in_brackets(literal: str) -> str:
+    return f"({literal})" if literal.startswith("-") else literal
+
+
+def _real(value: float) -> str:
+    if not math.isfinite(value):
+        return "std::numeric_limits<Real>::" + ("quiet_NaN()" if math.isnan(value) else "infinity()")
+    return f"Real({value!r})"
+
+
+# ---- languages ----
+
+_OF_MATH = {"absolute": "fabs({0})", "sqrt": "sqrt({0})", "number": "(double){0}"}
+_DOUBLE = _Dialect(
+    "double",
+    "int",
+    _double,
+    _double,
+    {**_OF_MATH, "fma": "ARMWRIGHT_FMA({0}, {1}, {2})", "bit": "armwright_bit({0}, {1})"},
+)
+_FLOAT = _Dialect(
+    "float",
+    "int",
+    _float,
+    lambda value: _float(min(value, _LIMIT_OF_FLOAT)),
+    {
+        "absolute": "fabsf({0})",
+        "sqrt": "sqrtf({0})",
+        "number": "(float){0}",
+        "fma": "ARMWRIGHT_FMAF({0}, {1}, {2})",
+        "sin": "sinf({0})",
+        "cos": "cosf({0})",
+        "atan2": "atan2f({0}, {1})",
+        "round": "rintf({0})",
+    },
+)
+_CUDA = _DOUBLE._replace(calls={**_OF_MATH, "fma": "fma({0}, {1}, {2})", "bit": "armwright_bit({0}, {1})"})
+
+
+def _cpp(space: str) -> _Dialect:
+    names = {"absolute": 1, "sqrt": 1, "fma": 3, "sin": 1, "cos": 1, "atan2": 2, "round": 1}
+    operands = {op: ", ".join(f"{{{i}}}" for i in range(count)) for op, count in names.items()}
+    calls = {op: f"{space}::{op}_of({operands[op]})" for op in names} | {"number": "Real({0} ? 1 : 0)"}
+    return _Dialect("Real", "bool", _real, lambda value: f"{space}::limit<Real>({value!r})", calls)
+
+
+def _has_fma(letter: str, of_arm: int) -> str:
+    """Return when a processor multiplies and adds in one instruction; not every compiler defines what C99 asks for."""
+    of_processor = f"defined __ARM_FEATURE_FMA && defined __ARM_FP && (__ARM_FP & {of_arm})"
+    return f"#if defined FP_FAST_FMA{letter} || defined __FMA__ || ({of_processor})"
+
+
+_BIT = """\
+{kind} {name}(double x, int place)
+{{
+    {whole} bits;
+    {memcpy}(&bits, &x, sizeof bits);
+    return (int)(bits >> place & 1);
+}}
+"""
+_C_HELPERS = {
+    "double": f"""\
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifndef ARMWRIGHT_FMA
+{_has_fma("", 8)}
+#define ARMWRIGHT_FMA(a, b, c) fma(a, b, c)
+#else
+#define ARMWRIGHT_FMA(a, b, c) ((a) * (b) + (c))
+#endif
+{_BIT.format(kind="static inline int", name="armwright_bit", whole="uint64_t", memcpy="memcpy")}#endif
+""",
+    "float": f"""\
+#include <math.h>
+
+#ifndef ARMWRIGHT_FMAF
+{_has_fma("F", 4)}
+#define ARMWRIGHT_FMAF(a, b, c) fmaf(a, b, c)
+#else
+#define ARMWRIGHT_FMAF(a, b, c) ((a) * (b) + (c))
+#endif
+#endif
+""",
+}
+_ON_DEVICE = "static __device__ __forceinline__ int"
+_CUDA_BIT = _BIT.format(kind=_ON_DEVICE, name="armwright_bit", whole="unsigned long long", memcpy="memcpy")
+_CUDA_HELPERS = f"#ifndef ARMWRIGHT_CUDA\n#define ARMWRIGHT_CUDA\n{_CUDA_BIT}#endif\n"
+_CPP_GENERAL = """\
+template <class Real>
+inline Real {op}_of(const Real& x)
+{{
+    using std::{name};
+    return {name}(x);
+}}
+"""
+
+
+def _cpp_helpers() -> str:
+    """Return the functions of numbers: for any type, and for double the same operations as on this processor."""
+    text = "".join(
+        _CPP_GENERAL.format(op=op, name=name)
+        for op, name in {"absolute": "abs", "sqrt": "sqrt", "sin": "sin", "cos": "cos", "round": "rint"}.items()
+    )
+    text += (
+        _CPP_GENERAL.replace("const Real& x", "const Real& y, const Real& x")
+        .replace("(x)", "(y, x)")
+        .format(op="atan2", name="atan2")
+    )
+    text += """\
+template <class Real>
+inline Real fma_of(const Real& a, const Real& b, const Real& c)
+{
+    return a * b + c;
+}
+"""
+    for letter, real, of_arm in (("", "double", 8), ("F", "float", 4)):
+        text += f"""\
+{_has_fma(letter, of_arm)}
+inline {real} fma_of({real} a, {real} b, {real} c)
+{{
+    return std::fma(a, b, c);
+}}
+#endif
+"""
+    text += f"""\
+template <class Real>
+inline Real limit(double value)
+{{
+    return Real(value);
+}}
+template <>
+inline float limit<float>(double value)
+{{
+    return float(value < {_LIMIT_OF_FLOAT!r} ? value : {_LIMIT_OF_FLOAT!r});
+}}
+"""
+    text += _BIT.format(kind="inline int", name="bit_of", whole="std::uint64_t", memcpy="std::memcpy")
+    dialect = _DOUBLE._replace(
+        truth="bool",
+        calls={
+            "absolute": "std::fabs({0})",
+            "sqrt": "std::sqrt({0})",
+            "number": "({0} ? 1.0 : 0.0)",
+            "fma": "fma_of({0}, {1}, {2})",
+            "bit": "bit_of({0}, {1}) != 0",
+        },
+    )
+    return text + "".join(_written_out(op, dialect) for op in ("sin", "cos", "atan2", "round"))
+
+
+def _written_out(op: str, dialect: _Dialect) -> str:
+    """Return an elementary function of double."""
+    graph = Graph()
+    operands = graph.inputs(2 if op == "atan2" else 1)
+    code = machine_code(graph, [traced(op, *operands).node])
+    parameters = ["y", "x"][-len(operands) :]
+    names = [f"double {name}" for name in parameters]
+    (result,) = code.outputs
+    function = Function("", code, lambda: code, [Argument(x, 1) for x in parameters], [], {})
+    lines = [x.replace("[0]", "") for x in _statements(function, code._replace(outputs=[]), dialect)]
+    body = "\n".join(f"    {line}" for line in [*lines[:-1], f"return v{result};"])
+    return f"inline double {op}_of({', '.join(names)})\n{{\n{body}\n}}\n"
+
+
+def _cuda_kernel(function: Function) -> str:
+    """Return the kernel of which every thread does one row."""
+    arrays = [*function.inputs, *function.outputs]
+    parameters = [f"const double *{x.name}" for x in function.inputs]
+    parameters += [f"{'unsigned char' if x.flag else 'double'} *{x.name}" for x in function.outputs]
+    head = f"{function.name}({', '.join(parameters)}, int *status, long long rows)"
+    rows = ", ".join(f"{x.name} + row * {x.width}" for x in arrays)
+    return f"""\
+extern "C" __global__ void __launch_bounds__(128)
+{head}
+{{
+    const long long row = (long long)blockIdx.x * blockDim.x + threadIdx.x;
+    if (row < rows) {{
+        const int of_row = {function.name}_row({rows});
+        if (status) {{
+            status[row] = of_row;
+        }}
+    }}
+}}
+"""

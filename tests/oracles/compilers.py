@@ -1,0 +1,156 @@
+"""Compilers of C, C++ and CUDA, and functions of texts that they have compiled."""
+
+import ctypes
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import nvidia.cuda_nvrtc
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.compiled.source_text import Language, arm_functions, source_text
+from armwright.tracing.emit_c import Function, Real
+from armwright.tracing.native import processor
+
+_ZIG = [sys.executable, "-m", "ziglang"]
+# How each is called, and the ending of the files that it takes.
+COMPILERS: dict[str, tuple[list[str], str]] = {
+    "gcc": (["gcc", "-std=c99"], ".c"),
+    "clang": ([*_ZIG, "cc", "-std=c99"], ".c"),
+    "g++": (["g++", "-std=c++11"], ".cpp"),
+    "clang++": ([*_ZIG, "c++", "-std=c++11"], ".cpp"),
+}
+_STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off"]
+_CORTEX_M7 = ["-target", "thumb-linux-musleabihf", "-mcpu=cortex_m7+fp_armv8d16"]
+# What the device has and a processor has not.
+_DEVICE = """\
+#include <math.h>
+#include <string.h>
+#define __global__
+#define __device__
+#define __forceinline__ inline
+#define __launch_bounds__(threads)
+struct Three { unsigned x; };
+static Three blockIdx, blockDim, threadIdx;
+"""
+# Undefined behaviour ends a program: with a message, or in clang without its library with a signal.
+SANITIZED = {
+    "gcc": ["-fsanitize=undefined", "-fno-sanitize-recover=all"],
+    "clang": ["-fsanitize=undefined", "-fsanitize-trap=undefined"],
+}
+# As a processor with multiply-adds is told of them; others have them always, or never.
+_FMA = ["-mfma"] if processor().target.has_fma and "sse" in processor().features else []
+
+
+def build(compiler: str, text: str, target: Path, *options: str) -> Path:
+    """Compile a text, with all warnings as errors; a compiler that is missing is an error.
+
+    Args:
+        compiler: one of ``COMPILERS``.
+        text: what is compiled.
+        target: an object where it ends in .o, a library where it ends in .so, a program otherwise.
+        options: for the compiler.
+    """
+    command, ending = COMPILERS[compiler]
+    source, made = target.with_suffix(ending), target.with_suffix(".o")
+    source.write_text(text, encoding="ascii")
+    shared = ["-shared", "-fPIC"] if target.suffix == ".so" else []
+    _run(*command, *_STRICT, *options, *shared[1:], "-c", str(source), "-o", str(made))
+    if target != made:
+        # ziglang would build a library of C++ of its own first, which takes a minute.
+        sanitized = [option for option in options if option.startswith("-fsanitize=")]
+        linker = "gcc" if ending == ".c" else "g++"
+        _run(linker, *shared, *(sanitized if compiler in ("gcc", "g++") else []), str(made), "-o", str(target), "-lm")
+    return target
+
+
+def _run(*command: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+
+
+def sizes_on_cortex_m7(text: str, folder: Path) -> tuple[int, int, int]:
+    """Return the bytes of code and constants, of data and of zeroed data of a text for a microcontroller."""
+    build("clang", text, folder / "m7.o", *_CORTEX_M7, "-O2")
+    done = subprocess.run(["size", str(folder / "m7.o")], capture_output=True, text=True, check=True)
+    text_size, data, bss = map(int, done.stdout.splitlines()[1].split()[:3])
+    return text_size, data, bss
+
+
+class Compiled:
+    """Quantities of an arm in another language, called for rows of arrays."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        quantities: Sequence[str],
+        folder: Path,
+        *,
+        compiler: str = "gcc",
+        language: Language = "c",
+        real: Real = "double",
+    ) -> None:
+        """Compile them."""
+        self._real = real
+        self._functions = dict(zip(quantities, arm_functions(arm, quantities), strict=True))
+        text = source_text(arm, quantities, language, real)
+        loops = "\n".join(_loop(each, language, real) for each in self._functions.values())
+        before = _DEVICE if language == "cuda" else ""
+        target = folder / f"{compiler}_{language}_{real}.so"
+        build(compiler, f"{before}{text}\n{loops}", target, "-O2", *_FMA)
+        self._library = ctypes.CDLL(str(target))
+
+    def __call__(self, quantity: str, *inputs: Array) -> tuple[list[Array], Array]:
+        """Return the outputs (rows, width) and the statuses (rows,)."""
+        function, rows = self._functions[quantity], len(inputs[0])
+        numbers = np.float32 if self._real == "float" else np.float64
+        arrays = [np.ascontiguousarray(x.reshape(rows, -1), dtype=numbers) for x in inputs]
+        outputs = [np.empty((rows, x.width), bool if x.flag else numbers) for x in function.outputs]
+        return outputs, self.into(quantity, *arrays, *outputs)
+
+    def into(self, quantity: str, *arrays: Array) -> Array:
+        """Fill the outputs, which stand behind the inputs, and return the statuses."""
+        status = np.empty(len(arrays[0]), dtype=np.intc)
+        pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*arrays, status)]
+        self._library[f"rows_{self._functions[quantity].name}"](ctypes.c_long(len(status)), *pointers)
+        return status
+
+
+def _loop(function: Function, language: Language, real: Real) -> str:
+    """Return the text of a function of rows."""
+    arrays = [*function.inputs, *function.outputs]
+    parameters = [f"const {real} *{x.name}" for x in function.inputs]
+    parameters += [f"{'unsigned char' if x.flag else real} *{x.name}" for x in function.outputs]
+    head = f"void rows_{function.name}(long rows, {', '.join(parameters)}, int *status)"
+    of_row = ", ".join(f"{x.name} + r * {x.width}" for x in arrays)
+    if language == "cuda":
+        names = ", ".join(x.name for x in arrays)
+        return (
+            f'extern "C" {head} {{ blockDim.x = 128; for (blockIdx.x = 0; blockIdx.x * 128 < rows; blockIdx.x++)\n'
+            f"for (threadIdx.x = 0; threadIdx.x < 128; threadIdx.x++) {function.name}({names}, status, rows); }}\n"
+        )
+    called = function.name if language == "c" else f"armwright::{function.name}<{real}>"
+    linkage = "" if language == "c" else 'extern "C" '
+    return (
+        f"{linkage}{head};\n{linkage}{head} {{ long r; for (r = 0; r < rows; r++) status[r] = {called}({of_row}); }}\n"
+    )
+
+
+def compiled_for_device(text: str) -> str:
+    """Compile kernels of CUDA for a device, and return what the compiler reports of them."""
+    (library,) = Path(nvidia.cuda_nvrtc.__path__[0]).glob("lib/libnvrtc.so*")
+    nvrtc = ctypes.CDLL(str(library))
+    program, size = ctypes.c_void_p(), ctypes.c_size_t()
+    options = [b"--gpu-architecture=sm_90", b"--fmad=false", b"--ptxas-options=-v"]
+    created = nvrtc.nvrtcCreateProgram(ctypes.byref(program), text.encode(), b"kernels.cu", 0, None, None)
+    assert created == 0
+    status = nvrtc.nvrtcCompileProgram(program, len(options), (ctypes.c_char_p * len(options))(*options))
+    nvrtc.nvrtcGetProgramLogSize(program, ctypes.byref(size))
+    log = ctypes.create_string_buffer(size.value)
+    nvrtc.nvrtcGetProgramLog(program, log)
+    nvrtc.nvrtcDestroyProgram(ctypes.byref(program))
+    assert status == 0, log.value.decode()
+    return log.value.decode()

@@ -1,0 +1,364 @@
+"""Quantities of an arm in C, C++ and CUDA, compiled and compared with what this processor computes."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+
+from armwright.arm.load import arm_names, load_arm
+from armwright.arm.model import Arm
+from armwright.arm.positions import ranges
+from armwright.arrays import Array
+from armwright.compiled.arm import compile_arm
+from armwright.compiled.quantities import quantity_names
+from armwright.compiled.source_check import check_text
+from armwright.compiled.source_text import Language, arm_functions, source_text
+from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.errors import InvalidValueError
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.jacobians import jacobian
+from armwright.tracing.emit import Emitted, emit
+from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
+from armwright.tracing.identifiers import identifier
+from armwright.tracing.scalar import atan2, round_half_even, sqrt
+from oracles.arms import random_arm
+from oracles.compilers import COMPILERS, SANITIZED, Compiled, build, compiled_for_device, sizes_on_cortex_m7
+from samples import Sample
+from test_data_is_no_code import HOSTILE, random_name
+
+FOR_DEVICE = "cuda as c++"
+LANGUAGES: dict[str, tuple[str, Language]] = {
+    "gcc": ("gcc", "c"),
+    "clang": ("clang", "c"),
+    "c as c++": ("g++", "c"),
+    "g++": ("g++", "cpp"),
+    "clang++": ("clang++", "cpp"),
+    FOR_DEVICE: ("g++", "cuda"),
+}
+SIX_JOINTS = [name for name in arm_names() if load_arm(name).n == 6]
+# What every text begins with that may differ where nothing else does.
+_HASH = re.compile(r"SHA-256 of the code: \w{64}|ARMWRIGHT_[0-9A-F]{16}_H")
+
+
+def with_slides(rng: np.random.Generator) -> Arm:
+    """A random arm some of whose joints slide, of four joints."""
+    while (arm := random_arm(rng, 4)).revolute.all() or not arm.revolute.any():
+        pass
+    return arm
+
+
+def quantities_of(arm: Arm, *, real: str = "double") -> list[str]:
+    """Return the quantities that an arm has: one with random axes has no closed form, and float has none either."""
+    closed_form = arm.name != "random" and real == "double"
+    return [name for name in quantity_names() if closed_form or name != "inverse_branches"]
+
+
+def inputs_of(arm: Arm, quantity: str, rows: int, rng: np.random.Generator) -> list[Array]:
+    """Return random inputs of a quantity, the last rows of which are wrong or unusual."""
+    inputs = []
+    for name, shape in compile_arm(arm).kernel(quantity).emitted.inputs.items():
+        positions = rng.uniform(*ranges(arm), size=(rows, arm.n))
+        if name == "pose":
+            inputs.append(forward(arm, positions))
+        else:
+            inputs.append(positions if name in {"q", "near"} else rng.normal(scale=3.0, size=(rows, *shape)))
+    for k, value in enumerate((np.nan, np.inf, 1e150, 200.0, -1e13), start=1):
+        inputs[k % len(inputs)].reshape(rows, -1)[-k, k % 3] = value
+    return inputs
+
+
+def assert_same_bits(name: str, arm: Arm, folder: Path, rng: np.random.Generator) -> int:
+    """All quantities of an arm have the bits and the statuses of the processor's kernels; return how many rows."""
+    compiler, language = LANGUAGES[name]
+    compared = 0
+    names = quantities_of(arm)
+    other = Compiled(arm, names, folder, compiler=compiler, language=language)
+    for quantity in names:
+        inputs, kernel = inputs_of(arm, quantity, 150, rng), compile_arm(arm).kernel(quantity)
+        outputs, statuses = other(quantity, *inputs)
+        for row in range(len(statuses)):
+            one = [np.ascontiguousarray(x[row]) for x in inputs]
+            expected = [np.empty(shape, kind) for shape, kind in kernel._kinds]
+            assert kernel._run(one, (), expected, None) == statuses[row], (quantity, row)
+            if statuses[row] != 1:
+                assert [x[row].tobytes() for x in outputs] == [x.tobytes() for x in expected], (quantity, row)
+                compared += 1
+        assert 1 in statuses
+        assert 0 in statuses
+    return compared
+
+
+@pytest.mark.parametrize("kind", ["catalogue", "random"])
+@pytest.mark.parametrize("name", LANGUAGES)
+@pytest.mark.drawn(0.2)
+def test_bits_of_the_processor(name: str, kind: str, tmp_path: Path, sample: Sample) -> None:
+    """Every quantity has the same bits and statuses in each language as in the kernel of this processor."""
+    rng = np.random.default_rng(sample.seed)
+    arm = load_arm(str(rng.choice(SIX_JOINTS))) if kind == "catalogue" else with_slides(rng)
+    rows = assert_same_bits(name, arm, tmp_path, rng)
+    sample.record(f"rows of all quantities with the processor's bits, {name}, {kind}", rows, 0)
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.drawn(0.25)
+def test_test_programs(compiler: str, real: Real, tmp_path: Path, rng: np.random.Generator) -> None:
+    """The program that comes with the text finds it right, without undefined behaviour on its way."""
+    arm = load_arm(str(rng.choice(SIX_JOINTS))) if rng.random() < 0.5 else with_slides(rng)
+    names = quantities_of(arm, real=real)
+    text = check_text(arm, names, "c" if COMPILERS[compiler][1] == ".c" else "cpp", real)
+
+    program = build(compiler, text, tmp_path / "program", *SANITIZED["clang" if "clang" in compiler else "gcc"])
+
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert done.stdout.count("0 of 20 refused") == len(names)
+
+
+def test_test_program_finds_an_error(tmp_path: Path) -> None:
+    """A text in which one number is off by a millionth fails its test."""
+    text = check_text(load_arm("stanford"), ["jacobian"], "c")
+    number = re.search(r"= ARMWRIGHT_FMA\(\w+, (-?\d\.\d+), v", text[text.index("bit(") :])
+    assert number is not None
+    wrong = text.replace(f", {number[1]},", f", {float(number[1]) + 1e-6!r},")
+    assert wrong != text
+    program = build("gcc", wrong, tmp_path / "program")
+    assert subprocess.run([program], capture_output=True, check=False).returncode == 1
+
+
+@pytest.mark.parametrize("name", SIX_JOINTS)
+@pytest.mark.drawn(0.2)
+def test_float(name: str, tmp_path: Path, sample: Sample) -> None:
+    """Efforts in float are off by at most a hundred-thousandth of their range."""
+    arm, rng = load_arm(name), np.random.default_rng(sample.seed)
+    inputs = [rng.uniform(*ranges(arm), size=(4000, 6)), *rng.normal(scale=3.0, size=(2, 4000, 6))]
+    inputs = [x.astype(np.float32).astype(float) for x in inputs]
+    expected = inverse_dynamics(arm, *inputs)
+
+    (tau,), status = Compiled(arm, ["inverse_dynamics"], tmp_path, real="float")("inverse_dynamics", *inputs)
+
+    error = (np.abs(tau - expected).max(axis=0) / np.ptp(expected, axis=0)).max()
+    assert not status.any()
+    assert error < 1e-5
+    sample.record(f"efforts in float, {name}", len(tau), 0, error=float(error))
+
+
+def test_float_knows_its_range(tmp_path: Path) -> None:
+    """Inputs whose squares float cannot hold have no meaning there, nor have a number of the arm beyond it."""
+    arm = load_arm("ur5")
+    of_arm = Compiled(arm, ["inverse_dynamics"], tmp_path, real="float")
+    inputs = [np.zeros((4, 6)) for _ in range(3)]
+    inputs[1][0, 3], inputs[2][1, 0], inputs[0][2, 0] = 1.1e15, np.nan, 1.1e12
+
+    assert of_arm("inverse_dynamics", *inputs)[1].tolist() == [1, 1, 1, 0]
+    with pytest.raises(InvalidValueError, match="real: expected double for inverse_branches, got float"):
+        source_text(arm, ["inverse_branches"], "c", "float")
+    heavy = attrs.evolve(arm, links=[attrs.evolve(link, mass=link.mass * 1e40) for link in arm.links])
+    with pytest.raises(InvalidValueError, match=r"real: expected double, as the number .* beyond the range of float"):
+        source_text(heavy, ["inverse_dynamics"], "c", "float")
+
+
+def function_of(emitted: Emitted) -> Function:
+    inputs = [Argument(name, shape[0]) for name, shape in emitted.inputs.items()]
+    outputs = [Argument(f"out{i}", *shape, i in emitted.flags) for i, shape in enumerate(emitted.outputs)]
+    return Function("of", emitted.code, emitted.any_type, inputs, outputs, emitted.operations)
+
+
+@pytest.mark.parametrize("header", [c_header, cpp_header], ids=["c", "cpp"])
+def test_whole_numbers_angles_and_flags(header: object, tmp_path: Path) -> None:
+    """Rounding, roots, arc tangents, flags, infinite constants and unused inputs compile without a warning."""
+    emitted = emit(
+        "all",
+        lambda x, _: [[round_half_even(x[0]), sqrt(x[1]), atan2(x[0], x[1]), x[0] * np.inf, abs(x[1])], [x[0] < x[1]]],
+        {"x": 2, "y": 1},
+        flags=(1,),
+    )
+    text = header([function_of(emitted)])  # type: ignore[operator]
+    language = header is cpp_header
+    called = "armwright::of<double>" if language else "of"
+    main = (
+        f"int main(void) {{ double x[2] = {{2.5, -4}}, y[1] = {{0}}, z[5]; unsigned char flag[1]; return !({called}(x, "
+        "y, z, flag) == 0 && z[0] == 2 && z[1] == 0 && z[2] > 2.58 && z[2] < 2.59 && z[3] > 1e308 && z[4] == 4 "
+        "&& flag[0] == 0); }\n"
+    )
+    program = build("g++" if language else "gcc", text + main, tmp_path / "program")
+    assert subprocess.run([program], check=False).returncode == 0
+
+
+# A number and its derivative, as a library for automatic differentiation has it.
+DUAL = """
+struct Dual {
+    double x, d;
+    Dual(double value = 0.0, double slope = 0.0) : x(value), d(slope) {}
+};
+inline Dual operator-(Dual a) { return Dual(-a.x, -a.d); }
+inline Dual operator+(Dual a, Dual b) { return Dual(a.x + b.x, a.d + b.d); }
+inline Dual operator-(Dual a, Dual b) { return Dual(a.x - b.x, a.d - b.d); }
+inline Dual operator*(Dual a, Dual b) { return Dual(a.x * b.x, a.x * b.d + a.d * b.x); }
+inline Dual operator/(Dual a, Dual b) { return Dual(a.x / b.x, (a.d * b.x - a.x * b.d) / (b.x * b.x)); }
+inline bool operator<(Dual a, Dual b) { return a.x < b.x; }
+inline bool operator<=(Dual a, Dual b) { return a.x <= b.x; }
+inline Dual sin(Dual a) { return Dual(std::sin(a.x), a.d * std::cos(a.x)); }
+inline Dual cos(Dual a) { return Dual(std::cos(a.x), -a.d * std::sin(a.x)); }
+inline Dual abs(Dual a) { return a.x < 0.0 ? -a : a; }
+"""
+
+
+def test_template_on_another_type(tmp_path: Path) -> None:
+    """With dual numbers the template of the tool pose gives the linear rows of the Jacobian."""
+    arm = load_arm("stanford")
+    text = source_text(arm, ["forward", "jacobian"], "cpp")
+    main = """
+#include <cstdio>
+int main() {
+    double q[6] = {0.3, -0.7, 0.5, 1.1, -0.4, 2.0}, J[36], error = 0.0;
+    int bad = armwright::stanford_jacobian(q, J);
+    for (int k = 0; k < 6; k++) {
+        Dual at[6], X[16];
+        for (int i = 0; i < 6; i++) at[i] = Dual(q[i], i == k);
+        bad += armwright::stanford_forward(at, X);
+        for (int r = 0; r < 3; r++) error = std::fmax(error, std::fabs(X[4 * r + 3].d - J[6 * r + k]));
+    }
+    std::printf("%d %.17g %.17g\\n", bad, error, J[0]);
+}
+"""
+    done = subprocess.run([build("g++", text + DUAL + main, tmp_path / "dual")], capture_output=True, check=True)
+
+    bad, error, first = map(float, done.stdout.split())
+    assert (bad, error < 1e-15) == (0, True)
+    assert first == pytest.approx(jacobian(arm, [0.3, -0.7, 0.5, 1.1, -0.4, 2.0])[0, 0], abs=1e-15)
+
+
+@pytest.mark.parametrize("target", ["aarch64-linux-musl", "x86_64-windows-gnu", "riscv64-linux-musl", "wasm32-wasi"])
+@pytest.mark.drawn(0.25)
+def test_other_processors(target: str, tmp_path: Path) -> None:
+    """The header compiles without a warning for other processors and systems."""
+    text = source_text(load_arm("ur5"), ["inverse_dynamics", "forward_dynamics"], "c")
+    (tmp_path / "ur5.h").write_text(text, encoding="ascii")
+    sums = "ur5_inverse_dynamics(x, x, x, x) + ur5_forward_dynamics(x, x, x, x)"
+    call = f"int f(double *x);\nint f(double *x) {{ return {sums}; }}\n"
+    build("clang", f'#include "ur5.h"\n#include "ur5.h"\n{call}', tmp_path / "other.o", "-target", target)
+
+
+def test_stack(tmp_path: Path) -> None:
+    """Without optimisation the stack holds what the comment says, and with it less than a fifth of that."""
+    text = source_text(load_arm("puma560"), ["inverse_dynamics"], "c")
+    found = re.search(
+        r"On the stack are at most (\d+) numbers and (\d+) truth values", unwrapped(text.replace("*", ""))
+    )
+    assert found is not None
+    numbers, truths = map(int, found.groups())
+    bound = 8 * numbers + 4 * truths
+    used = []
+    for level in ("-O0", "-O2"):
+        build("gcc", text + "int f(double *x) { return puma560_inverse_dynamics(x, x, x, x); }\n", tmp_path / "s.o",
+              level, "-fstack-usage")  # fmt: skip
+        used.append(sum(int(line.split()[1]) for line in (tmp_path / "s.su").read_text().splitlines()))
+
+    assert 0.9 * bound < used[0] < bound + 512
+    assert used[1] < 0.2 * bound
+
+
+def test_output_in_the_place_of_an_input(tmp_path: Path) -> None:
+    """An array may be input and output of one call."""
+    arm = load_arm("ur5")
+    of_arm = Compiled(arm, ["inverse_dynamics"], tmp_path)
+    q, qd, qdd = np.linspace(-1.0, 1.0, 18).reshape(3, 1, 6)
+    (expected,), _ = of_arm("inverse_dynamics", q, qd, qdd)
+    shared = qd.copy()
+
+    of_arm.into("inverse_dynamics", q, shared, qdd, shared)
+
+    assert shared.tolist() == expected.tolist()
+
+
+def test_cortex_m7(tmp_path: Path) -> None:
+    """Inverse dynamics of a Puma takes at most 6 KB of a microcontroller's flash, and none of its memory."""
+    sizes: dict[Real, int] = {"double": 6 * 1024, "float": 4 * 1024}
+    for real, largest in sizes.items():
+        text = source_text(load_arm("puma560"), ["inverse_dynamics"], "c", real)
+        call = f"int f({real} *x);\nint f({real} *x) {{ return puma560_inverse_dynamics(x, x + 6, x + 12, x); }}\n"
+        size, *of_data = sizes_on_cortex_m7(text + call, tmp_path)
+        assert 1000 < size <= largest
+        assert of_data == [0, 0]
+
+
+@pytest.mark.parametrize("name", SIX_JOINTS)
+def test_registers_of_a_device(name: str) -> None:
+    """Inverse dynamics of an arm of six joints fits into 128 registers: nothing is spilled to memory."""
+    log = compiled_for_device(source_text(load_arm(name), ["inverse_dynamics"], "cuda"))
+
+    assert "0 bytes stack frame, 0 bytes spill stores, 0 bytes spill loads" in log
+    (registers,) = re.findall(r"Used (\d+) registers", log)
+    assert int(registers) <= 128
+
+
+@pytest.mark.drawn(0.1)
+@pytest.mark.parametrize("quantity", quantity_names())
+def test_quantities_for_a_device(quantity: str) -> None:
+    """The compiler of a device takes every quantity."""
+    assert "Used" in compiled_for_device(source_text(load_arm("stanford"), [quantity], "cuda"))
+
+
+# ---- names ----
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("ur5", "ur5"), ("stanford-jpl", "stanford_jpl"), ("", "x"), ("__a__b", "a_b"), ("int", "int_2"),
+        ("7 axes", "x_7_axes"), ("é", "x"), ("v12", "v12_2"), ("class", "class_2"), ("NAN", "NAN_2"), ("_Bool", "Bool"),
+        ("a" * 100, "a" * 48),
+    ],
+)  # fmt: skip
+def test_identifiers(name: str, expected: str) -> None:
+    """A name keeps its letters and digits, and differs from what the language and the text call otherwise."""
+    assert identifier(name) == expected
+    assert identifier(name, [expected]) != expected
+    assert identifier(name, [expected, f"{expected}_2"]) not in {expected, f"{expected}_2"}
+
+
+def plain(text: str, prefix: str) -> str:
+    """Return a text without its hash and the name of its arm."""
+    return (
+        _HASH.sub("", text)
+        .replace(f" {prefix}_forward", " name_forward")
+        .replace(f"\n{prefix}_forward", " name_forward")
+    )
+
+
+def unwrapped(text: str) -> str:
+    """Return a text as if lines had no end, which depends on the length of names."""
+    return " ".join(text.split())
+
+
+@pytest.mark.parametrize("language", ["c", "cpp", "cuda"])
+@pytest.mark.share(0.005)
+def test_hostile_names(language: Language, sample: Sample) -> None:
+    """Whatever an arm is called, its name is an identifier in the text, and nothing else of the text changes."""
+    arm = load_arm("ntu-3r")
+    expected = unwrapped(plain(source_text(arm, ["forward"], language), "ntu_3r"))
+    names = [*HOSTILE.values(), *(random_name(rng) for rng in sample.cases(10_000))]
+    for name in names:
+        hostile = attrs.evolve(arm, name=name, title=name, source=name)
+        (function,) = arm_functions(hostile, ["forward"])
+        prefix = function.name.removesuffix("_forward")
+        text = source_text(hostile, ["forward"], language)
+        assert re.fullmatch(r"[A-Za-z](?:_?[A-Za-z0-9])*", prefix)
+        assert unwrapped(plain(text, prefix)) == expected, name
+    sample.record(f"hostile names of arms in {language}", len(names), 0)
+
+
+@pytest.mark.share(0.05)
+def test_text_of_hostile_names_compiles(tmp_path: Path, sample: Sample) -> None:
+    """Texts of arms with hostile names stand in one program."""
+    arm = load_arm("ntu-3r")
+    texts = {}
+    for name in [*HOSTILE.values(), *(random_name(rng) for rng in sample.cases(1000))]:
+        hostile = attrs.evolve(arm, name=name, title=name)
+        texts[arm_functions(hostile, ["forward"])[0].name] = source_text(hostile, ["forward"], "c")
+    build("gcc", "\n".join(texts.values()), tmp_path / "all.o")
+    sample.record("texts of hostile names compiled in one program", len(texts), 0)
