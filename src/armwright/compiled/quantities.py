@@ -35,12 +35,13 @@ Inputs = Sequence[Traced]
 Rows = list[list[Scalar]]
 
 
-def emit_quantity(arm: Arm, name: str) -> Emitted:
+def emit_quantity(arm: Arm, name: str, *, loops: bool = True) -> Emitted:
     """Return the code of a quantity's kernel and its operation count.
 
     Args:
         arm: the arm.
         name: of a quantity of ``CompiledArm``.
+        loops: whether loops over the links of a long arm stay loops.
 
     Raises:
         UnknownNameError: no such quantity.
@@ -62,7 +63,7 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
         shapes=outputs,
         flags=quantity.flags,
         bounds=bounds,
-        max_straight=quantity.max_straight,
+        max_straight=quantity.max_straight if loops else None,
     )
 
 

@@ -80,7 +80,7 @@ def arm_functions(arm: Arm, quantities: Sequence[str], real: Real = "double") ->
 
 
 def _function(arm: Arm, quantity: str, name: str) -> Function:
-    emitted = emit_quantity(arm, quantity)
+    emitted = emit_quantity(arm, quantity, loops=False)
     doc = getdoc(getattr(CompiledArm, quantity)) or ""
     arguments: list[Argument] = []
     names = [*emitted.inputs, *_output_names(doc, len(emitted.outputs))]

@@ -168,12 +168,14 @@ class _Target:
             return self._op("select", self.truth(operands[0]), *map(self.number, operands[1:]))
         if node.op == "state":
             return self.graph.record(node._replace(operands=tuple(operands)))
-        operands = [self.number(i) for i in operands]
-        if node.op in self._kept:
-            return self._op(node.op, *operands)
-        if node.op in _WRITTEN_OUT:
-            return _WRITTEN_OUT[node.op](*(Traced(self.graph, i) for i in operands)).node
-        return self._circle(operands[0], node.op) if node.op in ("sin", "cos") else self._op(node.op, *operands)
+        return self._written_out(node.op, [self.number(i) for i in operands])
+
+    def _written_out(self, op: str, operands: Sequence[int]) -> int:
+        """Return the node of an operation of numbers; elementary functions are written out, unless they are kept."""
+        if op in _WRITTEN_OUT and op not in self._kept:
+            return _WRITTEN_OUT[op](*(Traced(self.graph, i) for i in operands)).node
+        is_circle = op in ("sin", "cos") and op not in self._kept
+        return self._circle(operands[0], op) if is_circle else self._op(op, *operands)
 
     def _circle(self, angle: int, op: str) -> int:
         """Return the sine or cosine of an angle, of which both are written out together."""
