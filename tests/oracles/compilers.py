@@ -97,7 +97,7 @@ class Compiled:
         self._real = real
         self._functions = dict(zip(quantities, arm_functions(arm, quantities), strict=True))
         text = source_text(arm, quantities, language, real)
-        loops = "\n".join(_loop(each, language, real) for each in self._functions.values())
+        loops = "\n".join(_loop(each, language, real, compiler) for each in self._functions.values())
         before = _DEVICE if language == "cuda" else ""
         target = folder / f"{compiler}_{language}_{real}.so"
         build(compiler, f"{before}{text}\n{loops}", target, "-O2", *_FMA)
@@ -119,7 +119,7 @@ class Compiled:
         return status
 
 
-def _loop(function: Function, language: Language, real: Real) -> str:
+def _loop(function: Function, language: Language, real: Real, compiler: str) -> str:
     """Return the text of a function of rows."""
     arrays = [*function.inputs, *function.outputs]
     parameters = [f"const {real} *{x.name}" for x in function.inputs]
@@ -133,7 +133,7 @@ def _loop(function: Function, language: Language, real: Real) -> str:
             f"for (threadIdx.x = 0; threadIdx.x < 128; threadIdx.x++) {function.name}({names}, status, rows); }}\n"
         )
     called = function.name if language == "c" else f"armwright::{function.name}<{real}>"
-    linkage = "" if language == "c" else 'extern "C" '
+    linkage = 'extern "C" ' if COMPILERS[compiler][1] == ".cpp" else ""
     return (
         f"{linkage}{head};\n{linkage}{head} {{ long r; for (r = 0; r < rows; r++) status[r] = {called}({of_row}); }}\n"
     )

@@ -336,12 +336,12 @@ def unwrapped(text: str) -> str:
 
 
 @pytest.mark.parametrize("language", ["c", "cpp", "cuda"])
-@pytest.mark.share(0.005)
+@pytest.mark.share(0.01)
 def test_hostile_names(language: Language, sample: Sample) -> None:
     """Whatever an arm is called, its name is an identifier in the text, and nothing else of the text changes."""
     arm = load_arm("ntu-3r")
     expected = unwrapped(plain(source_text(arm, ["forward"], language), "ntu_3r"))
-    names = [*HOSTILE.values(), *(random_name(rng) for rng in sample.cases(10_000))]
+    names = [*HOSTILE.values(), *(random_name(rng) for rng in sample.cases(3_400))]
     for name in names:
         hostile = attrs.evolve(arm, name=name, title=name, source=name)
         (function,) = arm_functions(hostile, ["forward"])
