@@ -81,7 +81,7 @@ def assert_same_bits(name: str, arm: Arm, folder: Path, rng: np.random.Generator
         outputs, statuses = other(quantity, *inputs)
         for row in range(len(statuses)):
             one = [np.ascontiguousarray(x[row]) for x in inputs]
-            expected = [np.empty(shape, kind) for shape, kind in kernel._kinds]
+            expected = [np.empty(shape, kind) for shape, kind in kernel._passed[1]]
             assert kernel._run(one, (), expected, None) == statuses[row], (quantity, row)
             if statuses[row] != 1:
                 assert [x[row].tobytes() for x in outputs] == [x.tobytes() for x in expected], (quantity, row)

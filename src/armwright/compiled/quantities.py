@@ -25,7 +25,8 @@ from armwright.kinematics.inverse_kinematics.branches import branches, merged
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
 from armwright.kinematics.jacobians import frame_columns, tool_columns
 from armwright.tracing.emit import Emitted, Equation, Guarded, emit
-from armwright.tracing.graph import Traced
+from armwright.tracing.evaluation import evaluate
+from armwright.tracing.graph import Graph, Traced
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, Vector
@@ -84,7 +85,7 @@ def quantity_kernel(arm: Arm, name: str) -> Kernel:
 
 
 def evaluate_quantity(arm: Arm, name: str, *inputs: Sequence[float]) -> Rows:
-    """Return the values of a quantity for one configuration, by its equation on plain numbers.
+    """Return the values of a quantity for one configuration, by the graph of its equation on plain numbers.
 
     Args:
         arm: the arm.
@@ -94,8 +95,10 @@ def evaluate_quantity(arm: Arm, name: str, *inputs: Sequence[float]) -> Rows:
     Returns:
         The numbers of each output.
     """
-    result = _QUANTITIES[name].equation(arm, *inputs)
-    return [list(row) for row in (result.values if isinstance(result, Guarded) else result)]
+    graph = Graph()
+    result = _QUANTITIES[name].equation(arm, *(graph.inputs(len(x)) for x in inputs))
+    numbers = [x for row in inputs for x in row]
+    return [evaluate(graph, row, numbers) for row in (result.values if isinstance(result, Guarded) else result)]
 
 
 def quantity_names() -> tuple[str, ...]:
