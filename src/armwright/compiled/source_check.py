@@ -49,8 +49,10 @@ def check_text(arm: Arm, quantities: Sequence[str], language: Language, real: Re
     checks = [identifier(f"check_{name}", taken) for name in taken]
     rng = np.random.default_rng(0)
     parts = [text_of(functions, language, real), _START.format(tolerance=_TOLERANCES[real])]
-    for quantity, function, check in zip(quantities, functions, checks, strict=True):
-        parts.append(_check(arm, quantity, function, check, rng, language=language, real=real))
+    parts += [
+        _check(arm, quantity, function, check, rng, language=language, real=real)
+        for quantity, function, check in zip(quantities, functions, checks, strict=True)
+    ]
     calls = " + ".join(f"{check}()" for check in checks)
     parts.append(f"int main(void)\n{{\n    return {calls} > 0;\n}}\n")
     return "\n".join(parts)
@@ -59,20 +61,22 @@ def check_text(arm: Arm, quantities: Sequence[str], language: Language, real: Re
 def _check(
     arm: Arm, quantity: str, function: Function, check: str, rng: np.random.Generator, *, language: str, real: Real
 ) -> str:
-    """Return the function that compares a quantity; it returns in how many rows something is wrong."""
+    """Return the function that compares a quantity; it returns 1 where something is wrong, else 0."""
     rows = [_inputs(arm, function, rng, real) for _ in range(_ROWS)]
     expected = [[x for output in evaluate_quantity(arm, quantity, *row) for x in output] for row in rows]
     starts = np.cumsum([0, *(x.width for x in function.inputs)]).tolist()
     arrays = [f"x + {start}" for start in starts[:-1]] + [x.name for x in function.outputs]
     ends = np.cumsum([0, *(x.width for x in function.outputs)]).tolist()
     called = function.name if language == "c" else f"armwright::{function.name}<{real}>"
-    lines = [f"        {'unsigned char' if x.flag else real} {x.name}[{x.width}];" for x in function.outputs]
-    loops = [
+    declared = "\n".join(
+        f"        {'unsigned char' if x.flag else real} {x.name}[{x.width}];" for x in function.outputs
+    )
+    compared = "\n".join(
         f"        for (i = 0; i < {x.width}; i++) {{\n"
         f"            error = larger(error, difference((double){x.name}[i], expected[row][{start} + i]) / "
         f"{_literal(_size(expected, start, x.width))});\n        }}"
         for x, start in zip(function.outputs, ends, strict=False)
-    ]
+    )
     return f"""\
 static int {check}(void)
 {{
@@ -82,12 +86,12 @@ static int {check}(void)
     int row, i, refused = 0;
     for (row = 0; row < {_ROWS}; row++) {{
         {real} x[{starts[-1]}];
-{chr(10).join(lines)}
+{declared}
         for (i = 0; i < {starts[-1]}; i++) {{
             x[i] = ({real})inputs[row][i];
         }}
         refused += {called}({", ".join(arrays)}) != 0;
-{chr(10).join(loops)}
+{compared}
     }}
     printf("{function.name}: largest error %.2g of the largest value, %d of {_ROWS} refused\\n", error, refused);
     return !(error <= TOLERANCE) || refused > 0;

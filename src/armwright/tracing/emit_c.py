@@ -223,7 +223,7 @@ _LARGEST = {
 _C_RULES = """\
 A multiplication and an addition are one instruction, rounded once, where the processor has one (ARMWRIGHT_FMA).
 Results have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, which
--std=c99 includes for gcc, and no -ffast-math."""
+-std=c99 implies for gcc, and no -ffast-math."""
 _CPP_RULES = """\
 A multiplication and an addition are one instruction, rounded once, where the processor has one. Results in double
 have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, and no -ffast-math.
