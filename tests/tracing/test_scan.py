@@ -147,6 +147,17 @@ def test_length_of_the_code() -> None:
     assert short == long
 
 
+def test_scalars_of_elsewhere() -> None:
+    """A step that takes a traced scalar past its arguments would mix two graphs: that is noticed."""
+    graph = Graph(rolls=True)
+    elsewhere, *x = graph.inputs(LINKS)
+
+    with pytest.raises(TypeError, match="another graph"):
+        scan(lambda state, x: (state + elsewhere * x, []), 0.0, x)
+    with pytest.raises(TypeError, match="another graph"):
+        scan(lambda state, _: (state, elsewhere), 0.0, x)
+
+
 def test_short_enough() -> None:
     """Up to the limit every link is written out, and beyond it the code has a loop."""
 

@@ -120,7 +120,7 @@ def emit(
         graph, scalars, (rows, positive) = _traced(Graph(max_nodes=max_straight), equation, input_shapes)
     except TooManyNodesError:
         graph, scalars, (rows, positive) = _traced(Graph(rolls=True), equation, input_shapes)
-    outputs = [[_node(graph, x) for x in row] for row in rows]
+    outputs = [[graph.node(x) for x in row] for row in rows]
     flat = [node for row in outputs for node in row]
     are_flags = [i in flags for i, row in enumerate(outputs) for _ in row]
     of_angles = turned(graph)
@@ -128,7 +128,7 @@ def emit(
     watched = Watched(
         angles=[node for node in nodes if node in of_angles],
         others=[node for node in nodes if node not in of_angles],
-        positive=[_node(graph, x) for x in positive],
+        positive=[graph.node(x) for x in positive],
         bounds={
             x.node: float(bound)
             for name, numbers in (bounds or {}).items()
@@ -183,10 +183,6 @@ def emit_lanes(
         target: what it is written for.
     """
     graph = Graph()
-    outputs = [_node(graph, x) for x in equation(list(graph.inputs(inputs)))]
+    outputs = [graph.node(x) for x in equation(list(graph.inputs(inputs)))]
     code = machine_code(graph, outputs)
     return LaneKernel(ir=lanes_ir(code, inputs, count, target), outputs=len(outputs))
-
-
-def _node(graph: Graph, x: Scalar) -> int:
-    return x.node if isinstance(x, Traced) else graph.constant(float(x))

@@ -116,6 +116,18 @@ class Graph:
         """Return the value of a constant, None for any other node."""
         return self.nodes[node].value if self.nodes[node].op == "constant" else None
 
+    def node(self, x: Any) -> int:
+        """Return the node of a scalar, a traced one or a number.
+
+        Raises:
+            TypeError: it was traced in another graph, as where the step of a scan takes it past its arguments.
+        """
+        if not isinstance(x, Traced):
+            return self.constant(float(x))
+        if x.graph is not self:
+            raise TypeError("a scalar of another graph: a step of a scan takes scalars from its arguments only")
+        return x.node
+
     def known(self, node: Node) -> int | None:
         """Return the number of a node, None if there is none like it."""
         return self._known.get(_key(node))
@@ -186,8 +198,7 @@ class Traced:
 def traced(op: str, *operands: Any) -> Traced:
     """Apply an operation to scalars of which at least one is traced."""
     graph = next(x.graph for x in operands if isinstance(x, Traced))
-    nodes = [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in operands]
-    return Traced(graph, graph.apply(op, *nodes))
+    return Traced(graph, graph.apply(op, *(graph.node(x) for x in operands)))
 
 
 def is_traced(*scalars: Any) -> bool:

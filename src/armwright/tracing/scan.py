@@ -22,7 +22,7 @@ def scan(
     Args:
         step: takes the state and the tree of each of ``per_link`` for one link; returns the new state, whose shape
             is that of the old one, and a tree of results. It may ask what kind a link is by truth values in its
-            trees, not by numbers.
+            trees, not by numbers, and takes no traced scalar but from its arguments.
         state: before the first link.
         per_link: sequences of trees, each with one for every link.
         reverse: whether the last link comes first.
@@ -33,7 +33,7 @@ def scan(
     links = list(zip(*per_link, strict=True))
     # One link shows what all of them are; a loop that is written out where it need not be is right, too.
     graph = next((x.graph for x in _numbers((state, links[:1])) if isinstance(x, Traced)), None)
-    if graph is not None and graph.rolls:
+    if graph is not None and graph.rolls and links:
         return _Rolled(graph, step, state, links, reverse=reverse).result()
     results: list[Tree] = [None] * len(links)
     for i in reversed(range(len(links))) if reverse else range(len(links)):
@@ -117,50 +117,52 @@ class _Rolled:
         start = _nodes(self.graph, self.state)
         places, steps = self._traced_steps(start)
         carried = max(places, default=-1) + 1
-        inputs = carried + len(self.sequences)
-        stored = [list(dict.fromkeys(r for r in one.results if self._is_computed(one, r, carried))) for one in steps]
-        outputs = max(map(len, stored))
-        # A kind with fewer results than another has anything in their place.
-        filled = [
-            [*of, *[one.graph.constant(0.0)] * (outputs - len(of))] for one, of in zip(steps, stored, strict=True)
-        ]
-        constants = [list(table) for table in self.tables]
-        rows: list[tuple[float, ...]] = [()] * self.count
-        kind_of = [0] * self.count
-        for k, kind in enumerate(self.kinds):
-            for j, i in enumerate(kind.numbers):
-                rows[i], kind_of[i] = tuple(column[j] for column in constants[k]), k
         firsts = [places.index(k) for k in range(carried)]
+        stored = [list(dict.fromkeys(r for r in one.results if self._is_computed(one, r, carried))) for one in steps]
         loop = Loop(
-            steps=tuple(
-                LoopStep(one.graph, (*(one.state[f] for f in firsts), *results))
-                for one, results in zip(steps, filled, strict=True)
-            ),
-            kinds=tuple(kind_of),
-            constants=tuple(rows),
+            steps=tuple(self._loop_steps(steps, firsts, stored)),
+            kinds=tuple(k for _, k in sorted((i, k) for k, kind in enumerate(self.kinds) for i in kind.numbers)),
+            constants=tuple(self._constants()),
             carried=carried,
             reverse=self.reverse,
         )
         operands = [*(start[f] for f in firsts), *(node for sequence in self.sequences.values() for node in sequence)]
         node = self.graph.loop(loop, operands)
-        state = _replaced(self.state, iter([self._of_loop("state", node, k) for k in places]))
         results: list[Tree] = [None] * self.count
-        sequences = list(self.sequences.values())
-        for one, kind, store, table in zip(steps, self.kinds, stored, constants, strict=True):
-            for j, i in enumerate(kind.numbers):
-                values: list[Any] = []
-                for r in one.results:
-                    op, _, value = one.graph.nodes[r]
-                    if r in store:
-                        values.append(self._of_loop("each", node, store.index(r) * self.count + i))
-                    elif op == "constant":
-                        values.append(value)
-                    elif value < inputs:
-                        values.append(Traced(self.graph, sequences[int(value) - carried][i]))
-                    else:
-                        values.append(table[int(value) - inputs][j])
+        for k, one in enumerate(steps):
+            for j, i in enumerate(self.kinds[k].numbers):
+                values = [
+                    self._of_loop("each", node, stored[k].index(r) * self.count + i)
+                    if r in stored[k]
+                    else self._passed(one.graph.nodes[r], carried, i, [column[j] for column in self.tables[k]])
+                    for r in one.results
+                ]
                 results[i] = _replaced(one.tree, iter(values))
-        return state, results
+        return _replaced(self.state, iter([self._of_loop("state", node, k) for k in places])), results
+
+    @staticmethod
+    def _loop_steps(
+        steps: Sequence[_TracedStep], firsts: Sequence[int], stored: Sequence[Sequence[int]]
+    ) -> Iterator[LoopStep]:
+        """Give the steps of the loop; one with fewer results than another has anything in their place."""
+        most = max(map(len, stored))
+        for one, results in zip(steps, stored, strict=True):
+            others = [one.graph.constant(0.0) for _ in range(most - len(results))]
+            yield LoopStep(one.graph, (*(one.state[f] for f in firsts), *results, *others))
+
+    def _constants(self) -> Iterator[tuple[float, ...]]:
+        """Give the constants of each link."""
+        rows: dict[int, tuple[float, ...]] = {}
+        for kind, table in zip(self.kinds, self.tables, strict=True):
+            rows |= {i: tuple(column[j] for column in table) for j, i in enumerate(kind.numbers)}
+        yield from (rows[i] for i in range(self.count))
+
+    def _passed(self, result: Node, carried: int, link: int, constants: Sequence[float]) -> Any:
+        """Return the value, for a link, of a result that a step does not compute."""
+        if result.op == "constant":
+            return result.value
+        k, sequences = int(result.value) - carried, list(self.sequences.values())
+        return Traced(self.graph, sequences[k][link]) if k < len(sequences) else constants[k - len(sequences)]
 
     def _sequences(self) -> dict[Hashable, list[int]]:
         """Return the nodes of all links for what is traced of a link, by where these come from."""
@@ -244,7 +246,7 @@ class _Rolled:
 
 def _nodes(graph: Graph, tree: Tree) -> list[int]:
     """Return the nodes of the numbers of a tree."""
-    return [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in _numbers(tree)]
+    return [graph.node(x) for x in _numbers(tree)]
 
 
 def _numbered(values: Iterable[Hashable]) -> list[int]:
