@@ -37,7 +37,21 @@ class Solver(NamedTuple):
 def solver_of(arm: AnyArm) -> Solver:
     """Return the functions of an arm: kernels of a compiled one, else the plain functions, which compile nothing."""
     if isinstance(arm, CompiledArm):
-        closed = find_geometry(arm.arm) is not None
-        return Solver(arm.arm, arm.forward, arm.inverse_dynamics, arm.inverse_branches if closed else None)
+        forward_, dynamics = partial(_by_kernel, arm, "forward", 1), partial(_by_kernel, arm, "inverse_dynamics", 1)
+        branches_ = partial(_by_kernel, arm, "inverse_branches", 2)
+        return Solver(arm.arm, forward_, dynamics, branches_ if find_geometry(arm.arm) is not None else None)
     branches = partial(inverse_branches, arm) if find_geometry(known_arm(arm)) is not None else None
     return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches)
+
+
+def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:
+    """Call a function of a compiled arm, of whose first input one value has so many axes.
+
+    The kernel is traced only here, as not every arm has each of them. One value goes as a row: kernels have other code
+    for one alone, which would have to be compiled as well.
+    """
+    function = getattr(arm, name)
+    if inputs[0].ndim > axes:
+        return function(*inputs)
+    rows = function(inputs[0][None], *inputs[1:])
+    return tuple(each[0] for each in rows) if isinstance(rows, tuple) else rows[0]
