@@ -6,11 +6,13 @@ Coefficients are (m, k, n): of m segments and n joints, of the powers 0 to k-1 o
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, reduce
 
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.motion.rows import Evaluator, on_arrays
+from armwright.tracing.scalar import Scalar, larger
 
 # A leading coefficient below this part of the largest is left out to find where roots are; Newton's method, on the
 # whole polynomial, then puts them right.
@@ -46,28 +48,20 @@ def shifted(terms: Array, shift: Array) -> Array:
     return moved
 
 
-def composed(outer: Array, inner: Array) -> Array:
-    """Return the coefficients of polynomials of polynomials.
-
-    Args:
-        outer: (m, k, n) coefficients of q(s).
-        inner: (m, d) coefficients of s(t).
-
-    Returns:
-        (m, (k - 1)(d - 1) + 1, n) coefficients of q(s(t)).
-    """
-    segments, count, joints = outer.shape
-    degree = inner.shape[1] - 1
-    terms = np.zeros((segments, (count - 1) * degree + 1, joints))
+def composed(outer: list[Scalar], inner: list[Scalar]) -> list[list[Scalar]]:
+    """Return the coefficients of a polynomial q(s) of a polynomial s(t)."""
+    terms: list[Scalar] = [0.0] * ((len(outer) - 1) * (len(inner) - 1) + 1)
     # Powers of the inner polynomial, one after the other.
-    power = np.ones((segments, 1))
-    for k in range(count):
-        terms[:, : power.shape[1]] += power[..., None] * outer[:, k, None]
-        higher = np.zeros((segments, power.shape[1] + degree))
-        for d in range(degree + 1):
-            higher[:, d : d + power.shape[1]] += inner[:, d, None] * power
+    power: list[Scalar] = [1.0]
+    for coefficient in outer:
+        for i, x in enumerate(power):
+            terms[i] = terms[i] + x * coefficient
+        higher: list[Scalar] = [0.0] * (len(power) + len(inner) - 1)
+        for i, x in enumerate(power):
+            for k, y in enumerate(inner):
+                higher[i + k] = higher[i + k] + y * x
         power = higher
-    return terms
+    return [terms]
 
 
 def extremes(terms: Array, lengths: Array) -> tuple[Array, Array]:
@@ -85,7 +79,7 @@ def extremes(terms: Array, lengths: Array) -> tuple[Array, Array]:
     return lowest, highest
 
 
-def peaks(terms: Array, lengths: Array) -> Array:
+def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
     """Return the largest magnitude (n,) of all segments.
 
     Only polynomials whose Bernstein coefficients go beyond the largest value at an end of any can hold a larger one.
@@ -93,15 +87,46 @@ def peaks(terms: Array, lengths: Array) -> Array:
     Args:
         terms: (m, k, n) coefficients.
         lengths: (m,) of the segments.
+        rows: evaluates equations of many rows.
     """
-    segments, count, joints = terms.shape
-    at_ends = np.maximum(np.abs(terms[:, 0]), np.abs(evaluate(terms, lengths[:, None]))).max(axis=0)
-    rows = np.swapaxes(terms * _powers(lengths, count)[..., None], 1, 2).reshape(-1, count)
-    control = np.abs(rows @ _bernstein(count - 1)).max(axis=1).reshape(segments, joints)
-    segment, joint = np.nonzero(control > at_ends)
-    lowest, highest = extremes(terms[segment, :, joint][..., None], lengths[segment])
-    np.maximum.at(at_ends, joint, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
+    return _largest(terms, lengths, rows(_reach, [terms], [lengths[:, None]])[0])
+
+
+def rate_peaks(terms: Array, lengths: Array, rows: Evaluator) -> tuple[Array, Array]:
+    """Return the largest speeds and accelerations (n,) of all segments: see ``peaks``."""
+    reach = rows(_reach_of_rates, [terms], [lengths[:, None]])[0]
+    rates = derivative(terms, 1)
+    return _largest(rates, lengths, reach[:, :2]), _largest(derivative(rates, 1), lengths, reach[:, 2:])
+
+
+def _largest(terms: Array, lengths: Array, reach: Array) -> Array:
+    """Return the largest magnitude (n,) of polynomials whose reach (m, 2, n) is known."""
+    at_ends = reach[:, 0].max(axis=0)
+    segment, joint = np.nonzero(reach[:, 1] > at_ends)
+    if len(segment):
+        lowest, highest = extremes(terms[segment, :, joint][..., None], lengths[segment])
+        np.maximum.at(at_ends, joint, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
     return np.asarray(at_ends)
+
+
+def _reach(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
+    """Return the largest magnitude at an end of a polynomial, and a bound of that between: of its Bernstein terms."""
+    scaled, power = [], 1.0
+    for term in terms:
+        scaled.append(term * power)
+        power = power * length[0]
+    control = [
+        abs(sum((x * weight for x, weight in zip(scaled[1:], weights[1:], strict=True) if weight), scaled[0]))
+        for weights in _bernstein(len(terms) - 1).T.tolist()
+    ]
+    return [[larger(control[0], control[-1]), reduce(larger, control)]]
+
+
+def _reach_of_rates(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
+    """Return what ``_reach`` does of the first and of the second derivative of a polynomial."""
+    first = [power * term for power, term in enumerate(terms)][1:]
+    second = [power * term for power, term in enumerate(first)][1:]
+    return [[*_reach(first, length)[0], *_reach(second, length)[0]]]
 
 
 def turning_times(terms: Array, lengths: Array) -> list[Array]:

@@ -14,6 +14,7 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import inverse_branches
+from armwright.motion.rows import Evaluator, by_kernels, on_arrays
 
 AnyArm: TypeAlias = Arm | CompiledArm
 
@@ -26,12 +27,14 @@ class Solver(NamedTuple):
         forward: tool poses (..., 4, 4) of q (..., n).
         inverse_dynamics: efforts (..., n) of q, qd, qdd (..., n).
         inverse_branches: the eight configurations of poses, see ``kinematics.inverse``; None without a closed form.
+        rows: evaluates other equations of many rows.
     """
 
     arm: Arm
     forward: Callable[..., Array]
     inverse_dynamics: Callable[..., Array]
     inverse_branches: Callable[..., Any] | None
+    rows: Evaluator
 
 
 def solver_of(arm: AnyArm) -> Solver:
@@ -39,9 +42,10 @@ def solver_of(arm: AnyArm) -> Solver:
     if isinstance(arm, CompiledArm):
         forward_, dynamics = partial(_by_kernel, arm, "forward", 1), partial(_by_kernel, arm, "inverse_dynamics", 1)
         branches_ = partial(_by_kernel, arm, "inverse_branches", 2)
-        return Solver(arm.arm, forward_, dynamics, branches_ if find_geometry(arm.arm) is not None else None)
+        closed = find_geometry(arm.arm) is not None
+        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels)
     branches = partial(inverse_branches, arm) if find_geometry(known_arm(arm)) is not None else None
-    return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches)
+    return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches, on_arrays)
 
 
 def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:

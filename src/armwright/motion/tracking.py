@@ -211,14 +211,14 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
             return obstruction
         trajectory = _spline(task, knots, q)
         h = np.diff(knots)
-        speed, acceleration = cubic_peaks(trajectory.coefficients, h)
+        speed, acceleration = cubic_peaks(trajectory.coefficients, h, task.solver.rows)
         hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
         error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)
         tracking = Tracking(trajectory, error, speed)
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
             # Between two knots that keep a limit the spline may pass it where a joint reverses.
-            first, second = turning_positions(trajectory.coefficients, h)
+            first, second = turning_positions(trajectory.coefficients, h, task.solver.rows)
             return beyond_limits(arm, first, knots) or beyond_limits(arm, second, knots) or tracking
         if task.report_spline:
             return tracking
