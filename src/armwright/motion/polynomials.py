@@ -12,7 +12,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.motion.rows import Evaluator, on_arrays
-from armwright.tracing.scalar import Scalar, larger
+from armwright.tracing.scalar import Scalar, larger, select, smaller
 
 # A leading coefficient below this part of the largest is left out to find where roots are; Newton's method, on the
 # whole polynomial, then puts them right.
@@ -64,19 +64,18 @@ def composed(outer: list[Scalar], inner: list[Scalar]) -> list[list[Scalar]]:
     return [terms]
 
 
-def extremes(terms: Array, lengths: Array) -> tuple[Array, Array]:
+def extremes(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> tuple[Array, Array]:
     """Return the smallest and the largest value (m, n) on each segment, by the roots of the derivative.
 
     Args:
         terms: (m, k, n) coefficients.
         lengths: (m,) of the segments.
+        rows: evaluates equations of many rows.
     """
-    first, last = terms[:, 0], evaluate(terms, lengths[:, None])
-    lowest, highest = np.minimum(first, last), np.maximum(first, last)
-    for t in turning_times(terms, lengths):
-        value = evaluate(terms, t)
-        lowest, highest = np.minimum(lowest, value), np.maximum(highest, value)
-    return lowest, highest
+    ends = [terms[:, 0], evaluate(terms, lengths[:, None])]
+    between = evaluate(terms[..., None], turning_times(terms, lengths, rows))
+    values = np.concatenate([np.stack(ends, axis=-1), between], axis=-1)
+    return values.min(axis=-1), values.max(axis=-1)
 
 
 def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
@@ -89,37 +88,45 @@ def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
         lengths: (m,) of the segments.
         rows: evaluates equations of many rows.
     """
-    return _largest(terms, lengths, rows(_reach, [terms], [lengths[:, None]])[0])
+    return _largest(terms, lengths, rows(_reach, [terms], [lengths[:, None]])[0], rows)
 
 
 def rate_peaks(terms: Array, lengths: Array, rows: Evaluator) -> tuple[Array, Array]:
     """Return the largest speeds and accelerations (n,) of all segments: see ``peaks``."""
     reach = rows(_reach_of_rates, [terms], [lengths[:, None]])[0]
     rates = derivative(terms, 1)
-    return _largest(rates, lengths, reach[:, :2]), _largest(derivative(rates, 1), lengths, reach[:, 2:])
+    # A speed and an acceleration are looked at alike, the latter as one power more.
+    both = np.zeros((len(rates), rates.shape[1], 2 * rates.shape[2]))
+    both[..., : rates.shape[2]] = rates
+    both[:, :-1, rates.shape[2] :] = derivative(rates, 1)
+    found = _largest(both, lengths, np.concatenate([reach[:, :2], reach[:, 2:]], axis=2), rows)
+    return found[: rates.shape[2]], found[rates.shape[2] :]
 
 
-def _largest(terms: Array, lengths: Array, reach: Array) -> Array:
+def _largest(terms: Array, lengths: Array, reach: Array, rows: Evaluator) -> Array:
     """Return the largest magnitude (n,) of polynomials whose reach (m, 2, n) is known."""
     at_ends = reach[:, 0].max(axis=0)
     segment, joint = np.nonzero(reach[:, 1] > at_ends)
     if len(segment):
-        lowest, highest = extremes(terms[segment, :, joint][..., None], lengths[segment])
+        lowest, highest = extremes(terms[segment, :, joint][..., None], lengths[segment], rows)
         np.maximum.at(at_ends, joint, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
     return np.asarray(at_ends)
 
 
 def _reach(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
     """Return the largest magnitude at an end of a polynomial, and a bound of that between: of its Bernstein terms."""
-    scaled, power = [], 1.0
+    scaled, power, last = [], 1.0, terms[-1]
     for term in terms:
         scaled.append(term * power)
         power = power * length[0]
+    for term in terms[-2::-1]:
+        last = last * length[0] + term
+    ends = larger(abs(terms[0]), abs(last))
     control = [
         abs(sum((x * weight for x, weight in zip(scaled[1:], weights[1:], strict=True) if weight), scaled[0]))
-        for weights in _bernstein(len(terms) - 1).T.tolist()
+        for weights in _bernstein(len(terms) - 1).T[1:-1].tolist()
     ]
-    return [[larger(control[0], control[-1]), reduce(larger, control)]]
+    return [[ends, reduce(larger, control, ends)]]
 
 
 def _reach_of_rates(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
@@ -129,26 +136,25 @@ def _reach_of_rates(terms: list[Scalar], length: list[Scalar]) -> list[list[Scal
     return [[*_reach(first, length)[0], *_reach(second, length)[0]]]
 
 
-def turning_times(terms: Array, lengths: Array) -> list[Array]:
-    """Return times (m, n) inside the segments among which are all at which a polynomial reverses.
+def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
+    """Return times (m, n, r) inside the segments among which are all at which a polynomial reverses.
 
     A polynomial whose slope has no two Bernstein coefficients of opposite signs rises or falls all along, and is not
     sampled further.
     """
     segments, count, joints = terms.shape
     if count < 3:
-        return []
+        return np.empty((segments, joints, 0))
     # By the part of the segment that has passed, so that coefficients compare.
     slopes = terms[:, 1:] * (np.arange(1, count) * _powers(lengths, count)[:, 1:])[..., None]
-    rows = np.swapaxes(slopes, 1, 2).reshape(-1, count - 1)
-    control = rows @ _bernstein(count - 2)
+    slopes = np.swapaxes(slopes, 1, 2).reshape(-1, count - 1)
+    control = slopes @ _bernstein(count - 2)
     turns = np.flatnonzero((control.min(axis=1) < 0) & (control.max(axis=1) > 0))
     if not len(turns):
-        return []
-    parts = np.zeros((len(rows), count - 2))
-    parts[turns] = _roots(rows[turns] / np.abs(rows[turns]).max(axis=1, keepdims=True))
-    times = parts.reshape(segments, joints, -1) * lengths[:, None, None]
-    return list(np.moveaxis(times, -1, 0))
+        return np.empty((segments, joints, 0))
+    parts = np.zeros((len(slopes), count - 2))
+    parts[turns] = _roots(slopes[turns] / np.abs(slopes[turns]).max(axis=1, keepdims=True), rows)
+    return np.asarray(parts.reshape(segments, joints, -1) * lengths[:, None, None])
 
 
 def _powers(lengths: Array, count: int) -> Array:
@@ -164,21 +170,19 @@ def _bernstein(degree: int) -> Array:
     return np.array([[math.comb(i, j) / math.comb(degree, j) for i in range(degree + 1)] for j in range(degree + 1)])
 
 
-def _roots(rows: Array) -> Array:
+def _roots(slopes: Array, rows: Evaluator) -> Array:
     """Return points (r, d) of [0, 1] among which are all roots there of the polynomials (r, d + 1) of degree d."""
-    roots = np.zeros((len(rows), rows.shape[1] - 1))
-    significant = np.abs(rows) > _FADED
-    degrees = rows.shape[1] - 1 - significant[:, ::-1].argmax(axis=1)
-    for degree in np.unique(degrees):
+    roots = np.zeros((len(slopes), slopes.shape[1] - 1))
+    significant = np.abs(slopes) > _FADED
+    degrees = slopes.shape[1] - 1 - significant[:, ::-1].argmax(axis=1)
+    for degree in set(degrees.tolist()):
         of = np.flatnonzero(degrees == degree)
         if degree <= 2:
-            roots[of, : min(2, roots.shape[1])] = _of_parabola(rows[of])[:, : roots.shape[1]]
+            roots[of, : min(2, roots.shape[1])] = _of_parabola(slopes[of])[:, : roots.shape[1]]
         else:
-            roots[of, :degree] = _eigenvalues(rows[of, : degree + 1])
+            roots[of, :degree] = _eigenvalues(slopes[of, : degree + 1])
     roots = np.clip(roots, 0.0, 1.0)
-    for _ in range(_POLISHES if rows.shape[1] > 3 else 0):
-        roots = _newton(rows, roots)
-    return roots
+    return rows(_polished, [roots[:, None]], [slopes])[0][:, 0] if slopes.shape[1] > 3 else roots
 
 
 def _of_parabola(rows: Array) -> Array:
@@ -202,15 +206,20 @@ def _eigenvalues(rows: Array) -> Array:
     return np.asarray(np.linalg.eigvals(companions).real)
 
 
-def _newton(rows: Array, x: Array) -> Array:
-    """Return x (r, d) after a step of Newton's method towards roots, where the step is one for the better."""
-    value, slope = np.zeros_like(x), np.zeros_like(x)
-    for power in reversed(range(rows.shape[1])):
+def _polished(root: list[Scalar], terms: list[Scalar]) -> list[list[Scalar]]:
+    """Return a point of [0, 1] after steps of Newton's method towards a root, each where it is one for the better."""
+    x = root[0]
+    for _ in range(_POLISHES):
+        value, slope = _value_and_slope(terms, x)
+        rises = abs(slope) > 0
+        ahead = smaller(larger(x - select(rises, value / select(rises, slope, 1.0), 0.0), 0.0), 1.0)
+        x = select(abs(_value_and_slope(terms, ahead)[0]) < abs(value), ahead, x)
+    return [[x]]
+
+
+def _value_and_slope(terms: list[Scalar], x: Scalar) -> tuple[Scalar, Scalar]:
+    value, slope = terms[-1], 0.0 * x
+    for term in terms[-2::-1]:
         slope = slope * x + value
-        value = value * x + rows[:, power, None]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ahead = np.clip(np.where(slope != 0, x - value / slope, x), 0.0, 1.0)
-    there = np.zeros_like(x)
-    for power in reversed(range(rows.shape[1])):
-        there = there * ahead + rows[:, power, None]
-    return np.where(np.abs(there) < np.abs(value), ahead, x)
+        value = value * x + term
+    return value, slope
