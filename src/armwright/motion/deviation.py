@@ -8,6 +8,7 @@ speeds and accelerations of the joints, which are known exactly on every interva
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -221,13 +222,21 @@ def hand_bounds(arm: Arm, joints: Array, lengths: Array, qd: Array, qdd: Array) 
     lever = np.where(turns, _levers(arm, joints, lengths), 1.0)
     n = arm.n
     later = np.maximum(np.arange(n)[:, None], np.arange(n))
-    both = turns[:, None] & turns
-    # A slide is rotated by the joints before it; those beyond it do not change its direction.
-    carried = turns[np.minimum(np.arange(n)[:, None], np.arange(n))] & ~turns[later]
-    H = np.where(both, lever[later], np.where(carried & ~np.eye(n, dtype=bool), 1.0, 0.0))
-    pull = qdd @ lever + np.einsum("mi,ij,mj->m", qd, H, qd)
-    spin_change = qdd @ turns + np.einsum("mi,ij,mj->m", qd, np.triu(both, 1).astype(np.float64), qd)
+    both, carried, earlier = _together(tuple(turns.tolist()))
+    pull = qdd @ lever + ((qd @ (both * lever[later] + carried)) * qd).sum(axis=1)
+    spin_change = qdd @ turns + ((qd @ earlier) * qd).sum(axis=1)
     return HandBounds(np.asarray(pull), np.asarray(qd @ turns), np.asarray(spin_change))
+
+
+@cache
+def _together(turns: tuple[bool, ...]) -> tuple[Array, Array, Array]:
+    """Return (n, n) which pairs of joints rotate, where one carries a slide, and those that rotate once each."""
+    rotates, n = np.array(turns), len(turns)
+    rows, columns = np.arange(n)[:, None], np.arange(n)
+    both = rotates[:, None] & rotates
+    # A slide is rotated by the joints before it; those beyond it do not change its direction.
+    carried = rotates[np.minimum(rows, columns)] & ~rotates[np.maximum(rows, columns)] & (rows != columns)
+    return both.astype(np.float64), carried.astype(np.float64), np.triu(both, 1).astype(np.float64)
 
 
 def cubic_peaks(c: Array, lengths: Array, rows: Evaluator = on_arrays) -> tuple[Array, Array]:

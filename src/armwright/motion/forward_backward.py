@@ -60,8 +60,9 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) ->
             reachable[i] = _largest(sides, i, twice[i], reachable[i + 1])
     x = [reachable[0] if rests[0] else 0.0]
     most, _ = sides.room(np.array(reachable[:-1]))
+    uppers, leans = list(sides.upper[:, 1:]), list(sides.lean[:, 1:])
     for i in range(len(twice)):
-        u = most[i] if x[i] == reachable[i] else float((sides.upper[i, 1:] - sides.lean[i, 1:] * x[i]).min())
+        u = most[i] if x[i] == reachable[i] else float((uppers[i] - leans[i] * x[i]).min())
         x.append(max(0.0, min(reachable[i + 1], x[i] + twice[i] * u)))
     return np.array(x)
 

@@ -38,14 +38,20 @@ def derivative(terms: Array, order: int) -> Array:
     return terms
 
 
-def shifted(terms: Array, shift: Array) -> Array:
-    """Return the coefficients of the same polynomials around positions ``by`` (m,)."""
-    count = terms.shape[1]
-    moved = np.zeros_like(terms)
-    for power in range(count):
-        for higher in reversed(range(power, count)):
-            moved[:, power] = moved[:, power] * shift[:, None] + math.comb(higher, power) * terms[:, higher]
-    return moved
+def shifted(terms: Array, shift: Array, rows: Evaluator = on_arrays) -> Array:
+    """Return the coefficients of the same polynomials around positions ``shift`` (m,)."""
+    return rows(_shifted, [terms], [shift[:, None]])[0]
+
+
+def _shifted(terms: list[Scalar], shift: list[Scalar]) -> list[list[Scalar]]:
+    """Return the coefficients of a polynomial around another position."""
+    moved = []
+    for power in range(len(terms)):
+        value: Scalar = math.comb(len(terms) - 1, power) * terms[-1]
+        for higher in reversed(range(power, len(terms) - 1)):
+            value = value * shift[0] + math.comb(higher, power) * terms[higher]
+        moved.append(value)
+    return [moved]
 
 
 def composed(outer: list[Scalar], inner: list[Scalar]) -> list[list[Scalar]]:
