@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -57,10 +57,12 @@ class ErrorBounds(NamedTuple):
     Attributes:
         position: second derivative of the distance that is measured [m/s²].
         orientation: second derivative of the sine of half the angle [1/s²].
+        progress: what the motion has found out of itself on the intervals, for its ``error``.
     """
 
     position: Array
     orientation: Array
+    progress: Any = None
 
 
 class HandSamples(NamedTuple):

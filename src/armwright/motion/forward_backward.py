@@ -62,7 +62,7 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) ->
     most, _ = sides.room(np.array(reachable[:-1]))
     uppers, leans = list(sides.upper[:, 1:]), list(sides.lean[:, 1:])
     for i in range(len(twice)):
-        u = most[i] if x[i] == reachable[i] else float((uppers[i] - leans[i] * x[i]).min())
+        u = most[i] if x[i] == reachable[i] else float(np.minimum.reduce(uppers[i] - leans[i] * x[i]))
         x.append(max(0.0, min(reachable[i + 1], x[i] + twice[i] * u)))
     return np.array(x)
 

@@ -7,12 +7,16 @@ from __future__ import annotations
 
 import math
 from functools import cache, reduce
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.motion.rows import Evaluator, on_arrays
 from armwright.tracing.scalar import Scalar, larger, select, smaller
+
+Indices: TypeAlias = npt.NDArray[np.intp]
 
 # A leading coefficient below this part of the largest is left out to find where roots are; Newton's method, on the
 # whole polynomial, then puts them right.
@@ -94,29 +98,34 @@ def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
         lengths: (m,) of the segments.
         rows: evaluates equations of many rows.
     """
-    return _largest(terms, lengths, rows(_reach, [terms], [lengths[:, None]])[0], rows)
+    at_ends, bound = rows(_reach, [terms], [lengths[:, None]])[0].swapaxes(0, 1)
+    most = at_ends.max(axis=0)
+    segment, joint = np.nonzero(bound > most)
+    if len(segment):
+        _rise_to_extremes(most, joint, terms[segment, :, joint][..., None], lengths[segment], rows)
+    return np.asarray(most)
 
 
 def rate_peaks(terms: Array, lengths: Array, rows: Evaluator) -> tuple[Array, Array]:
     """Return the largest speeds and accelerations (n,) of all segments: see ``peaks``."""
     reach = rows(_reach_of_rates, [terms], [lengths[:, None]])[0]
-    rates = derivative(terms, 1)
-    # A speed and an acceleration are looked at alike, the latter as one power more.
-    both = np.zeros((len(rates), rates.shape[1], 2 * rates.shape[2]))
-    both[..., : rates.shape[2]] = rates
-    both[:, :-1, rates.shape[2] :] = derivative(rates, 1)
-    found = _largest(both, lengths, np.concatenate([reach[:, :2], reach[:, 2:]], axis=2), rows)
-    return found[: rates.shape[2]], found[rates.shape[2] :]
-
-
-def _largest(terms: Array, lengths: Array, reach: Array, rows: Evaluator) -> Array:
-    """Return the largest magnitude (n,) of polynomials whose reach (m, 2, n) is known."""
-    at_ends = reach[:, 0].max(axis=0)
-    segment, joint = np.nonzero(reach[:, 1] > at_ends)
+    # Both together, accelerations as polynomials with one power more.
+    at_ends, bound = np.concatenate([reach[:, :2], reach[:, 2:]], axis=2).swapaxes(0, 1)
+    joints, most = terms.shape[2], at_ends.max(axis=0)
+    segment, index = np.nonzero(bound > most)
     if len(segment):
-        lowest, highest = extremes(terms[segment, :, joint][..., None], lengths[segment], rows)
-        np.maximum.at(at_ends, joint, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
-    return np.asarray(at_ends)
+        speeds = derivative(terms[segment, :, index % joints][..., None], 1)
+        accelerations = np.zeros_like(speeds)
+        accelerations[:, :-1] = derivative(speeds, 1)
+        sought = np.where((index < joints)[:, None, None], speeds, accelerations)
+        _rise_to_extremes(most, index, sought, lengths[segment], rows)
+    return most[:joints], most[joints:]
+
+
+def _rise_to_extremes(most: Array, index: Indices, terms: Array, lengths: Array, rows: Evaluator) -> None:
+    """Raise the largest magnitudes of some polynomials to those between the ends of others (m, k, 1) of them."""
+    lowest, highest = extremes(terms, lengths, rows)
+    np.maximum.at(most, index, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
 
 
 def _reach(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
+
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import Array
@@ -51,11 +53,18 @@ def solver_of(arm: AnyArm) -> Solver:
 def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:
     """Call a function of a compiled arm, of whose first input one value has so many axes.
 
-    The kernel is traced only here, as not every arm has each of them. One value goes as a row: kernels have other code
-    for one alone, which would have to be compiled as well.
+    The kernel is traced only here, as not every arm has each of them. It takes rows, as many of each input: a kernel
+    has other code for one value alone, which would have to be compiled as well.
     """
-    function = getattr(arm, name)
-    if inputs[0].ndim > axes:
-        return function(*inputs)
-    rows = function(inputs[0][None], *inputs[1:])
-    return tuple(each[0] for each in rows) if isinstance(rows, tuple) else rows[0]
+    first, *others = inputs
+    lead = first.shape[:-axes]
+    rows = [x.reshape(-1, x.shape[-1]) if x.shape[:-1] == lead else _repeated(x, lead) for x in others]
+    results = getattr(arm, name)(first.reshape(-1, *first.shape[-axes:]), *rows)
+    if isinstance(results, tuple):
+        return tuple(x.reshape(*lead, *x.shape[1:]) for x in results)
+    return results.reshape(*lead, *results.shape[1:])
+
+
+def _repeated(x: Array, lead: tuple[int, ...]) -> Array:
+    """Return an input (..., n) as rows, the same ones for what it lacks of the leading axes."""
+    return np.ascontiguousarray(np.broadcast_to(x, (*lead, x.shape[-1]))).reshape(-1, x.shape[-1])

@@ -101,17 +101,17 @@ class StraightPath:
 
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
         """Return bounds of the error on the intervals between times: the distance from a straight segment is convex."""
-        way, rate, change = self._rates(times)
+        progress = way, rate, change = self._rates(times)
         angle = np.linalg.norm(self.rotations[way], axis=-1)
         spin = spin_bound(hand, angle * change, angle * rate)
         if self._by_position:
             # As an estimate the tool moves along the line as was planned; ``error`` does without.
             spin = np.maximum(spin, spin_bound(hand, angle * hand.pull / self._length, angle * rate))
-        return ErrorBounds(hand.pull, spin)
+        return ErrorBounds(hand.pull, spin, progress)
 
     def error(self, samples: HandSamples) -> TrackingError:
         """Return how far a sampled tool is from its segments."""
-        way, rate, change = self._rates(np.append(samples.times[:, 0], samples.times[-1, -1]))
+        way, rate, change = samples.bounds.progress
         planned = self.progress(samples.times)[..., 0] - way[:, None]
         count, each = planned.shape
         inputs = [samples.poses.reshape(-1, 16), planned.reshape(-1, 1), np.repeat(self._segments[way], each, axis=0)]

@@ -27,7 +27,7 @@ def _times(value: ArrayLike) -> Array:
     times = floats(value, "times")
     if times.ndim != 1 or len(times) < 2:
         raise ShapeError(f"times: expected at least two, got shape {times.shape}")
-    if times[0] != 0 or (np.diff(times) < 0).any():
+    if times[0] != 0 or (times[1:] < times[:-1]).any():
         raise InvalidValueError(f"times: expected non-decreasing times that begin at 0, got {times.tolist()}")
     times.setflags(write=False)
     return times
