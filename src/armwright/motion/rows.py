@@ -48,30 +48,23 @@ def on_arrays(equation: RowEquation, of_joints: Sequence[Array], of_rows: Sequen
 
 
 def by_kernels(equation: RowEquation, of_joints: Sequence[Array], of_rows: Sequence[Array]) -> list[Array]:
-    """Evaluate an equation by a kernel, which is compiled for its shapes when it is first needed: see ``Evaluator``."""
-    joints = of_joints[0].shape[2] if of_joints else 0
-    widths = tuple(x.shape[1] for x in (*of_joints, *of_rows))
-    results = _kernel(equation, joints, widths, len(of_joints))(*of_joints, *of_rows)
-    return list(results) if isinstance(results, tuple) else [results]
+    """Evaluate an equation by a kernel, which is compiled when it is first needed: see ``Evaluator``.
+
+    Every joint is a row of the kernel, so that it is the same for all arms.
+    """
+    joints = of_joints[0].shape[2] if of_joints else 1
+    inputs = [np.ascontiguousarray(x.swapaxes(1, 2)).reshape(-1, x.shape[1]) for x in of_joints]
+    inputs += [x.repeat(joints, axis=0) for x in of_rows] if of_joints else of_rows
+    results = _kernel(equation, *(x.shape[1] for x in inputs))(*inputs)
+    outputs = results if isinstance(results, tuple) else (results,)
+    if not of_joints:
+        return list(outputs)
+    return [x.reshape(-1, joints, x.shape[1]).swapaxes(1, 2) for x in outputs]
 
 
 @cache
-def _kernel(equation: RowEquation, joints: int, widths: tuple[int, ...], of_joints: int) -> Callable[..., Any]:
-    """Return the kernel of an equation for rows of so many joints, of which the first inputs are."""
-
-    def of_row(*inputs: list[Scalar]) -> list[list[Scalar]]:
-        if not joints:
-            return [list(output) for output in equation(*inputs)]
-        of_rows = inputs[of_joints:]
-        of_each = [equation(*(x[j::joints] for x in inputs[:of_joints]), *of_rows) for j in range(joints)]
-        # Row by row of an output, all joints of each.
-        return [[x for row in zip(*output, strict=True) for x in row] for output in zip(*of_each, strict=True)]
-
-    shapes = {f"x{i}": (width, joints) if i < of_joints else (width,) for i, width in enumerate(widths)}
-    # How many scalars each output has does not depend on their values.
-    outputs = [len(output) for output in equation(*([1.0] * width for width in widths))]
+def _kernel(equation: RowEquation, *widths: int) -> Callable[..., Any]:
+    """Return the kernel of an equation for inputs of so many scalars."""
     name = equation.__name__.strip("_")
-    kernel = Kernel(
-        emitted=emit(name, of_row, shapes, shapes=[(size, joints) if joints else (size,) for size in outputs])
-    )
-    return kernel.function(name)
+    emitted = emit(name, equation, {f"x{i}": width for i, width in enumerate(widths)})
+    return Kernel(emitted=emitted).function(name)

@@ -114,8 +114,8 @@ class StraightPath:
         way, rate, change = samples.bounds.progress
         planned = self.progress(samples.times)[..., 0] - way[:, None]
         count, each = planned.shape
-        inputs = [samples.poses.reshape(-1, 16), planned.reshape(-1, 1), np.repeat(self._segments[way], each, axis=0)]
-        seen = samples.rows(_seen, [], inputs)[0].reshape(count, each, 4)
+        asked = np.concatenate([np.repeat(self._segments[way], each, axis=0), planned.reshape(-1, 1)], axis=1)
+        seen = samples.rows(_seen, [], [samples.poses.reshape(-1, 16), asked])[0].reshape(count, each, 4)
         distance, along, (half, by_position) = seen[..., 0], seen[..., 1], seen[..., 2:].max(axis=1).T
         angle = np.linalg.norm(self.rotations[way], axis=-1)
         between, hand = samples.step**2 / 8, samples.hand
@@ -170,14 +170,13 @@ class StraightPath:
         return way, first + bend * h / 2, bend
 
 
-def _seen(X: list[Scalar], planned: list[Scalar], segment: list[Scalar]) -> list[list[Scalar]]:
+def _seen(X: list[Scalar], segment: list[Scalar]) -> list[list[Scalar]]:
     """Return how far one pose of the tool is from a straight segment.
 
     Args:
         X: (16,) the pose.
-        planned: (1,) at which fraction of the segment the tool should be.
-        segment: (20,) its start, the orientation there, the way to its end, the square of the length of that, and axis
-            and angle of the rotation on it.
+        segment: (21,) its start, the orientation there, the way to its end, the square of the length of that, axis and
+            angle of the rotation on it, and at which fraction of it the tool should be.
 
     Returns:
         The distance, the fraction nearest to the tool, and the sines of half the angles from the orientations that
@@ -197,7 +196,7 @@ def _seen(X: list[Scalar], planned: list[Scalar], segment: list[Scalar]) -> list
     away = [come[i] - inside * shift[i] for i in range(3)]
     # The orientation of the tool in the axes at the start.
     Q = [[R_A[i] * X[j] + R_A[3 + i] * X[4 + j] + R_A[6 + i] * X[8 + j] for j in range(3)] for i in range(3)]
-    halves = [_half_sine(axis, angle * fraction, Q) for fraction in (planned[0], along)]
+    halves = [_half_sine(axis, angle * fraction, Q) for fraction in (segment[20], along)]
     return [[sqrt(dot(away, away)), along, *halves]]
 
 

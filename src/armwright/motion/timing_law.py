@@ -186,7 +186,8 @@ def _bounds(solver: Solver, path: Trajectory, caps: Array) -> Bounds:
     """Return bounds on x = s'² at the start of every segment, and on u = s'', that hold all along it."""
     lengths, limits = np.diff(path.times), solver.arm.limits
     count, _, joints = path.coefficients.shape
-    rates, bends = solver.rows(_slopes, [path.coefficients], [lengths[:, None]])
+    slopes = solver.rows(_slopes, [path.coefficients], [lengths[:, None]])[0]
+    rates, bends = slopes[:, : len(_PARTS)], slopes[:, len(_PARTS) :]
     ramp = 0.0 if np.isfinite(limits.acceleration).all() else _RAMP
     squares, bends = (rates / limits.speed) ** 2, bends / limits.acceleration
     # At a part of the segment x has grown by 2 u times the path.
@@ -205,7 +206,7 @@ def _slopes(cubic: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
     """Return the slopes of a cubic, and its second derivatives, at parts of its length."""
     _, c1, c2, c3 = cubic
     at = [part * length[0] for part in _PARTS.tolist()]
-    return [[(3 * c3 * s + 2 * c2) * s + c1 for s in at], [6 * c3 * s + 2 * c2 for s in at]]
+    return [[*((3 * c3 * s + 2 * c2) * s + c1 for s in at), *(6 * c3 * s + 2 * c2 for s in at)]]
 
 
 def _smooth(grid: _Grid) -> _Run:
@@ -288,18 +289,24 @@ def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
     steps = np.diff(times)
     at = [evaluate(derivative(inner, order), steps[:, None] * _SEEN) for order in range(3)]
     along = np.maximum(at[1].max(axis=1, keepdims=True), 0.0)
-    used = grid.solver.rows(_used, [path.coefficients[interval]], at)[0]
+    used = grid.solver.rows(_used, [path.coefficients[interval]], [np.concatenate(at, axis=1)])[0]
     speed, acceleration = used[:, 0] / limits.speed, np.sqrt(used[:, 1] / limits.acceleration)
     uses = np.concatenate([along / caps[interval][:, None], speed, acceleration], axis=1)
     return _Run(path, times, interval, inner[..., 0], uses)
 
 
-def _used(cubic: list[Scalar], s: list[Scalar], sd: list[Scalar], sdd: list[Scalar]) -> list[list[Scalar]]:
-    """Return the largest speed and the largest acceleration of a joint at samples of a run along a cubic q(s)."""
+def _used(cubic: list[Scalar], run: list[Scalar]) -> list[list[Scalar]]:
+    """Return the largest speed and the largest acceleration of a joint at samples of a run along a cubic q(s).
+
+    Args:
+        cubic: (4,) its coefficients.
+        run: (3 k,) s at k samples, s' at them, and s''.
+    """
     _, c1, c2, c3 = cubic
     speed: Scalar = 0.0
     acceleration: Scalar = 0.0
-    for x, rate, bend in zip(s, sd, sdd, strict=True):
+    count = len(run) // 3
+    for x, rate, bend in zip(run[:count], run[count : 2 * count], run[2 * count :], strict=True):
         slope, curve = (3 * c3 * x + 2 * c2) * x + c1, 6 * c3 * x + 2 * c2
         speed = larger(abs(slope * rate), speed)
         acceleration = larger(abs(curve * rate * rate + slope * bend), acceleration)

@@ -233,8 +233,8 @@ def states(trajectory: Trajectory, t: Array, rows: Evaluator) -> tuple[Array, Ar
     """Return positions, speeds and accelerations (k, n) of a trajectory at times (k,) from its start to its end."""
     segment = segments_at(trajectory.times, t, len(trajectory.coefficients))
     local = t - trajectory.times[segment]
-    found = rows(_state, [trajectory.coefficients[segment]], [local[:, None]])
-    return found[0][:, 0], found[1][:, 0], found[2][:, 0]
+    found = rows(_state, [trajectory.coefficients[segment]], [local[:, None]])[0]
+    return found[:, 0], found[:, 1], found[:, 2]
 
 
 def _state(terms: list[Scalar], local: list[Scalar]) -> list[list[Scalar]]:
@@ -244,9 +244,9 @@ def _state(terms: list[Scalar], local: list[Scalar]) -> list[list[Scalar]]:
         value = terms[-1]
         for term in terms[-2::-1]:
             value = value * local[0] + term
-        found.append([value])
+        found.append(value)
         terms = [power * term for power, term in enumerate(terms)][1:] or [0.0 * terms[0]]
-    return found
+    return [found]
 
 
 def hold(q: ArrayLike, duration: float) -> Trajectory:
