@@ -42,6 +42,11 @@ def derivative(terms: Array, order: int) -> Array:
     return terms
 
 
+def slope(terms: list[Scalar]) -> list[Scalar]:
+    """Return the coefficients of the derivative of one polynomial; that of 0 where nothing is left."""
+    return [power * term for power, term in enumerate(terms)][1:] or [0.0 * terms[0]]
+
+
 def shifted(terms: Array, shift: Array, rows: Evaluator = on_arrays) -> Array:
     """Return the coefficients of the same polynomials around positions ``shift`` (m,)."""
     return rows(_shifted, [terms], [shift[:, None]])[0]
@@ -146,8 +151,8 @@ def _reach(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
 
 def _reach_of_rates(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
     """Return what ``_reach`` does of the first and of the second derivative of a polynomial."""
-    first = [power * term for power, term in enumerate(terms)][1:]
-    second = [power * term for power, term in enumerate(first)][1:]
+    first = slope(terms)
+    second = slope(first)
     return [[*_reach(first, length)[0], *_reach(second, length)[0]]]
 
 
@@ -225,16 +230,16 @@ def _polished(root: list[Scalar], terms: list[Scalar]) -> list[list[Scalar]]:
     """Return a point of [0, 1] after steps of Newton's method towards a root, each where it is one for the better."""
     x = root[0]
     for _ in range(_POLISHES):
-        value, slope = _value_and_slope(terms, x)
-        rises = abs(slope) > 0
-        ahead = smaller(larger(x - select(rises, value / select(rises, slope, 1.0), 0.0), 0.0), 1.0)
+        value, rate = _value_and_slope(terms, x)
+        rises = abs(rate) > 0
+        ahead = smaller(larger(x - select(rises, value / select(rises, rate, 1.0), 0.0), 0.0), 1.0)
         x = select(abs(_value_and_slope(terms, ahead)[0]) < abs(value), ahead, x)
     return [[x]]
 
 
 def _value_and_slope(terms: list[Scalar], x: Scalar) -> tuple[Scalar, Scalar]:
-    value, slope = terms[-1], 0.0 * x
+    value, rate = terms[-1], 0.0 * x
     for term in terms[-2::-1]:
-        slope = slope * x + value
+        rate = rate * x + value
         value = value * x + term
-    return value, slope
+    return value, rate

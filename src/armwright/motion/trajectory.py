@@ -12,7 +12,7 @@ import numpy as np
 from armwright.arrays import Array, ArrayLike, floats, integer, not_negative, positive, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import joint_vector, segments_at
-from armwright.motion.polynomials import derivative, extremes, peaks, shifted
+from armwright.motion.polynomials import derivative, extremes, peaks, shifted, slope
 from armwright.motion.rows import Evaluator
 from armwright.notebook import html_table
 from armwright.tracing.scalar import Scalar
@@ -245,7 +245,7 @@ def _state(terms: list[Scalar], local: list[Scalar]) -> list[list[Scalar]]:
         for term in terms[-2::-1]:
             value = value * local[0] + term
         found.append(value)
-        terms = [power * term for power, term in enumerate(terms)][1:] or [0.0 * terms[0]]
+        terms = slope(terms)
     return [found]
 
 
