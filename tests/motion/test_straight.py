@@ -1,5 +1,7 @@
 """Certified straight lines: what the certificate says is true."""
 
+from collections import Counter
+
 import attrs
 import numpy as np
 import pytest
@@ -20,7 +22,10 @@ from samples import Sample
 
 ARMS = ("puma560", "stanford", "ur5")
 LINES = 2000  # on each arm; about half of them can be run
+COMPARED, COMPARED_ELSEWHERE = 1000, 0.005  # on each arm
 ROUNDING = 1e-9
+# How far the plans of two ways to evaluate the same equations may be apart: distances, angles, and the rest.
+SAME, SAME_ANGLE, SAME_RUN = 1e-12, 1e-10, 1e-8
 # An angle taken from the cosine of a small turn is good to the root of a rounding.
 ANGLE_ROUNDING = 5e-8
 
@@ -168,6 +173,58 @@ def test_compiled_and_plain_plan_the_same() -> None:
 
     np.testing.assert_allclose(one.trajectory.coefficients, other.trajectory.coefficients, atol=1e-9)
     assert str(one.certificate) == str(other.certificate)
+
+
+def line_or_refusal(arm: Arm | CompiledArm, q: Array, X_B: Array, **manner: float) -> CertifiedMotion | PathError:
+    """Return a line, or why there is none."""
+    try:
+        return straight_line(arm, q, X_B, **manner)
+    except PathError as error:
+        return error
+
+
+def compared(fast: CompiledArm, rng: np.random.Generator) -> str:
+    """Plan a random line with a plain and with a compiled arm, which must come to the same.
+
+    Returns:
+        Whether it is ``run`` or ``refused``; ``elsewhere`` where it is refused at another place.
+    """
+    q, X_B = random_line(fast.arm, rng)
+    X_A = forward(fast.arm, q)
+    X_B[:3, 3] = X_A[:3, 3] + (X_B[:3, 3] - X_A[:3, 3]) * 10 ** rng.uniform(-4, 0)
+    manner = {"deviation": 10 ** rng.uniform(-4.5, -2), "speed": rng.uniform(1, 120)}
+    one, two = (line_or_refusal(arm, q, X_B, **manner) for arm in (fast.arm, fast))
+    if isinstance(one, PathError):
+        assert isinstance(two, PathError)
+        assert (one.cause, one.segment, one.joint) == (two.cause, two.segment, two.joint)
+        return "refused" if one.fraction == pytest.approx(two.fraction, abs=SAME, rel=0) else "elsewhere"
+    assert isinstance(two, CertifiedMotion)
+    mine, same = one.certificate, two.certificate
+    assert (mine.holds, mine.knots, mine.samples, mine.because) == (same.holds, same.knots, same.samples, same.because)
+    for name, apart in (("deviation", SAME), ("rotation", SAME_ANGLE)):
+        assert getattr(mine, name) == pytest.approx(getattr(same, name), abs=apart, rel=0)
+        sampled = f"{name}_sampled"
+        assert getattr(mine, sampled) == pytest.approx(getattr(same, sampled), abs=apart, rel=0)
+    assert one.trajectory.duration == pytest.approx(two.trajectory.duration, rel=SAME_RUN)
+    for limit, peaks in mine.peaks.items():
+        np.testing.assert_allclose(peaks, same.peaks[limit], rtol=SAME_RUN, atol=SAME_RUN)
+    t = np.linspace(0.0, 1.0, 50)
+    configurations = [each.trajectory(t * each.trajectory.duration) for each in (one, two)]
+    np.testing.assert_allclose(*configurations, rtol=0, atol=SAME_RUN)
+    return "run"
+
+
+@pytest.mark.share(0.02)
+def test_certificates_are_those_of_the_plain_arm(fast: CompiledArm, sample: Sample) -> None:
+    """A compiled arm certifies what a plain one does, and refuses the same lines for the same reasons.
+
+    The distances agree to 1e-12 m, the angles to 1e-10, as a nearly singular wrist magnifies rounding, the run to 1e-8.
+    Where the wrist is singular rounding decides which of two configurations is nearer: there a line in hundreds is
+    refused by a compiled arm at another place on it, for the same reason.
+    """
+    counts = Counter(compared(fast, rng) for rng in sample.cases(COMPARED))
+    assert counts["elsewhere"] <= max(1, COMPARED_ELSEWHERE * counts.total())
+    sample.record(f"lines of the {fast.arm.name}, by a compiled and a plain arm", counts.total(), 0, **counts)
 
 
 def test_an_effort_that_binds() -> None:

@@ -139,7 +139,8 @@ def via_distances(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends
         for i in range(5):
             for j in range(5):
                 squares[:, i + j, 0] += np.sum(terms[:, i] * terms[:, j], axis=-1)
-        times_tried = [np.zeros_like(b), b, 2 * b, *turning_times(squares, 2 * b[:, 0])]
+        turning = np.moveaxis(turning_times(squares, 2 * b[:, 0]), -1, 0)
+        times_tried = [np.zeros_like(b), b, 2 * b, *turning]
         distances[1:-1] = np.min([np.linalg.norm(evaluate(terms, t), axis=-1) for t in times_tried], axis=0)
     return distances
 

@@ -16,7 +16,7 @@ from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.timing_law import timed
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.tracking import Tracking
-from armwright.motion.trajectory import Trajectory, hold, join, whole_ticks
+from armwright.motion.trajectory import Trajectory, hold, join, states, whole_ticks
 
 # Efforts are sampled so often along a motion, and at the ends and in the middle of every segment, as the first ones of
 # a motion are short; those that come as near to a limit as this part of it are sampled closely.
@@ -138,7 +138,7 @@ def fastest(
         IncapableArmError: gravity alone takes more than a joint may give, and ``weak`` is not set.
     """
     path, error = tracking.trajectory, tracking.error
-    run = timed(solver_of(arm).arm, path, np.ones(len(path.times) - 1))
+    run = timed(solver_of(arm), path, np.ones(len(path.times) - 1))
     time = run.when(error.worst_time)
     trajectory, efforts, slower = _inside_efforts(arm, run.trajectory, weak=weak)
     stretch, factor = trajectory.duration / run.trajectory.duration, trajectory.duration / nominal
@@ -196,7 +196,7 @@ def _efforts(arm: AnyArm, trajectory: Trajectory) -> Array:
         return np.zeros(solver.arm.n)
     ends = trajectory.times
     t = np.concatenate([np.linspace(0.0, trajectory.duration, _SAMPLES), ends, (ends[1:] + ends[:-1]) / 2])
-    q, qd, qdd = (trajectory(t, order) for order in range(3))
+    q, qd, qdd = states(trajectory, t, solver.rows)
     # The sign of the speed of a joint that stands is rounding, and would give it Coulomb friction.
     qd = np.where(np.abs(qd) > _STANDS * np.abs(qd).max(axis=0), qd, 0.0)
     efforts = np.abs(solver.inverse_dynamics(q, qd, qdd)).max(axis=0)

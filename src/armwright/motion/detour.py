@@ -12,6 +12,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike
+from armwright.compiled.arm import compile_arm
 from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.forward_kinematics import forward
@@ -126,7 +127,7 @@ def line_or_detour(
     that takes less than half the time.
 
     Args:
-        arm: an arm, or a compiled one, which plans faster.
+        arm: an arm, or a compiled one, which plans faster; a detour is searched for with a compiled one anyway.
         q_start: (n,) present joint positions [rad] or [m].
         X_goal: (4, 4) pose at the end of the line.
         method: ``via`` or ``damped``.
@@ -160,6 +161,8 @@ def line_or_detour(
         obstacle = _crawl(requested, line)
     if requested is None or (method == "damped" and obstacle.cause == "reach"):
         raise obstacle
+    # So many poses are asked for in a search that it is worth compiling the arm for it.
+    arm = compile_arm(solver.arm)
     detour = _damped(arm, requested, q, damping, obstacle) if method == "damped" else None
     if method == "via":
         detour = _by_via(arm, requested, q, obstacle, allowed=allowed, speed=speed)

@@ -8,7 +8,8 @@ speeds and accelerations of the joints, which are known exactly on every interva
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from functools import cache
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +17,12 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.motion.polynomials import evaluate
+from armwright.motion.rows import Evaluator, on_arrays
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.rotations import skew_matrix
+from armwright.tracing.scalar import Scalar, larger, select, smaller, sqrt
 
 # What a bound may add to what is seen, in parts of what is allowed; samples are taken so densely that it does not
 # exceed it, but no fewer and no more on an interval than these.
@@ -54,10 +57,12 @@ class ErrorBounds(NamedTuple):
     Attributes:
         position: second derivative of the distance that is measured [m/s²].
         orientation: second derivative of the sine of half the angle [1/s²].
+        progress: what the motion has found out of itself on the intervals, for its ``error``.
     """
 
     position: Array
     orientation: Array
+    progress: Any = None
 
 
 class HandSamples(NamedTuple):
@@ -69,6 +74,7 @@ class HandSamples(NamedTuple):
         step: (m,) between two of them [s].
         hand: how the tool moves on the intervals.
         bounds: of the error between samples.
+        rows: evaluates equations of many samples.
     """
 
     times: Array
@@ -76,6 +82,7 @@ class HandSamples(NamedTuple):
     step: Array
     hand: HandBounds
     bounds: ErrorBounds
+    rows: Evaluator
 
 
 class TrackingError(NamedTuple):
@@ -140,7 +147,7 @@ def tracking_error(
     local = np.linspace(0.0, 1.0, count + 1) * h[:, None]
     q = evaluate(trajectory.coefficients[:, :, None], local[..., None])
     times = np.minimum(trajectory.times[:-1, None] + local, trajectory.duration)
-    return motion.error(HandSamples(times, np.asarray(solver.forward(q)), h / count, hand, bounds))
+    return motion.error(HandSamples(times, np.asarray(solver.forward(q)), h / count, hand, bounds, solver.rows))
 
 
 def error_of(
@@ -217,38 +224,60 @@ def hand_bounds(arm: Arm, joints: Array, lengths: Array, qd: Array, qdd: Array) 
     lever = np.where(turns, _levers(arm, joints, lengths), 1.0)
     n = arm.n
     later = np.maximum(np.arange(n)[:, None], np.arange(n))
-    both = turns[:, None] & turns
-    # A slide is rotated by the joints before it; those beyond it do not change its direction.
-    carried = turns[np.minimum(np.arange(n)[:, None], np.arange(n))] & ~turns[later]
-    H = np.where(both, lever[later], np.where(carried & ~np.eye(n, dtype=bool), 1.0, 0.0))
-    pull = qdd @ lever + np.einsum("mi,ij,mj->m", qd, H, qd)
-    spin_change = qdd @ turns + np.einsum("mi,ij,mj->m", qd, np.triu(both, 1).astype(np.float64), qd)
+    both, carried, earlier = _together(tuple(turns.tolist()))
+    pull = qdd @ lever + ((qd @ (both * lever[later] + carried)) * qd).sum(axis=1)
+    spin_change = qdd @ turns + ((qd @ earlier) * qd).sum(axis=1)
     return HandBounds(np.asarray(pull), np.asarray(qd @ turns), np.asarray(spin_change))
 
 
-def cubic_peaks(c: Array, lengths: Array) -> tuple[Array, Array]:
+@cache
+def _together(turns: tuple[bool, ...]) -> tuple[Array, Array, Array]:
+    """Return (n, n) which pairs of joints rotate, where one carries a slide, and those that rotate once each."""
+    rotates, n = np.array(turns), len(turns)
+    rows, columns = np.arange(n)[:, None], np.arange(n)
+    both = rotates[:, None] & rotates
+    # A slide is rotated by the joints before it; those beyond it do not change its direction.
+    carried = rotates[np.minimum(rows, columns)] & ~rotates[np.maximum(rows, columns)] & (rows != columns)
+    return both.astype(np.float64), carried.astype(np.float64), np.triu(both, 1).astype(np.float64)
+
+
+def cubic_peaks(c: Array, lengths: Array, rows: Evaluator = on_arrays) -> tuple[Array, Array]:
     """Return the largest speeds and accelerations (m, n) of cubics (m, 4, n), exactly."""
-    h = lengths[:, None]
-    start, bend, end = c[:, 1], 2 * c[:, 2], c[:, 1] + (2 * c[:, 2] + 3 * c[:, 3] * h) * h
-    bend_end = bend + 6 * c[:, 3] * h
-    speed = np.maximum(np.abs(start), np.abs(end))
+    peaks = rows(_cubic_peaks, [c], [lengths[:, None]])[0]
+    return peaks[:, 0], peaks[:, 1]
+
+
+def _cubic_peaks(c: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
+    """Return the largest speed and the largest acceleration of a cubic."""
+    h = length[0]
+    start, bend, end = c[1], 2 * c[2], c[1] + (2 * c[2] + 3 * c[3] * h) * h
+    bend_end = bend + 6 * c[3] * h
+    speed = larger(abs(start), abs(end))
     # The speed has its own peak where the acceleration changes its sign.
     inside = bend * bend_end < 0
-    vertex = start - bend**2 / np.where(inside, 12 * c[:, 3], 1.0)
-    speed = np.where(inside, np.maximum(speed, np.abs(vertex)), speed)
-    return speed, np.maximum(np.abs(bend), np.abs(bend_end))
+    vertex = start - bend * bend / select(inside, 12 * c[3], 1.0)
+    return [[select(inside, larger(speed, abs(vertex)), speed), larger(abs(bend), abs(bend_end))]]
 
 
-def turning_positions(c: Array, lengths: Array) -> Array:
-    """Return the positions (2, m, n) where cubics (m, 4, n) reverse, exactly; at an end where they do not."""
-    a, b, start = 3 * c[:, 3], c[:, 2], c[:, 1]
-    root = np.sqrt(np.maximum(b * b - a * start, 0.0))
+def turning_positions(c: Array, lengths: Array, rows: Evaluator = on_arrays) -> tuple[Array, Array]:
+    """Return two positions (m, n) where cubics (m, 4, n) reverse, exactly; at an end where they do not."""
+    positions = rows(_turning_positions, [c], [lengths[:, None]])[0]
+    return positions[:, 0], positions[:, 1]
+
+
+def _turning_positions(c: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
+    """Return the two positions where a cubic reverses."""
+    a, b, start = 3 * c[3], c[2], c[1]
+    root = sqrt(b * b - a * start)
     # Of a t² + 2 b t + start = 0 the root of larger size without cancellation, and the other by their product.
-    large = -b - np.copysign(root, b)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        times = np.stack([large / a, start / large])
-    t = np.clip(np.nan_to_num(times, nan=0.0, posinf=0.0, neginf=0.0), 0.0, lengths[:, None])
-    return evaluate(c, t)
+    large = -b - select(b < 0, -root, root)
+    positions = []
+    for over, under in ((large, a), (start, large)):
+        there = abs(under) > 0
+        t = select(there, over / select(there, under, 1.0), 0.0)
+        t = select(t > 0, smaller(t, length[0]), 0.0)
+        positions.append(((c[3] * t + c[2]) * t + c[1]) * t + c[0])
+    return [positions]
 
 
 def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:

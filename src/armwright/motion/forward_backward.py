@@ -58,13 +58,13 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) ->
             reachable[i] = top[i]
         else:
             reachable[i] = _largest(sides, i, twice[i], reachable[i + 1])
-    x = np.zeros(len(reachable))
-    x[0] = reachable[0] if rests[0] else 0.0
+    x = [reachable[0] if rests[0] else 0.0]
     most, _ = sides.room(np.array(reachable[:-1]))
+    uppers, leans = list(sides.upper[:, 1:]), list(sides.lean[:, 1:])
     for i in range(len(twice)):
-        u = most[i] if x[i] == reachable[i] else float((sides.upper[i, 1:] - sides.lean[i, 1:] * x[i]).min())
-        x[i + 1] = max(0.0, min(reachable[i + 1], x[i] + twice[i] * u))
-    return x
+        u = most[i] if x[i] == reachable[i] else float(np.minimum.reduce(uppers[i] - leans[i] * x[i]))
+        x.append(max(0.0, min(reachable[i + 1], x[i] + twice[i] * u)))
+    return np.array(x)
 
 
 class _Sides(NamedTuple):

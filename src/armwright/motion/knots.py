@@ -27,7 +27,7 @@ def timed_points(title: str, times: ArrayLike, points: ArrayLike, what: str = "p
     t, q = floats(times, "times", LARGEST), floats(points, what, LARGEST)
     if t.ndim != 1 or q.ndim != 2 or len(t) != len(q) or len(t) < 2 or not q.size:
         raise ShapeError(f"{title}: expected k times and (k, n) {what} with k at least 2, got {t.shape} and {q.shape}")
-    falls = np.flatnonzero(np.diff(t) <= 0)
+    falls = np.flatnonzero(t[1:] <= t[:-1])
     if len(falls):
         i = int(falls[0])
         raise InvalidValueError(
@@ -104,7 +104,8 @@ def rate_or_rest(rate: ArrayLike | None, joints: int, what: str) -> Array:
 
 def segments_at(starts: Array, t: ArrayLike, count: int) -> npt.NDArray[np.intp]:
     """Return which (...) of ``count`` segments, by their ``starts`` (k,), times (...) are in; at a start the next."""
-    return np.asarray(np.clip(np.searchsorted(starts, t, side="right") - 1, 0, count - 1), dtype=np.intp)
+    # np.clip would take many times as long as these.
+    return np.asarray(np.minimum(np.maximum(starts.searchsorted(t, side="right") - 1, 0), count - 1), dtype=np.intp)
 
 
 def divided(times: Array, parts: npt.NDArray[np.intp]) -> Array:

@@ -6,11 +6,17 @@ Coefficients are (m, k, n): of m segments and n joints, of the powers 0 to k-1 o
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, reduce
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arrays import Array
+from armwright.motion.rows import Evaluator, on_arrays
+from armwright.tracing.scalar import Scalar, larger, select, smaller
+
+Indices: TypeAlias = npt.NDArray[np.intp]
 
 # A leading coefficient below this part of the largest is left out to find where roots are; Newton's method, on the
 # whole polynomial, then puts them right.
@@ -36,56 +42,58 @@ def derivative(terms: Array, order: int) -> Array:
     return terms
 
 
-def shifted(terms: Array, shift: Array) -> Array:
-    """Return the coefficients of the same polynomials around positions ``by`` (m,)."""
-    count = terms.shape[1]
-    moved = np.zeros_like(terms)
-    for power in range(count):
-        for higher in reversed(range(power, count)):
-            moved[:, power] = moved[:, power] * shift[:, None] + math.comb(higher, power) * terms[:, higher]
-    return moved
+def slope(terms: list[Scalar]) -> list[Scalar]:
+    """Return the coefficients of the derivative of one polynomial; that of 0 where nothing is left."""
+    return [power * term for power, term in enumerate(terms)][1:] or [0.0 * terms[0]]
 
 
-def composed(outer: Array, inner: Array) -> Array:
-    """Return the coefficients of polynomials of polynomials.
+def shifted(terms: Array, shift: Array, rows: Evaluator = on_arrays) -> Array:
+    """Return the coefficients of the same polynomials around positions ``shift`` (m,)."""
+    return rows(_shifted, [terms], [shift[:, None]])[0]
 
-    Args:
-        outer: (m, k, n) coefficients of q(s).
-        inner: (m, d) coefficients of s(t).
 
-    Returns:
-        (m, (k - 1)(d - 1) + 1, n) coefficients of q(s(t)).
-    """
-    segments, count, joints = outer.shape
-    degree = inner.shape[1] - 1
-    terms = np.zeros((segments, (count - 1) * degree + 1, joints))
+def _shifted(terms: list[Scalar], shift: list[Scalar]) -> list[list[Scalar]]:
+    """Return the coefficients of a polynomial around another position."""
+    moved = []
+    for power in range(len(terms)):
+        value: Scalar = math.comb(len(terms) - 1, power) * terms[-1]
+        for higher in reversed(range(power, len(terms) - 1)):
+            value = value * shift[0] + math.comb(higher, power) * terms[higher]
+        moved.append(value)
+    return [moved]
+
+
+def composed(outer: list[Scalar], inner: list[Scalar]) -> list[list[Scalar]]:
+    """Return the coefficients of a polynomial q(s) of a polynomial s(t)."""
+    terms: list[Scalar] = [0.0] * ((len(outer) - 1) * (len(inner) - 1) + 1)
     # Powers of the inner polynomial, one after the other.
-    power = np.ones((segments, 1))
-    for k in range(count):
-        terms[:, : power.shape[1]] += power[..., None] * outer[:, k, None]
-        higher = np.zeros((segments, power.shape[1] + degree))
-        for d in range(degree + 1):
-            higher[:, d : d + power.shape[1]] += inner[:, d, None] * power
+    power: list[Scalar] = [1.0]
+    for coefficient in outer:
+        for i, x in enumerate(power):
+            terms[i] = terms[i] + x * coefficient
+        higher: list[Scalar] = [0.0] * (len(power) + len(inner) - 1)
+        for i, x in enumerate(power):
+            for k, y in enumerate(inner):
+                higher[i + k] = higher[i + k] + y * x
         power = higher
-    return terms
+    return [terms]
 
 
-def extremes(terms: Array, lengths: Array) -> tuple[Array, Array]:
+def extremes(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> tuple[Array, Array]:
     """Return the smallest and the largest value (m, n) on each segment, by the roots of the derivative.
 
     Args:
         terms: (m, k, n) coefficients.
         lengths: (m,) of the segments.
+        rows: evaluates equations of many rows.
     """
-    first, last = terms[:, 0], evaluate(terms, lengths[:, None])
-    lowest, highest = np.minimum(first, last), np.maximum(first, last)
-    for t in turning_times(terms, lengths):
-        value = evaluate(terms, t)
-        lowest, highest = np.minimum(lowest, value), np.maximum(highest, value)
-    return lowest, highest
+    ends = [terms[:, 0], evaluate(terms, lengths[:, None])]
+    between = evaluate(terms[..., None], turning_times(terms, lengths, rows))
+    values = np.concatenate([np.stack(ends, axis=-1), between], axis=-1)
+    return values.min(axis=-1), values.max(axis=-1)
 
 
-def peaks(terms: Array, lengths: Array) -> Array:
+def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
     """Return the largest magnitude (n,) of all segments.
 
     Only polynomials whose Bernstein coefficients go beyond the largest value at an end of any can hold a larger one.
@@ -93,37 +101,80 @@ def peaks(terms: Array, lengths: Array) -> Array:
     Args:
         terms: (m, k, n) coefficients.
         lengths: (m,) of the segments.
+        rows: evaluates equations of many rows.
     """
-    segments, count, joints = terms.shape
-    at_ends = np.maximum(np.abs(terms[:, 0]), np.abs(evaluate(terms, lengths[:, None]))).max(axis=0)
-    rows = np.swapaxes(terms * _powers(lengths, count)[..., None], 1, 2).reshape(-1, count)
-    control = np.abs(rows @ _bernstein(count - 1)).max(axis=1).reshape(segments, joints)
-    segment, joint = np.nonzero(control > at_ends)
-    lowest, highest = extremes(terms[segment, :, joint][..., None], lengths[segment])
-    np.maximum.at(at_ends, joint, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
-    return np.asarray(at_ends)
+    at_ends, bound = rows(_reach, [terms], [lengths[:, None]])[0].swapaxes(0, 1)
+    most = at_ends.max(axis=0)
+    segment, joint = np.nonzero(bound > most)
+    if len(segment):
+        _rise_to_extremes(most, joint, terms[segment, :, joint][..., None], lengths[segment], rows)
+    return np.asarray(most)
 
 
-def turning_times(terms: Array, lengths: Array) -> list[Array]:
-    """Return times (m, n) inside the segments among which are all at which a polynomial reverses.
+def rate_peaks(terms: Array, lengths: Array, rows: Evaluator) -> tuple[Array, Array]:
+    """Return the largest speeds and accelerations (n,) of all segments: see ``peaks``."""
+    reach = rows(_reach_of_rates, [terms], [lengths[:, None]])[0]
+    # Both together, accelerations as polynomials with one power more.
+    at_ends, bound = np.concatenate([reach[:, :2], reach[:, 2:]], axis=2).swapaxes(0, 1)
+    joints, most = terms.shape[2], at_ends.max(axis=0)
+    segment, index = np.nonzero(bound > most)
+    if len(segment):
+        speeds = derivative(terms[segment, :, index % joints][..., None], 1)
+        accelerations = np.zeros_like(speeds)
+        accelerations[:, :-1] = derivative(speeds, 1)
+        sought = np.where((index < joints)[:, None, None], speeds, accelerations)
+        _rise_to_extremes(most, index, sought, lengths[segment], rows)
+    return most[:joints], most[joints:]
+
+
+def _rise_to_extremes(most: Array, index: Indices, terms: Array, lengths: Array, rows: Evaluator) -> None:
+    """Raise the largest magnitudes of some polynomials to those between the ends of others (m, k, 1) of them."""
+    lowest, highest = extremes(terms, lengths, rows)
+    np.maximum.at(most, index, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
+
+
+def _reach(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
+    """Return the largest magnitude at an end of a polynomial, and a bound of that between: of its Bernstein terms."""
+    scaled, power, last = [], 1.0, terms[-1]
+    for term in terms:
+        scaled.append(term * power)
+        power = power * length[0]
+    for term in terms[-2::-1]:
+        last = last * length[0] + term
+    ends = larger(abs(terms[0]), abs(last))
+    control = [
+        abs(sum((x * weight for x, weight in zip(scaled[1:], weights[1:], strict=True) if weight), scaled[0]))
+        for weights in _bernstein(len(terms) - 1).T[1:-1].tolist()
+    ]
+    return [[ends, reduce(larger, control, ends)]]
+
+
+def _reach_of_rates(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
+    """Return what ``_reach`` does of the first and of the second derivative of a polynomial."""
+    first = slope(terms)
+    second = slope(first)
+    return [[*_reach(first, length)[0], *_reach(second, length)[0]]]
+
+
+def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
+    """Return times (m, n, r) inside the segments among which are all at which a polynomial reverses.
 
     A polynomial whose slope has no two Bernstein coefficients of opposite signs rises or falls all along, and is not
     sampled further.
     """
     segments, count, joints = terms.shape
     if count < 3:
-        return []
+        return np.empty((segments, joints, 0))
     # By the part of the segment that has passed, so that coefficients compare.
     slopes = terms[:, 1:] * (np.arange(1, count) * _powers(lengths, count)[:, 1:])[..., None]
-    rows = np.swapaxes(slopes, 1, 2).reshape(-1, count - 1)
-    control = rows @ _bernstein(count - 2)
+    slopes = np.swapaxes(slopes, 1, 2).reshape(-1, count - 1)
+    control = slopes @ _bernstein(count - 2)
     turns = np.flatnonzero((control.min(axis=1) < 0) & (control.max(axis=1) > 0))
     if not len(turns):
-        return []
-    parts = np.zeros((len(rows), count - 2))
-    parts[turns] = _roots(rows[turns] / np.abs(rows[turns]).max(axis=1, keepdims=True))
-    times = parts.reshape(segments, joints, -1) * lengths[:, None, None]
-    return list(np.moveaxis(times, -1, 0))
+        return np.empty((segments, joints, 0))
+    parts = np.zeros((len(slopes), count - 2))
+    parts[turns] = _roots(slopes[turns] / np.abs(slopes[turns]).max(axis=1, keepdims=True), rows)
+    return np.asarray(parts.reshape(segments, joints, -1) * lengths[:, None, None])
 
 
 def _powers(lengths: Array, count: int) -> Array:
@@ -139,21 +190,19 @@ def _bernstein(degree: int) -> Array:
     return np.array([[math.comb(i, j) / math.comb(degree, j) for i in range(degree + 1)] for j in range(degree + 1)])
 
 
-def _roots(rows: Array) -> Array:
+def _roots(slopes: Array, rows: Evaluator) -> Array:
     """Return points (r, d) of [0, 1] among which are all roots there of the polynomials (r, d + 1) of degree d."""
-    roots = np.zeros((len(rows), rows.shape[1] - 1))
-    significant = np.abs(rows) > _FADED
-    degrees = rows.shape[1] - 1 - significant[:, ::-1].argmax(axis=1)
-    for degree in np.unique(degrees):
+    roots = np.zeros((len(slopes), slopes.shape[1] - 1))
+    significant = np.abs(slopes) > _FADED
+    degrees = slopes.shape[1] - 1 - significant[:, ::-1].argmax(axis=1)
+    for degree in set(degrees.tolist()):
         of = np.flatnonzero(degrees == degree)
         if degree <= 2:
-            roots[of, : min(2, roots.shape[1])] = _of_parabola(rows[of])[:, : roots.shape[1]]
+            roots[of, : min(2, roots.shape[1])] = _of_parabola(slopes[of])[:, : roots.shape[1]]
         else:
-            roots[of, :degree] = _eigenvalues(rows[of, : degree + 1])
+            roots[of, :degree] = _eigenvalues(slopes[of, : degree + 1])
     roots = np.clip(roots, 0.0, 1.0)
-    for _ in range(_POLISHES if rows.shape[1] > 3 else 0):
-        roots = _newton(rows, roots)
-    return roots
+    return rows(_polished, [roots[:, None]], [slopes])[0][:, 0] if slopes.shape[1] > 3 else roots
 
 
 def _of_parabola(rows: Array) -> Array:
@@ -177,15 +226,20 @@ def _eigenvalues(rows: Array) -> Array:
     return np.asarray(np.linalg.eigvals(companions).real)
 
 
-def _newton(rows: Array, x: Array) -> Array:
-    """Return x (r, d) after a step of Newton's method towards roots, where the step is one for the better."""
-    value, slope = np.zeros_like(x), np.zeros_like(x)
-    for power in reversed(range(rows.shape[1])):
-        slope = slope * x + value
-        value = value * x + rows[:, power, None]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ahead = np.clip(np.where(slope != 0, x - value / slope, x), 0.0, 1.0)
-    there = np.zeros_like(x)
-    for power in reversed(range(rows.shape[1])):
-        there = there * ahead + rows[:, power, None]
-    return np.where(np.abs(there) < np.abs(value), ahead, x)
+def _polished(root: list[Scalar], terms: list[Scalar]) -> list[list[Scalar]]:
+    """Return a point of [0, 1] after steps of Newton's method towards a root, each where it is one for the better."""
+    x = root[0]
+    for _ in range(_POLISHES):
+        value, rate = _value_and_slope(terms, x)
+        rises = abs(rate) > 0
+        ahead = smaller(larger(x - select(rises, value / select(rises, rate, 1.0), 0.0), 0.0), 1.0)
+        x = select(abs(_value_and_slope(terms, ahead)[0]) < abs(value), ahead, x)
+    return [[x]]
+
+
+def _value_and_slope(terms: list[Scalar], x: Scalar) -> tuple[Scalar, Scalar]:
+    value, rate = terms[-1], 0.0 * x
+    for term in terms[-2::-1]:
+        rate = rate * x + value
+        value = value * x + term
+    return value, rate

@@ -320,7 +320,7 @@ def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, TimedPath]:
     except PathError as error:
         raise error.restated(legs.numbers[error.segment + 1] - 1, str(error)) from None
     caps = _caps(tracked.trajectory.times, times, widths / top, legs.speeds / top)
-    return tracked, timed(solver.arm, tracked.trajectory, caps)
+    return tracked, timed(solver, tracked.trajectory, caps)
 
 
 def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
+
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import Array
@@ -14,6 +16,7 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import inverse_branches
+from armwright.motion.rows import Evaluator, by_kernels, on_arrays
 
 AnyArm: TypeAlias = Arm | CompiledArm
 
@@ -26,18 +29,42 @@ class Solver(NamedTuple):
         forward: tool poses (..., 4, 4) of q (..., n).
         inverse_dynamics: efforts (..., n) of q, qd, qdd (..., n).
         inverse_branches: the eight configurations of poses, see ``kinematics.inverse``; None without a closed form.
+        rows: evaluates other equations of many rows.
     """
 
     arm: Arm
     forward: Callable[..., Array]
     inverse_dynamics: Callable[..., Array]
     inverse_branches: Callable[..., Any] | None
+    rows: Evaluator
 
 
 def solver_of(arm: AnyArm) -> Solver:
     """Return the functions of an arm: kernels of a compiled one, else the plain functions, which compile nothing."""
     if isinstance(arm, CompiledArm):
+        forward_, dynamics = partial(_by_kernel, arm, "forward", 1), partial(_by_kernel, arm, "inverse_dynamics", 1)
+        branches_ = partial(_by_kernel, arm, "inverse_branches", 2)
         closed = find_geometry(arm.arm) is not None
-        return Solver(arm.arm, arm.forward, arm.inverse_dynamics, arm.inverse_branches if closed else None)
+        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels)
     branches = partial(inverse_branches, arm) if find_geometry(known_arm(arm)) is not None else None
-    return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches)
+    return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches, on_arrays)
+
+
+def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:
+    """Call a function of a compiled arm, of whose first input one value has so many axes.
+
+    The kernel is traced only here, as not every arm has each of them. It takes rows, as many of each input: a kernel
+    has other code for one value alone, which would have to be compiled as well.
+    """
+    first, *others = inputs
+    lead = first.shape[:-axes]
+    rows = [x.reshape(-1, x.shape[-1]) if x.shape[:-1] == lead else _repeated(x, lead) for x in others]
+    results = getattr(arm, name)(first.reshape(-1, *first.shape[-axes:]), *rows)
+    if isinstance(results, tuple):
+        return tuple(x.reshape(*lead, *x.shape[1:]) for x in results)
+    return results.reshape(*lead, *results.shape[1:])
+
+
+def _repeated(x: Array, lead: tuple[int, ...]) -> Array:
+    """Return an input (..., n) as rows, the same ones for what it lacks of the leading axes."""
+    return np.ascontiguousarray(np.broadcast_to(x, (*lead, x.shape[-1]))).reshape(-1, x.shape[-1])

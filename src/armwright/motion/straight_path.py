@@ -16,7 +16,6 @@ from armwright.motion.deviation import (
     HandSamples,
     TrackingError,
     error_of,
-    half_sines,
     rotated,
     spin_bound,
 )
@@ -27,6 +26,8 @@ from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.poses import position_text
 from armwright.spatial.rotations import rotation_vector
+from armwright.tracing.scalar import Scalar, larger, sin, smaller, sqrt
+from armwright.tracing.vectors import dot
 
 SegmentNumbers: TypeAlias = npt.NDArray[np.intp]
 
@@ -100,25 +101,22 @@ class StraightPath:
 
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
         """Return bounds of the error on the intervals between times: the distance from a straight segment is convex."""
-        way, rate, change = self._rates(times)
+        progress = way, rate, change = self._rates(times)
         angle = np.linalg.norm(self.rotations[way], axis=-1)
         spin = spin_bound(hand, angle * change, angle * rate)
         if self._by_position:
             # As an estimate the tool moves along the line as was planned; ``error`` does without.
             spin = np.maximum(spin, spin_bound(hand, angle * hand.pull / self._length, angle * rate))
-        return ErrorBounds(hand.pull, spin)
+        return ErrorBounds(hand.pull, spin, progress)
 
     def error(self, samples: HandSamples) -> TrackingError:
         """Return how far a sampled tool is from its segments."""
-        way, rate, change = self._rates(np.append(samples.times[:, 0], samples.times[-1, -1]))
-        p_A, R_A, shift = self.poses[way, :3, 3], self.poses[way, None, :3, :3], self.shifts[way]
-        come = samples.poses[..., :3, 3] - p_A[:, None]
-        square = np.einsum("mi,mi->m", shift, shift)
-        along = (come @ shift[:, :, None])[..., 0] / np.where(square > 0, square, 1.0)[:, None]
-        distance = np.linalg.norm(come - np.clip(along, 0.0, 1.0)[..., None] * shift[:, None], axis=-1)
+        way, rate, change = samples.bounds.progress
         planned = self.progress(samples.times)[..., 0] - way[:, None]
-        R = samples.poses[..., :3, :3]
-        half = half_sines(R_A @ rotated(self.rotations[way], planned), R).max(axis=1)
+        count, each = planned.shape
+        asked = np.concatenate([np.repeat(self._segments[way], each, axis=0), planned.reshape(-1, 1)], axis=1)
+        seen = samples.rows(_seen, [], [samples.poses.reshape(-1, 16), asked])[0].reshape(count, each, 4)
+        distance, along, (half, by_position) = seen[..., 0], seen[..., 1], seen[..., 2:].max(axis=1).T
         angle = np.linalg.norm(self.rotations[way], axis=-1)
         between, hand = samples.step**2 / 8, samples.hand
         orientation = half + between * spin_bound(hand, angle * change, angle * rate)
@@ -128,7 +126,6 @@ class StraightPath:
         hurry = hand.pull / self._length
         rate = np.abs(np.diff(along, axis=1)).max(axis=1) / samples.step + samples.step * hurry
         beyond = np.maximum(np.maximum(-along, along - 1).max(axis=1) + between * hurry, 0.0)
-        by_position = half_sines(R_A @ rotated(self.rotations[way], along), R).max(axis=1)
         bound = by_position + between * spin_bound(hand, angle * hurry, angle * rate) + angle * beyond / 2
         return error_of(
             samples,
@@ -137,6 +134,16 @@ class StraightPath:
             orientation=np.maximum(orientation, bound),
             backward=_backward(along * self._length, between * hand.pull),
         )
+
+    @property
+    def _segments(self) -> Array:
+        """Return the segments as ``_seen`` takes them, (k, 20)."""
+        angles = np.linalg.norm(self.rotations, axis=-1, keepdims=True)
+        squares = np.einsum("ki,ki->k", self.shifts, self.shifts)[:, None]
+        axes = self.rotations / np.where(angles > 0, angles, 1.0)
+        R = self.poses[:-1, :3, :3].reshape(-1, 9)
+        parts = [self.poses[:-1, :3, 3], R, self.shifts, np.where(squares > 0, squares, 1.0), axes, angles]
+        return np.concatenate(parts, axis=1)
 
     @property
     def _length(self) -> float:
@@ -161,6 +168,53 @@ class StraightPath:
         )
         bend = second + third * h / 2
         return way, first + bend * h / 2, bend
+
+
+def _seen(X: list[Scalar], segment: list[Scalar]) -> list[list[Scalar]]:
+    """Return how far one pose of the tool is from a straight segment.
+
+    Args:
+        X: (16,) the pose.
+        segment: (21,) its start, the orientation there, the way to its end, the square of the length of that, axis and
+            angle of the rotation on it, and at which fraction of it the tool should be.
+
+    Returns:
+        The distance, the fraction nearest to the tool, and the sines of half the angles from the orientations that
+        belong to the planned fraction and to the nearest one.
+    """
+    start, R_A, shift, square, axis, angle = (
+        segment[:3],
+        segment[3:12],
+        segment[12:15],
+        segment[15],
+        segment[16:19],
+        segment[19],
+    )
+    come = [X[4 * i + 3] - start[i] for i in range(3)]
+    along = dot(come, shift) / square
+    inside = smaller(larger(along, 0.0), 1.0)
+    away = [come[i] - inside * shift[i] for i in range(3)]
+    # The orientation of the tool in the axes at the start.
+    Q = [[R_A[i] * X[j] + R_A[3 + i] * X[4 + j] + R_A[6 + i] * X[8 + j] for j in range(3)] for i in range(3)]
+    halves = [_half_sine(axis, angle * fraction, Q) for fraction in (segment[20], along)]
+    return [[sqrt(dot(away, away)), along, *halves]]
+
+
+def _half_sine(axis: list[Scalar], angle: Scalar, Q: list[list[Scalar]]) -> Scalar:
+    """Return sin(angle / 2) of the rotation from that about an axis to another (3, 3), small ones to all digits."""
+    x, y, z = axis
+    sine, half = sin(angle), sin(angle / 2)
+    versed = 2 * half * half
+    xy, xz, yz = versed * x * y, versed * x * z, versed * y * z
+    R = [
+        [1 - versed * (y * y + z * z), xy - sine * z, xz + sine * y],
+        [xy + sine * z, 1 - versed * (x * x + z * z), yz - sine * x],
+        [xz - sine * y, yz + sine * x, 1 - versed * (x * x + y * y)],
+    ]
+    D = [[R[0][i] * Q[0][j] + R[1][i] * Q[1][j] + R[2][i] * Q[2][j] for j in range(3)] for i in range(3)]
+    w = sqrt(larger(1 + D[0][0] + D[1][1] + D[2][2], 1e-12)) / 2
+    v = [D[2][1] - D[1][2], D[0][2] - D[2][0], D[1][0] - D[0][1]]
+    return sqrt(dot(v, v)) / (4 * w)
 
 
 def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:

@@ -19,6 +19,7 @@ from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
 from armwright.motion.joint_path import Grid, gridded, pieces_of, through_knots
 from armwright.motion.phase_plane import SolverName, fastest
 from armwright.motion.polynomials import composed
+from armwright.motion.rows import on_arrays
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.trajectory import Trajectory, hold, join
 
@@ -190,7 +191,8 @@ def _composed(grid: Grid, sd: Array) -> Trajectory:
     """Return q(s(t)) with s' as given at the ends of the intervals and s'' constant on each."""
     durations = 2 * grid.lengths / (sd[1:] + sd[:-1])
     inner = np.stack([np.zeros_like(durations), sd[:-1], np.diff(sd) / durations / 2], axis=1)
-    return Trajectory(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=composed(grid.local, inner))
+    terms = on_arrays(composed, [grid.local], [inner])[0]
+    return Trajectory(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=terms)
 
 
 def _bindings(solver: Solver, run: Trajectory, *, efforts: bool) -> tuple[Binding, ...]:

@@ -19,13 +19,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
 from armwright.motion.forward_backward import Bounds, largest_squares
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import composed, derivative, evaluate, shifted
+from armwright.motion.polynomials import composed, derivative, evaluate, rate_peaks, shifted
+from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
+from armwright.tracing.scalar import Scalar, larger
 
 # From rest to the full speed of the path takes no less than this where a joint has no limit of acceleration [s].
 _RAMP = 0.05
@@ -39,7 +40,7 @@ _ROUNDS = 4
 # more, the fewer knots there are, so that there are some so many in all.
 _FINER, _ENOUGH = 4, 400
 # Parts of an interval where its bounds are kept, and parts of a piece where the limits are sampled.
-_PARTS, _SEEN = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
+_PARTS, _SEEN = np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 # Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed,
 # to this part of the piece.
 _SAME, _HALVINGS, _CONVERGED = 1e-10, 60, 1e-12
@@ -82,7 +83,7 @@ class _Grid(NamedTuple):
     """A path cut into intervals.
 
     Attributes:
-        arm: the arm.
+        solver: the arm.
         path: of its joints, a cubic on each of m intervals.
         caps: (m,) the largest s' on each.
         bounds: on each.
@@ -90,7 +91,7 @@ class _Grid(NamedTuple):
         shortest: the time of that run [s].
     """
 
-    arm: Arm
+    solver: Solver
     path: Trajectory
     caps: Array
     bounds: Bounds
@@ -126,10 +127,10 @@ class _Run(NamedTuple):
     law: Array
     uses: Array
 
-    @property
-    def trajectory(self) -> Trajectory:
-        """Of the joints."""
-        return Trajectory(times=self.times, coefficients=composed(self.path.coefficients[self.intervals], self.law))
+    def trajectory(self, solver: Solver) -> Trajectory:
+        """Return that of the joints."""
+        terms = solver.rows(composed, [self.path.coefficients[self.intervals]], [self.law])[0]
+        return Trajectory(times=self.times, coefficients=terms)
 
     @property
     def duration(self) -> float:
@@ -137,18 +138,18 @@ class _Run(NamedTuple):
         return float(self.times[-1]) * max(1.0, float(self.uses.max()))
 
 
-def timed(arm: Arm, path: Trajectory, caps: Array) -> TimedPath:
+def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
     """Return a run along a path, from rest to rest, inside the limits of speed and acceleration of the joints.
 
     Args:
-        arm: the arm, with n joints.
+        solver: the arm, with n joints.
         path: cubics with continuous second derivatives.
         caps: (m,) the largest s' on each of its m segments.
     """
-    grid = _gridded(arm, path, caps)
+    arm, grid = solver.arm, _gridded(solver, path, caps)
     run = _smooth(grid)
-    trajectory = run.trajectory
-    speed, acceleration = trajectory.peaks(1), trajectory.peaks(2)
+    trajectory = run.trajectory(solver)
+    speed, acceleration = rate_peaks(trajectory.coefficients, np.diff(trajectory.times), solver.rows)
     over = max(
         float((speed / arm.limits.speed).max()),
         math.sqrt(float((acceleration / arm.limits.acceleration).max())),
@@ -169,35 +170,43 @@ def _allowed(shortest: float) -> float:
     return shortest + min(_COST * shortest, _MAX_LENGTH)
 
 
-def _gridded(arm: Arm, path: Trajectory, caps: Array) -> _Grid:
+def _gridded(solver: Solver, path: Trajectory, caps: Array) -> _Grid:
     """Return a path with every segment cut into equal parts."""
     finer = min(max(math.ceil(_ENOUGH / len(caps)), 1), _FINER)
     starts = (np.diff(path.times)[:, None] * (np.arange(finer) / finer)).ravel()
-    coefficients = shifted(np.repeat(path.coefficients, finer, axis=0), starts)
+    coefficients = shifted(np.repeat(path.coefficients, finer, axis=0), starts, solver.rows)
     times = np.append(np.repeat(path.times[:-1], finer) + starts, path.times[-1])
     fine, caps = Trajectory(times=times, coefficients=coefficients), np.repeat(caps, finer)
-    bounds, lengths = _bounds(arm, fine, caps), np.diff(times)
+    bounds, lengths = _bounds(solver, fine, caps), np.diff(times)
     squares = largest_squares(bounds, lengths, (False, False))
-    return _Grid(arm, fine, caps, bounds, squares, float(_steps(lengths, np.sqrt(squares)).sum()))
+    return _Grid(solver, fine, caps, bounds, squares, float(_steps(lengths, np.sqrt(squares)).sum()))
 
 
-def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
+def _bounds(solver: Solver, path: Trajectory, caps: Array) -> Bounds:
     """Return bounds on x = s'² at the start of every segment, and on u = s'', that hold all along it."""
-    lengths, terms = np.diff(path.times), path.coefficients
-    speed, acceleration = arm.limits.speed, arm.limits.acceleration
-    ramp = 0.0 if np.isfinite(acceleration).all() else _RAMP
-    a, b = [np.full((len(lengths), 1), ramp)], [np.zeros((len(lengths), 1))]
-    rates, bends = derivative(terms, 1), derivative(terms, 2)
-    for part in _PARTS:
-        length = (part * lengths)[:, None]
-        rate, bend = evaluate(rates, length), evaluate(bends, length)
-        # At this part of the segment x has grown by 2 u times the path.
-        of_x = [1 / caps[:, None] ** 2, (rate / speed) ** 2, bend / acceleration]
-        b += of_x
-        a += [each * 2 * length for each in of_x]
-        a[-1] += rate / acceleration
-    on_u, on_x = np.concatenate(a, axis=1), np.concatenate(b, axis=1)
+    lengths, limits = np.diff(path.times), solver.arm.limits
+    count, _, joints = path.coefficients.shape
+    slopes = solver.rows(_slopes, [path.coefficients], [lengths[:, None]])[0]
+    rates, bends = slopes[:, : len(_PARTS)], slopes[:, len(_PARTS) :]
+    ramp = 0.0 if np.isfinite(limits.acceleration).all() else _RAMP
+    squares, bends = (rates / limits.speed) ** 2, bends / limits.acceleration
+    # At a part of the segment x has grown by 2 u times the path.
+    grown = 2 * lengths[:, None] * _PARTS
+    on_x = np.zeros((count, 1 + len(_PARTS), 1 + 2 * joints))
+    on_x[:, 1:, 0], on_x[:, 1:, 1 : 1 + joints], on_x[:, 1:, 1 + joints :] = 1 / caps[:, None] ** 2, squares, bends
+    on_u = np.zeros_like(on_x)
+    on_u[:, 0, 0] = ramp
+    on_u[:, 1:] = on_x[:, 1:] * grown[..., None]
+    on_u[:, 1:, 1 + joints :] += rates / limits.acceleration
+    on_u, on_x = on_u.reshape(count, -1), on_x.reshape(count, -1)
     return Bounds(on_u, on_x, np.zeros_like(on_u))
+
+
+def _slopes(cubic: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
+    """Return the slopes of a cubic, and its second derivatives, at parts of its length."""
+    _, c1, c2, c3 = cubic
+    at = [part * length[0] for part in _PARTS.tolist()]
+    return [[*((3 * c3 * s + 2 * c2) * s + c1 for s in at), *(6 * c3 * s + 2 * c2 for s in at)]]
 
 
 def _smooth(grid: _Grid) -> _Run:
@@ -218,7 +227,7 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
     bounds, lengths = grid.bounds, grid.lengths
     tighter, runs, x = np.ones((len(lengths), 1)), [], grid.squares
     for _ in range(_ROUNDS):
-        runs.append(_checked(grid, *_averaged(lengths, np.sqrt(x), window)))
+        runs.append(_checked(grid, *_averaged(grid.solver, lengths, np.sqrt(x), window)))
         if runs[-1].duration <= (1 + _HAIR) * grid.allowed:
             break
         worst = np.ones(len(lengths))
@@ -233,10 +242,11 @@ def _steps(lengths: Array, speeds: Array) -> Array:
     return 2 * lengths / (speeds[1:] + speeds[:-1])
 
 
-def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Array]:
+def _averaged(solver: Solver, lengths: Array, speeds: Array, window: float) -> tuple[Array, Array]:
     """Return s(t) averaged over a moving window of time: its breaks (k + 1,) and cubics (k, 4).
 
     Args:
+        solver: of the arm, to evaluate equations.
         lengths: (m,) of the intervals in s.
         speeds: (m + 1,) s' at their ends; s'' is constant on each.
         window: [s].
@@ -256,7 +266,7 @@ def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Arra
 
     def around(length: Array, within: Array) -> Array:
         piece = segments_at(begins, within, len(integral))
-        return shifted(integral[piece][..., None], length - begins[piece])[..., 0]
+        return shifted(integral[piece][..., None], length - begins[piece], solver.rows)[..., 0]
 
     ahead, behind = around(breaks[:-1], middles), around(breaks[:-1] - window, middles - window)
     return breaks, (ahead - behind) / window
@@ -264,30 +274,43 @@ def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Arra
 
 def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
     """Return q(s(t)), cut where s(t) passes a knot of the path, and what it uses of the limits."""
-    arm, path, caps = grid.arm, grid.path, grid.caps
+    limits, path, caps = grid.solver.arm.limits, grid.path, grid.caps
     knots = path.times[1:-1]
     begins = np.maximum.accumulate(law[:, 0])
     piece = segments_at(begins, knots, len(law))
     times = _apart(np.concatenate([breaks, breaks[piece] + _when(law[piece], np.diff(breaks)[piece], knots)]))
     middles = (times[1:] + times[:-1]) / 2
     piece = segments_at(breaks, middles, len(law))
-    inner = shifted(law[piece][..., None], times[:-1] - breaks[piece])
+    inner = shifted(law[piece][..., None], times[:-1] - breaks[piece], grid.solver.rows)
     there = evaluate(inner, (middles - times[:-1])[:, None])[:, 0]
     interval = segments_at(path.times, there, len(caps))
     inner[:, 0, 0] -= path.times[interval]
-    outer, steps = path.coefficients[interval], np.diff(times)
-    rates, bends = derivative(inner, 1), derivative(inner, 2)
-    slopes, curves = derivative(outer, 1), derivative(outer, 2)
-    along, speed, acceleration = np.zeros((len(steps), 1)), *np.zeros((2, len(steps), arm.n))
-    for part in _SEEN:
-        length = (part * steps)[:, None]
-        s, sd, sdd = evaluate(inner, length), evaluate(rates, length), evaluate(bends, length)
-        slope = evaluate(slopes, s)
-        np.maximum(along, sd, out=along)
-        np.maximum(speed, np.abs(slope * sd), out=speed)
-        np.maximum(acceleration, np.abs(evaluate(curves, s) * sd**2 + slope * sdd), out=acceleration)
-    uses = [along / caps[interval][:, None], speed / arm.limits.speed, np.sqrt(acceleration / arm.limits.acceleration)]
-    return _Run(path, times, interval, inner[..., 0], np.concatenate(uses, axis=1))
+    # Where the run is at the samples of each piece, how fast along the path, and with which acceleration.
+    steps = np.diff(times)
+    at = [evaluate(derivative(inner, order), steps[:, None] * _SEEN) for order in range(3)]
+    along = np.maximum(at[1].max(axis=1, keepdims=True), 0.0)
+    used = grid.solver.rows(_used, [path.coefficients[interval]], [np.concatenate(at, axis=1)])[0]
+    speed, acceleration = used[:, 0] / limits.speed, np.sqrt(used[:, 1] / limits.acceleration)
+    uses = np.concatenate([along / caps[interval][:, None], speed, acceleration], axis=1)
+    return _Run(path, times, interval, inner[..., 0], uses)
+
+
+def _used(cubic: list[Scalar], run: list[Scalar]) -> list[list[Scalar]]:
+    """Return the largest speed and the largest acceleration of a joint at samples of a run along a cubic q(s).
+
+    Args:
+        cubic: (4,) its coefficients.
+        run: (3 k,) s at k samples, s' at them, and s''.
+    """
+    _, c1, c2, c3 = cubic
+    speed: Scalar = 0.0
+    acceleration: Scalar = 0.0
+    count = len(run) // 3
+    for x, rate, bend in zip(run[:count], run[count : 2 * count], run[2 * count :], strict=True):
+        slope, curve = (3 * c3 * x + 2 * c2) * x + c1, 6 * c3 * x + 2 * c2
+        speed = larger(abs(slope * rate), speed)
+        acceleration = larger(abs(curve * rate * rate + slope * bend), acceleration)
+    return [[speed, acceleration]]
 
 
 def _when(law: Array, steps: Array, knots: Array) -> Array:

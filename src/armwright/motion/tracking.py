@@ -39,7 +39,7 @@ from armwright.motion.obstruction import (
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline_path import smooth_weight, xspline
+from armwright.motion.xspline_path import smooth_xspline, xspline
 
 # Rounds of putting knots where they are missing, and how much closer they are put than the error asks for; into how
 # many parts an interval is divided at most.
@@ -211,14 +211,14 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
             return obstruction
         trajectory = _spline(task, knots, q)
         h = np.diff(knots)
-        speed, acceleration = cubic_peaks(trajectory.coefficients, h)
+        speed, acceleration = cubic_peaks(trajectory.coefficients, h, task.solver.rows)
         hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
         error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)
         tracking = Tracking(trajectory, error, speed)
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
             # Between two knots that keep a limit the spline may pass it where a joint reverses.
-            first, second = turning_positions(trajectory.coefficients, h)
+            first, second = turning_positions(trajectory.coefficients, h, task.solver.rows)
             return beyond_limits(arm, first, knots) or beyond_limits(arm, second, knots) or tracking
         if task.report_spline:
             return tracking
@@ -239,7 +239,7 @@ def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
     """Return the spline through configurations (k, n) at knots (k,)."""
     still = np.zeros(q.shape[1])
     rates = (still, still) if task.rest else (_rate(knots, q), _rate(knots[::-1], q[::-1]))
-    return xspline(knots, q, *rates, b=None if task.report_spline else smooth_weight(knots))
+    return (xspline if task.report_spline else smooth_xspline)(knots, q, *rates)
 
 
 def _rate(t: Array, q: Array) -> Array:

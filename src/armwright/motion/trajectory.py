@@ -12,8 +12,10 @@ import numpy as np
 from armwright.arrays import Array, ArrayLike, floats, integer, not_negative, positive, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import joint_vector, segments_at
-from armwright.motion.polynomials import derivative, extremes, peaks, shifted
+from armwright.motion.polynomials import derivative, extremes, peaks, shifted, slope
+from armwright.motion.rows import Evaluator
 from armwright.notebook import html_table
+from armwright.tracing.scalar import Scalar
 
 # Nobody reads more samples than this; a shorter period is a slip of the unit.
 _MAX_SAMPLES = 100_000_000
@@ -25,7 +27,7 @@ def _times(value: ArrayLike) -> Array:
     times = floats(value, "times")
     if times.ndim != 1 or len(times) < 2:
         raise ShapeError(f"times: expected at least two, got shape {times.shape}")
-    if times[0] != 0 or (np.diff(times) < 0).any():
+    if times[0] != 0 or (times[1:] < times[:-1]).any():
         raise InvalidValueError(f"times: expected non-decreasing times that begin at 0, got {times.tolist()}")
     times.setflags(write=False)
     return times
@@ -225,6 +227,26 @@ class Trajectory:
         values = (self(0.0), self(self.duration), *self.extremes(), self.peaks(1), self.peaks(2))
         rows = [(str(number), *row) for number, row in enumerate(np.stack(values, axis=-1).tolist(), 1)]
         return html_table(f"{self.duration:.6g} s in {len(self.coefficients)} segments (SI units)", columns, rows)
+
+
+def states(trajectory: Trajectory, t: Array, rows: Evaluator) -> tuple[Array, Array, Array]:
+    """Return positions, speeds and accelerations (k, n) of a trajectory at times (k,) from its start to its end."""
+    segment = segments_at(trajectory.times, t, len(trajectory.coefficients))
+    local = t - trajectory.times[segment]
+    found = rows(_state, [trajectory.coefficients[segment]], [local[:, None]])[0]
+    return found[:, 0], found[:, 1], found[:, 2]
+
+
+def _state(terms: list[Scalar], local: list[Scalar]) -> list[list[Scalar]]:
+    """Return the value of a polynomial, and of its first two derivatives."""
+    found = []
+    for _ in range(3):
+        value = terms[-1]
+        for term in terms[-2::-1]:
+            value = value * local[0] + term
+        found.append(value)
+        terms = slope(terms)
+    return [found]
 
 
 def hold(q: ArrayLike, duration: float) -> Trajectory:

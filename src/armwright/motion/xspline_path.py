@@ -105,9 +105,16 @@ def xspline(
     t, q = timed_points("X-spline", times, knots, "knots")
     joints = q.shape[1]
     ends = rate_or_rest(start, joints, "start"), rate_or_rest(end, joints, "end")
-    h = np.diff(t)
-    m = _rates(h, q, ends, *_parameters(h, a, b))
-    return Trajectory(times=t, coefficients=np.stack(hermite(q[:-1], m[:-1], q[1:], m[1:], h[:, None]), axis=1))
+    return _through(t, q, ends, *_parameters(np.diff(t), a, b))
+
+
+def smooth_xspline(times: Array, knots: Array, start: Array, end: Array) -> Trajectory:
+    """Return the X-spline of ``smooth_weight`` through knots (k, n) at times (k,), with rates (n,) at its ends.
+
+    Its |a| + |b| is 1/2 at every knot; nothing is checked.
+    """
+    h, b = np.diff(times), smooth_weight(times)
+    return _through(times, knots, (start, end), usual_weight((h[:-1], h[1:]), b), b)
 
 
 def xspline_along(
@@ -175,6 +182,13 @@ def _parameters(h: Array, a: ArrayLike | None, b: ArrayLike | None) -> tuple[Arr
             f"{i + 1} (a = {weight_a[i]:g}, b = {weight_b[i]:g})"
         )
     return np.asarray(weight_a), weight_b
+
+
+def _through(t: Array, q: Array, ends: tuple[Array, Array], a: Array, b: Array) -> Trajectory:
+    """Return the spline through knots q (k, n) at times t (k,)."""
+    h = np.diff(t)
+    m = _rates(h, q, ends, a, b)
+    return Trajectory(times=t, coefficients=np.stack(hermite(q[:-1], m[:-1], q[1:], m[1:], h[:, None]), axis=1))
 
 
 def _rates(h: Array, q: Array, ends: tuple[Array, Array], a: Array, b: Array) -> Array:

@@ -54,6 +54,16 @@ def select(condition: Any, then: Scalar, otherwise: Scalar) -> Scalar:
     return then if condition else otherwise
 
 
+def larger(x: Scalar, y: Scalar) -> Scalar:
+    """Return the larger one of two scalars."""
+    return select(x < y, y, x)
+
+
+def smaller(x: Scalar, y: Scalar) -> Scalar:
+    """Return the smaller one of two scalars."""
+    return select(y < x, y, x)
+
+
 def reciprocal(x: Scalar) -> Scalar:
     """Return 1 / ``x``, and infinity for a float 0 as for one in an array."""
     return math.inf if isinstance(x, float) and x == 0 else 1.0 / x
