@@ -43,22 +43,22 @@ def per_call(*works: Callable[[], object], calls: int = 5000, repeats: int = REP
     return [taken / calls for taken in in_turn(*map(many, works), repeats=repeats)]
 
 
+_HOST: dict[str, Any] = {}
+
+
 def compiled_for(arm: Any, lanes: int) -> Any:
-    """Return an arm compiled for vectors of 8 numbers (AVX-512) or of 4, as for a processor with AVX2 and FMA alone."""
-    from armwright.compiled.arm import CompiledArm
-    from armwright.tracing import kernel, native
-    from armwright.tracing.emit_llvm import Target
+    """Return an arm compiled for vectors of 8 numbers (AVX-512) or of 4, as for a processor with AVX2 and FMA alone.
 
-    host = native.processor()
-    if lanes < host.target.lanes:
-        host = native.Processor("haswell", "", Target(lanes, has_fma=True))
-    native.processor = kernel.processor = lambda: host
+    What is called for the first time before the next call of this function is compiled for that processor.
+    """
+    from armwright.compiled.arm import CompiledArm  # noqa: PLC0415 - behind the setting of the threads
+    from armwright.tracing import kernel, native  # noqa: PLC0415
+    from armwright.tracing.emit_llvm import Target  # noqa: PLC0415
+
+    host = _HOST.setdefault("it", native.processor())
+    made_for = host if lanes >= host.target.lanes else native.Processor("haswell", "", Target(lanes, has_fma=True))
+    native.processor = kernel.processor = lambda: made_for
     return CompiledArm(arm=arm)
-
-
-def call_cost(function: Callable[..., object], *arguments: object, calls: int = 20_000) -> float:
-    """Return what a call from Python costs that does nothing [s], such as of a getter of the same binding."""
-    return per_call(lambda: function(*arguments), calls=calls)[0]
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

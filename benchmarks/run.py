@@ -15,9 +15,11 @@ from measure import REPEATS, processor
 HERE = Path(__file__).parent
 ALL = (
     "dynamics",
+    "derivatives",
     "kinematics",
     "inverse_kinematics",
     "one_call",
+    "c_text",
     "scaling",
     "latency",
     "simulation",
@@ -33,6 +35,7 @@ PEERS = (
     "pin",
     "roboticstoolbox-python",
     "eaik",
+    "casadi",
     "ruckig",
     "toppra",
     "lark",

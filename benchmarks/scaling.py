@@ -1,6 +1,6 @@
 """How the time grows with the number of configurations and of joints, and what memory it takes (Linux)."""
 
-from measure import REPEATS, in_turn, microseconds, per_call, progress, section, table  # isort: skip - sets the threads first
+from measure import REPEATS, compiled_for, in_turn, microseconds, per_call, progress, section, table  # isort: skip - sets the threads first
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ from oracles.with_pinocchio import pinocchio_model
 
 SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 JOINTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 50)
-ROWS = 20_000
+ROWS = 8_000
 
 
 def by_rows() -> list[list[str]]:
@@ -45,33 +45,33 @@ def by_rows() -> list[list[str]]:
 
 
 def by_joints() -> list[list[str]]:
-    """Return the time of inverse dynamics for arms of 2 to 50 joints, and what the first call costs."""
+    """Return the time of inverse and forward dynamics for arms of 2 to 50 joints, and what the first call costs."""
+    works = {"inverse_dynamics": pin.rneaInParallel, "forward_dynamics": pin.abaInParallel}
     rows = []
-    rng = np.random.default_rng(1)
-    for joints in JOINTS:
-        progress(f"{joints} joints")
-        arm = random_arm(rng, joints)
-        with tempfile.TemporaryDirectory() as cache:
-            os.environ["ARMWRIGHT_CACHE"] = cache
-            start = time.perf_counter()
-            compiled = compile_arm(arm)
-            fast = compiled.inverse_dynamics
-            q, qd, qdd = rng.uniform(-3, 3, size=(3, ROWS, joints))
-            fast(q[:2], qd[:2], qdd[:2])
-            first = time.perf_counter() - start
-        model, _, _ = pinocchio_model(arm)
-        pool = pin.ModelPool(model)
-        columns, out = np.empty((joints, ROWS), order="F"), np.empty((ROWS, joints))
-        peer, own = in_turn(
-            lambda: pin.rneaInParallel(1, pool, q.T, qd.T, qdd.T, columns), lambda: fast(q, qd, qdd, out=out)
-        )
-        operations = sum(compiled.kernel("inverse_dynamics").emitted.operations.values())
-        rows.append(
-            [
-                f"{joints}", f"{operations}", microseconds(peer / ROWS), microseconds(own / ROWS),
-                f"{peer / own:.1f}", f"{first:.1f}",
-            ]
-        )  # fmt: skip
+    for name, theirs in works.items():
+        rng = np.random.default_rng(1)
+        for joints in JOINTS:
+            progress(f"{name} of {joints} joints")
+            arm = random_arm(rng, joints)
+            q, qd, x = rng.uniform(-3, 3, size=(3, ROWS, joints))
+            with tempfile.TemporaryDirectory() as cache:
+                os.environ["ARMWRIGHT_CACHE"] = cache
+                start = time.process_time()
+                fast = getattr(compiled_for(arm, 8), name)
+                fast(q[:2], qd[:2], x[:2])
+                first = time.process_time() - start
+            model, _, _ = pinocchio_model(arm)
+            pool = pin.ModelPool(model)
+            columns, out = np.empty((joints, ROWS), order="F"), np.empty((ROWS, joints))
+            narrow = getattr(compiled_for(arm, 4), name)
+            peer, own, of_four = in_turn(
+                lambda pool=pool, a=(q.T, qd.T, x.T), c=columns, theirs=theirs: theirs(1, pool, *a, c),
+                lambda a=(q, qd, x), out=out, fast=fast: fast(*a, out=out, threads=1),
+                lambda a=(q, qd, x), out=out, narrow=narrow: narrow(*a, out=out, threads=1),
+            )
+            times = map(microseconds, (peer / ROWS, own / ROWS))
+            ratios = (f"{peer / own:.1f}", f"{peer / of_four:.1f}")
+            rows.append([f"`{name}`", f"{joints}", *times, *ratios, f"{first:.2f}"])
     return rows
 
 
@@ -116,12 +116,19 @@ if __name__ == "__main__":
     )
     section(
         "Growth with the number of joints",
-        f"Inverse dynamics of random arms with nothing at a right angle, {ROWS} rows, with `out=`; the first call "
-        "with an empty cache. From 8 joints on the code of a kernel, which is one straight line, outgrows the 32 KiB "
-        "of a first-level instruction cache (23 KiB for 6 joints, 34 for 8, 44 for 12), and fetching it takes longer "
-        "than running it.",
+        f"Random arms with nothing at a right angle, {ROWS} rows, with `out=`; the first call with an empty cache. The "
+        "code of long arms is a loop over the links: inverse dynamics from some 11 joints on, forward dynamics from "
+        "some 19.",
         table(
-            ["joints", "operations", "Pinocchio, µs per row", "armwright, µs per row", "ratio", "first call, s"],
+            [
+                "work",
+                "joints",
+                "Pinocchio, µs per row",
+                "armwright, µs per row",
+                "ratio",
+                "lanes of 4",
+                "first call, s",
+            ],
             by_joints(),
         ),
     )
