@@ -22,7 +22,8 @@ def _of_row(x: list[Scalar], y: list[Scalar]) -> list[list[Scalar]]:
 @pytest.fixture(params=[on_arrays, by_kernels])
 def evaluate(request: pytest.FixtureRequest) -> Evaluator:
     """Both ways to evaluate an equation."""
-    return request.param
+    way: Evaluator = request.param
+    return way
 
 
 def test_rows_of_joints(evaluate: Evaluator, rng: np.random.Generator) -> None:
@@ -60,7 +61,8 @@ def test_peaks_against_a_dense_grid(evaluate: Evaluator, rng: np.random.Generato
 def _magnitudes(terms: Array, length: float, order: int) -> Array:
     """Return the largest magnitudes of polynomials (k, n) at many samples, (n,)."""
     t = np.linspace(0.0, length, 4001)
-    return np.abs([np.polynomial.Polynomial(joint).deriv(order)(t) for joint in terms.T]).max(axis=1)
+    values = [np.polynomial.Polynomial(joint).deriv(order)(t) for joint in terms.T]
+    return np.asarray(np.abs(values).max(axis=1))
 
 
 def test_shifted_polynomials(evaluate: Evaluator, rng: np.random.Generator) -> None:

@@ -209,8 +209,8 @@ def compared(fast: CompiledArm, rng: np.random.Generator) -> str:
     for limit, peaks in mine.peaks.items():
         np.testing.assert_allclose(peaks, same.peaks[limit], rtol=SAME_RUN, atol=SAME_RUN)
     t = np.linspace(0.0, 1.0, 50)
-    configurations = [each.trajectory(t * each.trajectory.duration) for each in (one, two)]
-    np.testing.assert_allclose(*configurations, rtol=0, atol=SAME_RUN)
+    q_one, q_two = (each.trajectory(t * each.trajectory.duration) for each in (one, two))
+    np.testing.assert_allclose(q_one, q_two, rtol=0, atol=SAME_RUN)
     return "run"
 
 

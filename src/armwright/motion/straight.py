@@ -47,7 +47,7 @@ def straight_line(
     speed of the tool allow, and all of it slower where an effort would pass its limit.
 
     Args:
-        arm: an arm, or a compiled one, which plans some five times faster.
+        arm: an arm, or a compiled one, which plans some three times faster.
         q_start: (n,) present joint positions [rad] or [m].
         X_goal: (4, 4) pose at the end of the line.
         deviation: allowed distance of the tool from the line [m].
