@@ -14,7 +14,7 @@ from oracles.with_pinocchio import pinocchio_model, pushed, with_load, with_roto
 from samples import WHOLE
 
 # Largest deviation from Pinocchio, in parts of the largest number of the quantity.
-AGREEMENT = 1e-9
+AGREEMENT = 1e-11
 # Quantities smaller than this are compared as if they were this large: what is left where everything cancels is
 # rounding of terms a thousand times its size.
 _SMALL = 1e-3
