@@ -24,7 +24,7 @@ from armwright.tracing.emit import Emitted, emit
 from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
 from armwright.tracing.identifiers import identifier
 from armwright.tracing.scalar import atan2, round_half_even, sqrt
-from oracles.arms import random_arm
+from oracles.arms import of_all_kinds, random_arm
 from oracles.compilers import COMPILERS, SANITIZED, Compiled, build, compiled_for_device, sizes_on_cortex_m7
 from samples import Sample
 from test_data_is_no_code import HOSTILE, random_name
@@ -70,11 +70,10 @@ def inputs_of(arm: Arm, quantity: str, rows: int, rng: np.random.Generator) -> l
     return inputs
 
 
-def assert_same_bits(name: str, arm: Arm, folder: Path, rng: np.random.Generator) -> int:
-    """All quantities of an arm have the bits and the statuses of the processor's kernels; return how many rows."""
+def assert_same_bits(name: str, arm: Arm, names: list[str], folder: Path, rng: np.random.Generator) -> int:
+    """Quantities of an arm have the bits and the statuses of the processor's kernels; return how many rows."""
     compiler, language = LANGUAGES[name]
     compared = 0
-    names = quantities_of(arm)
     other = Compiled(arm, names, folder, compiler=compiler, language=language)
     for quantity in names:
         inputs, kernel = inputs_of(arm, quantity, 150, rng), compile_arm(arm).kernel(quantity)
@@ -98,8 +97,26 @@ def test_bits_of_the_processor(name: str, kind: str, tmp_path: Path, sample: Sam
     """Every quantity has the same bits and statuses in each language as in the kernel of this processor."""
     rng = np.random.default_rng(sample.seed)
     arm = load_arm(str(rng.choice(SIX_JOINTS))) if kind == "catalogue" else with_slides(rng)
-    rows = assert_same_bits(name, arm, tmp_path, rng)
+    rows = assert_same_bits(name, arm, quantities_of(arm), tmp_path, rng)
     sample.record(f"rows of all quantities with the processor's bits, {name}, {kind}", rows, 0)
+
+
+@pytest.mark.parametrize("name", [name for name in LANGUAGES if name != FOR_DEVICE])
+@pytest.mark.drawn(0.2)
+def test_loops_of_long_arms(name: str, tmp_path: Path, sample: Sample) -> None:
+    """Loops over the links of a long arm stay loops, with the bits of the processor, and no text gets much longer."""
+    rng = np.random.default_rng(sample.seed)
+    arm = of_all_kinds(random_arm(rng, 20), rng)
+    language = LANGUAGES[name][1]
+    names = ["inverse_dynamics", "inverse_dynamics_with_wrench", "forward_dynamics"]
+
+    rows = assert_same_bits(name, arm, names, tmp_path, rng)
+
+    half = attrs.evolve(arm, joints=arm.joints[:10], links=arm.links[:10], motors=arm.motors[:10])
+    texts = [source_text(one, names[:1], language) for one in (half, arm)]
+    assert all("for (int i = 0; i < " in text for text in texts)
+    assert len(texts[1]) < 1.7 * len(texts[0])
+    sample.record(f"rows of an arm of 20 joints with the processor's bits, {name}", rows, 0)
 
 
 @pytest.mark.parametrize("real", ["double", "float"])
@@ -344,7 +361,7 @@ def test_hostile_names(language: Language, sample: Sample) -> None:
     names = [*HOSTILE.values(), *(random_name(rng) for rng in sample.cases(3_400))]
     for name in names:
         hostile = attrs.evolve(arm, name=name, title=name, source=name)
-        (function,) = arm_functions(hostile, ["forward"])
+        (function,) = arm_functions(hostile, ["forward"], "c")
         prefix = function.name.removesuffix("_forward")
         text = source_text(hostile, ["forward"], language)
         assert re.fullmatch(r"[A-Za-z](?:_?[A-Za-z0-9])*", prefix)
@@ -359,6 +376,6 @@ def test_text_of_hostile_names_compiles(tmp_path: Path, sample: Sample) -> None:
     texts = {}
     for name in [*HOSTILE.values(), *(random_name(rng) for rng in sample.cases(1000))]:
         hostile = attrs.evolve(arm, name=name, title=name)
-        texts[arm_functions(hostile, ["forward"])[0].name] = source_text(hostile, ["forward"], "c")
+        texts[arm_functions(hostile, ["forward"], "c")[0].name] = source_text(hostile, ["forward"], "c")
     build("gcc", "\n".join(texts.values()), tmp_path / "all.o")
     sample.record("texts of hostile names compiled in one program", len(texts), 0)

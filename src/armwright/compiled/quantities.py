@@ -36,13 +36,13 @@ Inputs = Sequence[Traced]
 Rows = list[list[Scalar]]
 
 
-def emit_quantity(arm: Arm, name: str, *, loops: bool = True) -> Emitted:
+def emit_quantity(arm: Arm, name: str, *, loops: bool | None = None) -> Emitted:
     """Return the code of a quantity's kernel and its operation count.
 
     Args:
         arm: the arm.
         name: of a quantity of ``CompiledArm``.
-        loops: whether loops over the links of a long arm stay loops.
+        loops: whether loops over the links stay loops, where the equation has them; None for long code only.
 
     Raises:
         UnknownNameError: no such quantity.
@@ -55,6 +55,9 @@ def emit_quantity(arm: Arm, name: str, *, loops: bool = True) -> Emitted:
         weighed(arm)
     outputs = [tuple(_size(arm, x) for x in shape) for shape in quantity.outputs]
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
+    max_straight = quantity.max_straight
+    if loops is not None and max_straight is not None:
+        max_straight = 0 if loops else None
     bounds = dict.fromkeys(_POSITIONS, admitted(arm).tolist())
     equation: Equation = partial(quantity.equation, arm)
     return emit(
@@ -64,7 +67,7 @@ def emit_quantity(arm: Arm, name: str, *, loops: bool = True) -> Emitted:
         shapes=outputs,
         flags=quantity.flags,
         bounds=bounds,
-        max_straight=quantity.max_straight if loops else None,
+        max_straight=max_straight,
     )
 
 

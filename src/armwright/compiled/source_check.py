@@ -44,7 +44,7 @@ def check_text(arm: Arm, quantities: Sequence[str], language: Language, real: Re
     """
     if language not in {"c", "cpp"}:
         raise InvalidValueError(f"test: expected c or cpp as the language, got {language}")
-    functions = arm_functions(arm, quantities, real)
+    functions = arm_functions(arm, quantities, language, real)
     taken = [each.name for each in functions]
     checks = [identifier(f"check_{name}", taken) for name in taken]
     rng = np.random.default_rng(0)

@@ -22,6 +22,8 @@ Language: TypeAlias = Literal["c", "cpp", "cuda"]
 
 # What is small there is small for double: see ``kinematics.inverse_kinematics.branches.REACH_TOLERANCE``.
 _FOR_DOUBLE = frozenset({"inverse_branches"})
+# From so many joints on the loops over links stay loops in the text: a controller has little room for code.
+_LOOPS_FROM = 9
 _ASCII = str.maketrans({"²": "^2", "³": "^3", "·": "*", "…": "...", "–": "-", "°": " deg"})
 
 
@@ -41,7 +43,7 @@ def source_text(arm: Arm, quantities: Sequence[str], language: Language, real: R
         InvalidValueError: a quantity occurs twice, CUDA or ``inverse_branches`` is asked for in float, or a number of
             the arm is beyond the range of float.
     """
-    return text_of(arm_functions(arm, quantities, real), language, real)
+    return text_of(arm_functions(arm, quantities, language, real), language, real)
 
 
 def text_of(functions: Sequence[Function], language: Language, real: Real = "double") -> str:
@@ -55,12 +57,13 @@ def text_of(functions: Sequence[Function], language: Language, real: Real = "dou
     return cuda_source(functions)
 
 
-def arm_functions(arm: Arm, quantities: Sequence[str], real: Real = "double") -> list[Function]:
+def arm_functions(arm: Arm, quantities: Sequence[str], language: Language, real: Real = "double") -> list[Function]:
     """Return what becomes functions; all names in it are identifiers.
 
     Args:
         arm: the arm.
         quantities: names of functions of ``CompiledArm``.
+        language: of the text.
         real: the type of numbers that they are for.
 
     Raises:
@@ -76,11 +79,11 @@ def arm_functions(arm: Arm, quantities: Sequence[str], real: Real = "double") ->
                 f"real: expected double for {name}, got float, whose digits do not tell what is in reach"
             )
     prefix = identifier(arm.name, otherwise="arm")
-    return [_function(arm, name, f"{prefix}_{name}") for name in quantities]
+    return [_function(arm, name, f"{prefix}_{name}", language) for name in quantities]
 
 
-def _function(arm: Arm, quantity: str, name: str) -> Function:
-    emitted = emit_quantity(arm, quantity, loops=False)
+def _function(arm: Arm, quantity: str, name: str, language: Language) -> Function:
+    emitted = emit_quantity(arm, quantity, loops=language != "cuda" and arm.n >= _LOOPS_FROM)
     doc = getdoc(getattr(CompiledArm, quantity)) or ""
     arguments: list[Argument] = []
     names = [*emitted.inputs, *_output_names(doc, len(emitted.outputs))]

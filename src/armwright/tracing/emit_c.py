@@ -9,14 +9,14 @@ What it holds of the user's are numbers, and names as identifiers only.
 import hashlib
 import math
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from armwright.errors import InvalidValueError
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
-from armwright.tracing.graph import Graph, reachable, traced
+from armwright.tracing.graph import Graph, Loop, reachable, traced
 from armwright.tracing.machine import TRUTHS, MachineCode, machine_code
 from armwright.version import __version__
 
@@ -64,6 +64,8 @@ class _Dialect(NamedTuple):
         real: the type of numbers.
         truth: that of truth values.
         literal: writes a constant.
+        table: the type of tables of constants.
+        of_table: writes a constant in one.
         limit: writes a limit.
         calls: operations that are calls of a function.
     """
@@ -72,6 +74,8 @@ class _Dialect(NamedTuple):
     truth: str
     literal: Callable[[float], str]
     limit: Callable[[float], str]
+    table: str
+    of_table: Callable[[float], str]
     calls: Mapping[str, str]
 
 
@@ -156,25 +160,13 @@ def _function(function: Function, code: MachineCode, dialect: _Dialect, kind: st
 
 def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> list[str]:
     places = [f"{x.name}[{i}]" for x in function.inputs for i in range(x.width)]
-    names: dict[int, str] = {}
-    lines, read = [], set()
     # What makes a configuration valid comes first: at the end it would keep all inputs in registers until then.
     first = reachable(code.graph, [x for x in (code.invalid, code.unusual) if x is not None])
-    for i in [*first, *sorted(set(code.order).difference(first))]:
-        node = code.graph.nodes[i]
-        if node.op in ("constant", "limit"):
-            names[i] = (dialect.literal if node.op == "constant" else dialect.limit)(node.value)
-            continue
-        if node.op == "input":
-            expression = places[int(node.value)]
-            read.add(expression.partition("[")[0])
-        elif node.op == "bit":
-            place = int(code.graph.nodes[node.operands[1]].value)
-            expression = dialect.calls["bit"].format(names[node.operands[0]], place)
-        else:
-            expression = {**_OPERATORS, **dialect.calls}[node.op].format(*(names[j] for j in node.operands))
-        names[i] = f"v{i}"
-        lines.append(f"const {dialect.truth if node.op in TRUTHS else dialect.real} v{i} = {expression};")
+    order = [*first, *sorted(set(code.order).difference(first))]
+    names, lines = _Writer(dialect).operations(code.graph, order, places.__getitem__, "v")
+    read = {
+        places[int(code.graph.nodes[i].value)].partition("[")[0] for i in order if code.graph.nodes[i].op == "input"
+    }
     # Inputs on which nothing depends.
     lines[:0] = [f"(void){x.name};" for x in function.inputs if x.name not in read]
     targets = [(x, i) for x in function.outputs for i in range(x.width)]
@@ -188,17 +180,140 @@ def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> lis
     return [*lines, f"return {status};"]
 
 
+class _Writer:
+    """Writes the operations of graphs; the loops of a function are numbered."""
+
+    def __init__(self, dialect: _Dialect) -> None:
+        self._dialect, self._loops = dialect, 0
+
+    def operations(
+        self, graph: Graph, order: Sequence[int], read: Callable[[int], str], prefix: str
+    ) -> tuple[dict[int, str], list[str]]:
+        """Write operations.
+
+        Args:
+            graph: of the processor.
+            order: its nodes in use.
+            read: returns where an input is read, by its number.
+            prefix: of the names of the results.
+
+        Returns:
+            The names of the results by node, and the statements.
+        """
+        dialect, lines = self._dialect, list[str]()
+        names: dict[int, str] = {}
+        for i in order:
+            op, operands, value = graph.nodes[i]
+            if op in ("constant", "limit"):
+                names[i] = (dialect.literal if op == "constant" else dialect.limit)(value)
+            elif op == "loop":
+                names[i], of_loop = self._loop(graph.loops[int(value)], [names[j] for j in operands])
+                lines += of_loop
+            elif op in ("state", "each"):
+                links = len(graph.loops[int(graph.nodes[operands[0]].value)].kinds)
+                result, link = divmod(int(value), links)
+                place = f"_s[{int(value)}]" if op == "state" else f"_r{result}[{link}]"
+                names[i] = names[operands[0]] + place
+            else:
+                if op == "input":
+                    expression = read(int(value))
+                elif op == "bit":
+                    expression = dialect.calls["bit"].format(names[operands[0]], int(graph.nodes[operands[1]].value))
+                else:
+                    expression = {**_OPERATORS, **dialect.calls}[op].format(*(names[j] for j in operands))
+                names[i] = f"{prefix}{i}"
+                lines.append(f"const {dialect.truth if op in TRUTHS else dialect.real} {names[i]} = {expression};")
+        return names, lines
+
+    def _loop(self, loop: Loop, operands: Sequence[str]) -> tuple[str, list[str]]:
+        """Write a loop over links; return its name, of which its arrays are called, and its statements.
+
+        The state is left in ``NAME_s``, the results of the links in ``NAME_r0`` and so on.
+        """
+        name = f"loop{self._loops}"
+        self._loops += 1
+        real, table, n = self._dialect.real, self._dialect.table, len(loop.kinds)
+        state, values = operands[: loop.carried], operands[loop.carried :]
+        columns = [values[k : k + n] for k in range(0, len(values), n)]
+        # Results of a loop before this one lie in an array already.
+        arrays = [_as_array(column) or f"{name}_x{k}" for k, column in enumerate(columns)]
+        width = max(1, *map(len, loop.constants))
+        used: set[str] = set()
+
+        def read(k: int) -> str:
+            if k < loop.carried:
+                return f"{name}_s[{k}]"
+            k -= loop.carried
+            if k < len(columns):
+                used.add(arrays[k])
+                return f"{arrays[k]}[i]"
+            constant = f"{name}_c[i * {width} + {k - len(columns)}]"
+            return constant if table == real else f"{real}({constant})"
+
+        bodies = [self._step(loop, name, kind, read) for kind in range(len(loop.steps))]
+        lines = _array(f"{real} {name}_s[{loop.carried}]", state) if state else []
+        for array, column in zip(arrays, columns, strict=True):
+            if array in used and not _as_array(column):
+                lines += _array(f"const {real} {array}[{n}]", column)
+        if any(loop.constants):
+            rows = [x for row in loop.constants for x in (*row, *[0.0] * (width - len(row)))]
+            lines += _array(f"static const {table} {name}_c[{n * width}]", map(self._dialect.of_table, rows))
+        if len(bodies) > 1:
+            lines += _array(f"static const unsigned char {name}_kind[{n}]", map(str, loop.kinds))
+            bodies = [
+                [f"if ({name}_kind[i] == {kind}) {{", *(f"    {line}" for line in body), "}"]
+                for kind, body in enumerate(bodies)
+            ]
+        lines += [f"{real} {name}_r{k}[{n}];" for k in range(len(loop.steps[0].results) - loop.carried)]
+        lines += [f"for ({f'int i = {n}; i-- > 0;' if loop.reverse else f'int i = 0; i < {n}; i++'}) {{"]
+        return name, [*lines, *(f"    {line}" for body in bodies for line in body), "}"]
+
+    def _step(self, loop: Loop, name: str, kind: int, read: Callable[[int], str]) -> list[str]:
+        """Write what a loop does for a kind of link."""
+        graph, results = loop.steps[kind]
+        found, lines = self.operations(graph, reachable(graph, results), read, f"{name}_{kind}_")
+        for k, result in enumerate(results):
+            place = f"_s[{k}]" if k < loop.carried else f"_r{k - loop.carried}[i]"
+            lines.append(f"{name}{place} = {found[result]};")
+        return lines
+
+
+def _as_array(elements: Sequence[str]) -> str | None:
+    """Return the array whose elements these are, all of them in order; None if there is none."""
+    array = elements[0].partition("[")[0]
+    return array if list(elements) == [f"{array}[{i}]" for i in range(len(elements))] else None
+
+
+def _array(declaration: str, elements: Iterable[str]) -> list[str]:
+    """Return the definition of an array."""
+    return textwrap.wrap(f"{declaration} = {{{', '.join(elements)}}};", _LINE - 4, subsequent_indent="    ")
+
+
 def _comment_of(function: Function, code: MachineCode) -> str:
     total = sum(function.operations.values())
     counts = ", ".join(f"{number} {op}" for op, number in function.operations.items())
-    ops = [code.graph.nodes[i].op for i in code.order]
-    truths = sum(op in TRUTHS for op in ops)
-    numbers = sum(op not in {"constant", "limit"} for op in ops) - truths
+    numbers, truths = _stack(code.graph, code.order)
     text = (
         f"{total} operations ({counts}); {code.joined} additions are joined with a multiplication. On the stack are at "
         f"most {numbers} numbers and {truths} truth values; far fewer where the compiler optimises."
     )
     return _block([*function.description, *textwrap.wrap(text, _LINE - 4)])
+
+
+def _stack(graph: Graph, order: Sequence[int]) -> tuple[int, int]:
+    """Return how many numbers and truth values the operations of a graph leave, those of its loops with them."""
+    ops = [graph.nodes[i].op for i in order]
+    truths = sum(op in TRUTHS for op in ops)
+    numbers = sum(op not in {"constant", "limit", "loop", "state", "each"} for op in ops) - truths
+    for i in order:
+        op, operands, value = graph.nodes[i]
+        if op == "loop":
+            loop = graph.loops[int(value)]
+            numbers += len(operands) + len(loop.kinds) * (len(loop.steps[0].results) - loop.carried)
+            for step in loop.steps:
+                more = _stack(step.graph, reachable(step.graph, step.results))
+                numbers, truths = numbers + more[0], truths + more[1]
+    return numbers, truths
 
 
 # ---- the text around it ----
@@ -299,6 +414,8 @@ _DOUBLE = _Dialect(
     "int",
     _double,
     _double,
+    "double",
+    _double,
     {**_OF_MATH, "fma": "ARMWRIGHT_FMA({0}, {1}, {2})", "bit": "armwright_bit({0}, {1})"},
 )
 _FLOAT = _Dialect(
@@ -306,6 +423,8 @@ _FLOAT = _Dialect(
     "int",
     _float,
     lambda value: _float(min(value, _LIMIT_OF_FLOAT)),
+    "float",
+    _float,
     {
         "absolute": "fabsf({0})",
         "sqrt": "sqrtf({0})",
@@ -324,7 +443,9 @@ def _cpp(space: str) -> _Dialect:
     names = {"absolute": 1, "sqrt": 1, "fma": 3, "sin": 1, "cos": 1, "atan2": 2, "round": 1}
     operands = {op: ", ".join(f"{{{i}}}" for i in range(count)) for op, count in names.items()}
     calls = {op: f"{space}::{op}_of({operands[op]})" for op in names} | {"number": "Real({0} ? 1 : 0)"}
-    return _Dialect("Real", "bool", _real, lambda value: f"{space}::limit<Real>({value!r})", calls)
+    limit = f"{space}::limit<Real>({{!r}})".format
+    # Constants that the compiler knows: those of another type would be made when the function is first called.
+    return _Dialect("Real", "bool", _real, limit, "double", _double, calls)
 
 
 def _has_fma(letter: str, of_arm: int) -> str:
