@@ -5,6 +5,7 @@ from measure import microseconds, per_call, progress, section, table  # isort: s
 import ctypes
 import math
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +24,7 @@ CALLS = 200_000
 COMPILERS = {
     "gcc -O3": ["gcc", "-O3", "-march=native"],
     "gcc -O2": ["gcc", "-O2", "-march=native"],
-    "clang -O3": ["python", "-m", "ziglang", "cc", "-O3", "-march=native"],
+    "clang -O3": [sys.executable, "-m", "ziglang", "cc", "-O3", "-march=native"],
 }
 
 
