@@ -92,7 +92,7 @@ def assert_same_bits(name: str, arm: Arm, names: list[str], folder: Path, rng: n
 
 @pytest.mark.parametrize("kind", ["catalogue", "random"])
 @pytest.mark.parametrize("name", LANGUAGES)
-@pytest.mark.drawn(0.2)
+@pytest.mark.drawn(0.09)
 def test_bits_of_the_processor(name: str, kind: str, tmp_path: Path, sample: Sample) -> None:
     """Every quantity has the same bits and statuses in each language as in the kernel of this processor."""
     rng = np.random.default_rng(sample.seed)
@@ -121,7 +121,7 @@ def test_loops_of_long_arms(name: str, tmp_path: Path, sample: Sample) -> None:
 
 @pytest.mark.parametrize("real", ["double", "float"])
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.drawn(0.25)
+@pytest.mark.drawn(0.13)
 def test_test_programs(compiler: str, real: Real, tmp_path: Path, rng: np.random.Generator) -> None:
     """The program that comes with the text finds it right, without undefined behaviour on its way."""
     arm = load_arm(str(rng.choice(SIX_JOINTS))) if rng.random() < 0.5 else with_slides(rng)
