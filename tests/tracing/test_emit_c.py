@@ -29,6 +29,8 @@ from oracles.compilers import COMPILERS, SANITIZED, Compiled, build, compiled_fo
 from samples import Sample
 from test_data_is_no_code import HOSTILE, random_name
 
+pytestmark = pytest.mark.early
+
 FOR_DEVICE = "cuda as c++"
 LANGUAGES: dict[str, tuple[str, Language]] = {
     "gcc": ("gcc", "c"),
