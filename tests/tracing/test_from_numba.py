@@ -1,6 +1,5 @@
 """Kernels called from loops that Numba compiles: only arrays that they can take, and no address kept on disk."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,7 @@ from armwright.tracing.emit import emit
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
 from armwright.tracing.kernel import Kernel
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Compile into a folder of the module's own; the modules behind it use the user's again."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("ARMWRIGHT_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 @pytest.fixture(scope="module")

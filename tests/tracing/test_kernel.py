@@ -5,7 +5,6 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -21,13 +20,7 @@ from armwright.tracing.kernel import LANES, CalledOff, Kernel, on_cores_for_long
 from armwright.tracing.scalar import Scalar, atan2, cos, sin
 from oracles.arms import random_arm, random_configurations
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Compile into a folder of the module's own; the modules behind it use the user's again."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("ARMWRIGHT_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 @pytest.fixture(scope="module")

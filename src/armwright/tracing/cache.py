@@ -19,6 +19,7 @@ import numpy as np
 
 from armwright.errors import shown
 from armwright.files.store import user_store
+from armwright.tracing.native import processor
 from armwright.version import __version__
 
 _LOADED: dict[str, Callable[..., Any]] = {}
@@ -113,9 +114,8 @@ def _module_name(key: str) -> str:
 
 def _key(source: str) -> str:
     """Name a source by itself, the versions that compile it, and the processor it is compiled for."""
-    import llvmlite.binding as llvm  # noqa: PLC0415 - costs a twentieth of a second, and only compiled code needs it
     import numba  # noqa: PLC0415
 
-    processor = [llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
-    parts: list[Any] = [source, __version__, sys.version, np.__version__, numba.__version__, *processor]
+    host = processor()
+    parts: list[Any] = [source, __version__, sys.version, np.__version__, numba.__version__, host.name, host.features]
     return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()

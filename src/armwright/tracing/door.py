@@ -42,8 +42,7 @@ _FIELDS = (
 _PLACE = {name: 8 * i for i, name in enumerate(_FIELDS)}
 _FUNCTIONS = tuple(name for name in _FIELDS if name.startswith("Py"))
 _AXES_MAX = 4
-# Of each array: how many axes a value has, their lengths, its size in bytes, the kind of its numbers, its shape, and
-# the lengths as Python's integers.
+# Of each array: how many axes a value has, their lengths, its size in bytes, the kind of its numbers, and its shape.
 _OF_ARRAY = ("axes", *(f"length{i}" for i in range(_AXES_MAX)), "size", "kind", "shape")
 _STRIDE = 8 * len(_OF_ARRAY)
 

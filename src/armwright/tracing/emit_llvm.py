@@ -116,13 +116,10 @@ class _Text:
         else:
             self.lines.append(f"  {statement}")
 
-    def call(self, name: str, *operands: str, suffix: str = "") -> str:
-        suffix = suffix or self.suffix
-        kinds = ", ".join([self.number] * len(operands))
-        self.intrinsics.add(f"declare {self.number} @llvm.{name}.{suffix}({kinds})")
-        return self.let(
-            f"call {self.number} @llvm.{name}.{suffix}({', '.join(f'{self.number} {x}' for x in operands)})"
-        )
+    def call(self, name: str, *operands: str) -> str:
+        function = f"{self.number} @llvm.{name}.{self.suffix}"
+        self.intrinsics.add(f"declare {function}({', '.join([self.number] * len(operands))})")
+        return self.let(f"call {function}({', '.join(f'{self.number} {x}' for x in operands)})")
 
     def copy(self, to: str, source: str, size: str) -> None:
         """Write the copy of so many bytes."""

@@ -203,13 +203,10 @@ class _Target:
         # One sum of squares tells of many: it is not a number, infinite or too large where one of them is.
         for inputs, largest in ((watched.angles, LARGEST_ANGLE), (watched.others, LARGEST)):
             if inputs:
-                size = self.graph.constant(0.0)
-                for i in inputs:
-                    size = (
-                        self._op("fma", new[i], new[i], size)
-                        if i is not inputs[0]
-                        else self._op("multiply", new[i], new[i])
-                    )
+                first, *others = (new[i] for i in inputs)
+                size = self._op("multiply", first, first)
+                for x in others:
+                    size = self._op("fma", x, x, size)
                 valid.append(self._op("less_equal", size, self._limit(largest**2)))
         zero = self.graph.constant(0.0)
         valid += [self._op("less", zero, self.number(new[i])) for i in watched.positive]
