@@ -14,6 +14,7 @@ from armwright.tracing.emit import Shape, emit
 from armwright.tracing.graph import Graph, Traced
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar
+from armwright.tracing.vectors import mirrored
 
 
 def derivative(
@@ -85,8 +86,7 @@ def derivative(
         first = [[x for row in rows for x in row[place]] for place in places]
         if order == 1:
             return [values, *first]
-        H = jacobian(rows[0], columns)
-        return [values, *first, [H[min(i, j)][max(i, j)] for i in range(len(H)) for j in range(len(H))]]
+        return [values, *first, [x for row in mirrored(jacobian(rows[0], columns)) for x in row]]
 
     outputs = [value_shape, *((*value_shape, *shapes[name]) for name in names)]
     if order == 2:

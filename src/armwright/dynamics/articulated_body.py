@@ -16,7 +16,7 @@ from armwright.dynamics.joint_frames import JointStep, joint_body, joint_steps
 from armwright.dynamics.newton_euler import base_frame_acceleration, tool_wrench
 from armwright.tracing.scalar import Scalar, reciprocal
 from armwright.tracing.scan import scan
-from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, transpose
+from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, mirrored, scale, transpose
 
 
 class Articulated(NamedTuple):
@@ -174,17 +174,12 @@ def _at_previous_joint(body: Articulated, step: JointStep, centripetal: Vector) 
     shifted = [add(row, lever) for row, lever in zip(H, transpose([cross(p, row) for row in M]), strict=True)]
     there, back = [cross(p, row) for row in H], [cross(p, row) for row in shifted]
     return Articulated(
-        J=_mirrored([[J[i][j] + there[i][j] + back[j][i] for j in range(3)] for i in range(3)]),
+        J=mirrored([[J[i][j] + there[i][j] + back[j][i] for j in range(3)] for i in range(3)]),
         H=shifted,
-        M=_mirrored(M),
+        M=mirrored(M),
         n0=n0,
         f0=f0,
     )
-
-
-def _mirrored(matrix: Matrix) -> Matrix:
-    """Return the symmetric matrix of an upper half."""
-    return [[matrix[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)]
 
 
 def _joint_response(body: Articulated, step: JointStep, rotor: float, tau: Scalar) -> JointResponse:

@@ -17,7 +17,7 @@ from armwright.tracing.derivatives import jacobian, replaced
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph, Traced
 from armwright.tracing.scalar import Scalar
-from armwright.tracing.vectors import Matrix, apply, dot, product, scale, subtract
+from armwright.tracing.vectors import Matrix, apply, dot, mirrored, product, scale, subtract
 
 
 class EffortDerivatives(NamedTuple):
@@ -148,7 +148,7 @@ def effort_partials(
     efforts = with_drives(arm, newton_euler(arm, q, qd, qdd), qd, qdd)
     n = arm.n
     rows = jacobian(efforts, [*q, *qd, *qdd])
-    M = [[rows[min(i, j)][2 * n + max(i, j)] for j in range(n)] for i in range(n)]
+    M = mirrored([row[2 * n :] for row in rows])
     return [row[:n] for row in rows], [row[n : 2 * n] for row in rows], M
 
 

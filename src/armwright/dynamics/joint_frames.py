@@ -14,7 +14,7 @@ from armwright.arm.model import Arm, Joint, Link
 from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.tracing.scalar import Scalar, cos, sin
 from armwright.tracing.scan import scan
-from armwright.tracing.vectors import Matrix, Vector, add, apply, product, scale, transpose
+from armwright.tracing.vectors import Matrix, Vector, add, apply, mirrored, product, scale, transpose
 
 
 class JointBody(NamedTuple):
@@ -176,7 +176,7 @@ def at_previous_joint(body: JointBody, step: JointStep) -> JointBody:
     p, moment, spread = step.lever, step.outward_axes(body.moment), step.outward_matrix(body.spread)
     shifted = add(moment, scale(body.mass, p))
     upper = [[spread[i][j] + p[i] * moment[j] + shifted[i] * p[j] for j in range(3)] for i in range(3)]
-    return JointBody(body.mass, shifted, [[upper[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)])
+    return JointBody(body.mass, shifted, mirrored(upper))
 
 
 def combined(a: JointBody, b: JointBody) -> JointBody:

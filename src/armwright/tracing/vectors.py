@@ -55,4 +55,10 @@ def congruence(R: Sequence[Sequence[Scalar]], S: Sequence[Sequence[Scalar]]) -> 
     """Return R S Rᵀ of a symmetric S: its upper half, and that half mirrored."""
     half = product(R, S)
     upper = [[dot(half[i], R[j]) if j >= i else 0.0 for j in range(len(R))] for i in range(len(R))]
-    return [[upper[min(i, j)][max(i, j)] for j in range(len(R))] for i in range(len(R))]
+    return mirrored(upper)
+
+
+def mirrored(upper: Sequence[Sequence[Scalar]]) -> Matrix:
+    """Return the symmetric matrix of an upper half; what stands below it is not used."""
+    n = len(upper)
+    return [[upper[min(i, j)][max(i, j)] for j in range(n)] for i in range(n)]
