@@ -11,11 +11,12 @@ batch and at any width of the vectors, on all processors that multiply and add i
 
 import struct
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import accumulate
 from typing import NamedTuple
 
 from armwright.tracing.graph import Graph, Loop, Node, reachable
-from armwright.tracing.machine import MachineCode
+from armwright.tracing.machine import MachineCode, with_results
 
 # What a kernel returns beside 0: some configuration is without meaning, or unusual.
 MEANINGLESS, UNUSUAL = 1, 2
@@ -40,8 +41,6 @@ _INSTRUCTIONS = {
 _READ = frozenset({"constant", "input", "state", "each"})
 # Bytes of a number, and of a line of the cache.
 _DOUBLE, _LINE = 8, 64
-# Blocks of more bytes than this are not fetched ahead: they would drive out of the nearest cache what is worked on.
-_FETCHED = 16384
 
 
 class Column(NamedTuple):
@@ -169,16 +168,20 @@ class _Text:
     def graph(self, graph: Graph, order: Sequence[int], values: "_Values") -> None:
         """Write all operations; the names of their results are among the values then."""
         for i in _straight_first(graph, order):
-            node = graph.nodes[i]
-            if node.op in _READ:
-                continue
-            if node.op == "loop":
-                values.loop(i)
-            elif node.op == "bit":
-                place = int(graph.nodes[node.operands[1]].value)
-                values.names[i] = self._bit(values[node.operands[0]], place)
-            else:
-                values.names[i] = self._operation(node, [values[j] for j in node.operands])
+            self.node(graph, i, values)
+
+    def node(self, graph: Graph, i: int, values: "_Values") -> None:
+        """Write an operation, or a loop."""
+        node = graph.nodes[i]
+        if node.op in _READ:
+            return
+        if node.op == "loop":
+            values.loop(i)
+        elif node.op == "bit":
+            place = int(graph.nodes[node.operands[1]].value)
+            values.names[i] = self._bit(values[node.operands[0]], place)
+        else:
+            values.names[i] = self._operation(node, [values[j] for j in node.operands])
 
     def loop(self, loop: Loop, start: Sequence[str], links: Sequence[str]) -> "_Left":
         """Write a loop.
@@ -243,17 +246,19 @@ class _Text:
         self.do(f"{name}_left:")
         return _Left([f"{x}_next" for x in state], each)
 
-    def fetch_ahead(self, link: str = "0", links: int = 1) -> None:
+    def fetch_ahead(self, link: str, links: int) -> None:
         """Ask for the memory of the next block while this one is worked on: a part of it at each link."""
-        self.intrinsics.add("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
         for ahead in self.ahead:
             lines = -(-ahead.size // (_LINE * links))
-            start = ahead.start
-            if links > 1:
-                start = self.address(start, self.let(f"mul i64 {link}, {lines * _LINE}"), "i8")
+            start = self.address(ahead.start, self.let(f"mul i64 {link}, {lines * _LINE}"), "i8")
             for line in range(lines):
-                address = self.address(start, line * _LINE, "i8")
-                self.do(f"call void @llvm.prefetch.p0(ptr {address}, i32 {int(ahead.is_written)}, i32 3, i32 1)")
+                self.fetch(start, line * _LINE, is_written=ahead.is_written)
+
+    def fetch(self, start: str, offset: int, *, is_written: bool) -> None:
+        """Ask for a line of memory."""
+        self.intrinsics.add("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
+        address = self.address(start, offset, "i8")
+        self.do(f"call void @llvm.prefetch.p0(ptr {address}, i32 {int(is_written)}, i32 3, i32 1)")
 
     def _operation(self, node: Node, x: Sequence[str]) -> str:
         if node.op == "fma" and not self.has_fma:
@@ -283,20 +288,32 @@ class _Text:
             rows = [self._load_row(pointer, r, start, width) for r in range(self.lanes)]
             yield from ((start + k, x) for k, x in enumerate(self._transposed(rows)) if start + k < width)
 
-    def store_columns(self, pointer: str, values: "_Values", columns: Sequence[int]) -> None:
-        """Write columns, each a vector, as a block of rows."""
-        width = len(columns)
-        if self.lanes == 1 or width == 1:
-            for i, node in enumerate(columns):
-                self.do(f"store {self.number} {values[node]}, ptr {self.address(pointer, i)}, align 8")
-            return
-        for start in _windows(width, self.lanes):
-            block = [values[columns[start + k]] if start + k < width else "poison" for k in range(self.lanes)]
-            # A row of fewer numbers than a vector begins where the one before it ends too far: it is written behind it.
-            for r, row in enumerate(self._transposed(block)):
-                self._store_row(pointer, r, start, width, row)
+    def parts(self, pointer: str, column: Column, nodes: Sequence[int]) -> list["_Part"]:
+        """Return the parts in which columns, each a vector, are written as a block of rows.
 
-    def store_flags(self, pointer: str, values: "_Values", columns: Sequence[int]) -> None:
+        Args:
+            pointer: where the block begins.
+            column: what the array is.
+            nodes: of the columns.
+        """
+        if column.flag:
+            return [_Part(tuple(nodes), lambda values: self._store_flags(pointer, values, nodes))]
+        width = column.width
+        if self.lanes == 1 or width == 1:
+            return [_Part((node,), partial(self._store_column, pointer, i, node)) for i, node in enumerate(nodes)]
+        windows = [(start, tuple(nodes[start : start + self.lanes])) for start in _windows(width, self.lanes)]
+        return [_Part(part, partial(self._store_window, pointer, start, width, part)) for start, part in windows]
+
+    def _store_column(self, pointer: str, i: int, node: int, values: "_Values") -> None:
+        self.do(f"store {self.number} {values[node]}, ptr {self.address(pointer, i)}, align 8")
+
+    def _store_window(self, pointer: str, start: int, width: int, nodes: Sequence[int], values: "_Values") -> None:
+        block = [*(values[node] for node in nodes), *["poison"] * (self.lanes - len(nodes))]
+        # A row of fewer numbers than a vector begins where the one before it ends too far: it is written behind it.
+        for r, row in enumerate(self._transposed(block)):
+            self._store_row(pointer, r, start, width, row)
+
+    def _store_flags(self, pointer: str, values: "_Values", columns: Sequence[int]) -> None:
         """Write columns of truth values as a block of rows of bytes."""
         if len(columns) == _DOUBLE and self.lanes > 1:
             # A row of eight bytes is one word: each column sets a bit of it.
@@ -370,6 +387,13 @@ class _Ahead(NamedTuple):
     start: str
     size: int
     is_written: bool
+
+
+class _Part(NamedTuple):
+    """A part of the outputs: the nodes that it takes, and what writes it."""
+
+    nodes: tuple[int, ...]
+    write: Callable[["_Values"], None]
 
 
 class _Left(NamedTuple):
@@ -512,16 +536,13 @@ def rows_ir(code: MachineCode, inputs: Sequence[Column], outputs: Sequence[Colum
     _copy_last_rows(text, inputs, here, spare)
     text.do("work:")
     places = [text.let(f"phi ptr [{a}, %block], [{b}, %copy]") for a, b in zip(here, spare, strict=True)]
-    text.ahead = [
-        _Ahead(text.address(start, lanes * one.size, "i8"), lanes * one.size, i >= len(inputs))
-        for i, (start, one) in enumerate(zip(here, arrays, strict=True))
-    ]
     if code.graph.loops:
+        text.ahead = [
+            _Ahead(text.address(start, lanes * one.size, "i8"), lanes * one.size, i >= len(inputs))
+            for i, (start, one) in enumerate(zip(here, arrays, strict=True))
+        ]
         # The longest loop has the most time for it.
         text.ahead_in = max(code.graph.loops, key=lambda loop: sum(len(step.graph.nodes) for step in loop.steps))
-    else:
-        text.ahead = [one for one in text.ahead if one.size <= _FETCHED]
-        text.fetch_ahead()
     bad, odd = _body(text, code, inputs, outputs, places)
     text.do(f"%bad_now = or {truth} %bad, {bad}")
     text.do(f"%odd_now = or {truth} %odd, {odd}")
@@ -606,13 +627,55 @@ def _body(
     else:
         names = {start + i: x for start, of_input in zip(starts, columns, strict=False) for i, x in of_input}
         values = _Values(text, code.graph, names.__getitem__)
-    text.graph(code.graph, code.order, values)
+    parts: list[_Part] = []
     first = 0
     for place, one in zip(written, outputs, strict=True):
-        write = text.store_flags if one.flag else text.store_columns
-        write(place, values, code.outputs[first : first + one.width])
+        parts += text.parts(place, one, code.outputs[first : first + one.width])
         first += one.width
+    if code.graph.loops:
+        text.graph(code.graph, code.order, values)
+        for part in parts:
+            part.write(values)
+    else:
+        _straight(text, code, values, parts, _lines(written, outputs, text.lanes))
     return tuple(text.never if x is None else values[x] for x in (code.invalid, code.unusual))  # type: ignore[return-value]
+
+
+def _straight(
+    text: _Text, code: MachineCode, values: _Values, parts: Sequence[_Part], lines: Sequence[tuple[str, int]]
+) -> None:
+    """Write straight code, and each part of the outputs as soon as it is known.
+
+    Lines of the outputs are asked for meanwhile, one now and then: many at once, or those of the next block, would
+    drive out of the nearest cache what is worked on.
+
+    Args:
+        text: where it is written.
+        code: what is computed.
+        values: begins with the inputs.
+        parts: of the outputs.
+        lines: of the outputs, each by the address of its array and its place from there.
+    """
+    every, waiting = max(1, len(code.order) // max(1, len(lines))), iter(lines)
+    for count, (i, complete) in enumerate(with_results(code, [part.nodes for part in parts]), 1):
+        text.node(code.graph, i, values)
+        if count % every == 0 and (line := next(waiting, None)):
+            text.fetch(*line, is_written=True)
+        for k in complete:
+            parts[k].write(values)
+
+
+def _lines(pointers: Sequence[str], columns: Sequence[Column], lanes: int) -> list[tuple[str, int]]:
+    """Return the lines of the blocks of outputs, those at the same place of all arrays together; none of one row."""
+    if lanes == 1:
+        return []
+    sizes = [lanes * one.size for one in columns]
+    return [
+        (pointer, offset)
+        for offset in range(0, max(sizes), _LINE)
+        for pointer, size in zip(pointers, sizes, strict=True)
+        if offset < size
+    ]
 
 
 def _status(text: _Text, bad: str, odd: str) -> str:

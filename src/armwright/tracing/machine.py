@@ -100,6 +100,31 @@ def machine_code(
     return MachineCode(target.graph, reachable(target.graph, all_ends), ends, invalid, unusual, target.joined)
 
 
+def with_results(code: MachineCode, groups: Sequence[Sequence[int]]) -> list[tuple[int, list[int]]]:
+    """Return the nodes in use in their order, each with the groups of results that are complete with it.
+
+    What is written as soon as it is known is not in the way until the end. Conditions, too, stand right behind what
+    they are about: at the end they would keep all inputs until then.
+
+    Args:
+        code: operations.
+        groups: nodes that are written together.
+
+    Returns:
+        Of each node its number, and the numbers of the groups of which it is the last.
+    """
+    needed = set(reachable(code.graph, code.outputs))
+    behind: dict[int, int] = {}
+    for i in code.order:
+        behind[i] = i if i in needed else max((behind[k] for k in code.graph.nodes[i].operands), default=i)
+    order = sorted(code.order, key=lambda i: (behind[i], i))
+    places = {node: place for place, node in enumerate(order)}
+    complete: list[list[int]] = [[] for _ in order]
+    for k, nodes in enumerate(groups):
+        complete[max(places[i] for i in nodes)].append(k)
+    return list(zip(order, complete, strict=True))
+
+
 def _product(graph: Graph, number: int | None) -> tuple[int, Node] | None:
     return None if number is None else (number, graph.nodes[number])
 
