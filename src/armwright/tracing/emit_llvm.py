@@ -41,6 +41,9 @@ _INSTRUCTIONS = {
 _READ = frozenset({"constant", "input", "state", "each"})
 # Bytes of a number, and of a line of the cache.
 _DOUBLE, _LINE = 8, 64
+# Blocks of rows of more bytes than this do not stay in the nearest cache: they are written from front to back, and not
+# asked for before.
+_LONG_ROW = 2048
 
 
 class Column(NamedTuple):
@@ -637,45 +640,29 @@ def _body(
         for part in parts:
             part.write(values)
     else:
-        _straight(text, code, values, parts, _lines(written, outputs, text.lanes))
+        in_turn = any(one.size > _LONG_ROW for one in outputs)
+        order = with_results(code, [part.nodes for part in parts], in_turn=in_turn)
+        lines = _lines(written, outputs, text.lanes)
+        every, waiting = max(1, len(order) // max(1, len(lines))), iter(lines)
+        for count, (i, known) in enumerate(order, 1):
+            text.node(code.graph, i, values)
+            # One line now and then: many at once, or those of the next block, would drive out of the nearest cache
+            # what is worked on.
+            if count % every == 0 and (line := next(waiting, None)):
+                text.fetch(*line, is_written=True)
+            for k in known:
+                parts[k].write(values)
     return tuple(text.never if x is None else values[x] for x in (code.invalid, code.unusual))  # type: ignore[return-value]
 
 
-def _straight(
-    text: _Text, code: MachineCode, values: _Values, parts: Sequence[_Part], lines: Sequence[tuple[str, int]]
-) -> None:
-    """Write straight code, and each part of the outputs as soon as it is known.
-
-    Lines of the outputs are asked for meanwhile, one now and then: many at once, or those of the next block, would
-    drive out of the nearest cache what is worked on.
-
-    Args:
-        text: where it is written.
-        code: what is computed.
-        values: begins with the inputs.
-        parts: of the outputs.
-        lines: of the outputs, each by the address of its array and its place from there.
-    """
-    every, waiting = max(1, len(code.order) // max(1, len(lines))), iter(lines)
-    for count, (i, complete) in enumerate(with_results(code, [part.nodes for part in parts]), 1):
-        text.node(code.graph, i, values)
-        if count % every == 0 and (line := next(waiting, None)):
-            text.fetch(*line, is_written=True)
-        for k in complete:
-            parts[k].write(values)
-
-
 def _lines(pointers: Sequence[str], columns: Sequence[Column], lanes: int) -> list[tuple[str, int]]:
-    """Return the lines of the blocks of outputs, those at the same place of all arrays together; none of one row."""
-    if lanes == 1:
-        return []
-    sizes = [lanes * one.size for one in columns]
-    return [
-        (pointer, offset)
-        for offset in range(0, max(sizes), _LINE)
-        for pointer, size in zip(pointers, sizes, strict=True)
-        if offset < size
-    ]
+    """Return the lines of blocks of rows that are not long, those at the same place of all blocks together.
+
+    Each is the address of its block and its place from there. There are none of single rows.
+    """
+    short = [(place, one) for place, one in zip(pointers, columns, strict=True) if lanes > 1 and one.size <= _LONG_ROW]
+    end = max((lanes * one.size for _, one in short), default=0)
+    return [(place, k) for k in range(0, end, _LINE) for place, one in short if k < lanes * one.size]
 
 
 def _status(text: _Text, bad: str, odd: str) -> str:

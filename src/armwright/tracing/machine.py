@@ -100,28 +100,37 @@ def machine_code(
     return MachineCode(target.graph, reachable(target.graph, all_ends), ends, invalid, unusual, target.joined)
 
 
-def with_results(code: MachineCode, groups: Sequence[Sequence[int]]) -> list[tuple[int, list[int]]]:
-    """Return the nodes in use in their order, each with the groups of results that are complete with it.
+def with_results(
+    code: MachineCode, groups: Sequence[Sequence[int]], *, in_turn: bool = False
+) -> list[tuple[int, list[int]]]:
+    """Return the nodes in use in an order in which results are complete early, each with those it completes.
 
     What is written as soon as it is known is not in the way until the end. Conditions, too, stand right behind what
     they are about: at the end they would keep all inputs until then.
 
     Args:
         code: operations.
-        groups: nodes that are written together.
+        groups: nodes whose values are written together.
+        in_turn: whether the groups are to be complete one after the other; otherwise the nodes stay in their order.
 
     Returns:
         Of each node its number, and the numbers of the groups of which it is the last.
     """
     needed = set(reachable(code.graph, code.outputs))
-    behind: dict[int, int] = {}
+    place: dict[int, int] = {i: i for i in needed}
+    if in_turn:
+        for k, nodes in reversed(list(enumerate(groups))):
+            place.update(dict.fromkeys(reachable(code.graph, nodes), k))
     for i in code.order:
-        behind[i] = i if i in needed else max((behind[k] for k in code.graph.nodes[i].operands), default=i)
-    order = sorted(code.order, key=lambda i: (behind[i], i))
-    places = {node: place for place, node in enumerate(order)}
+        if i not in needed:
+            place[i] = max((place[k] for k in code.graph.nodes[i].operands), default=0)
+    order = sorted(code.order, key=lambda i: (place[i], i))
+    found = {node: k for k, node in enumerate(order)}
     complete: list[list[int]] = [[] for _ in order]
+    last = 0
     for k, nodes in enumerate(groups):
-        complete[max(places[i] for i in nodes)].append(k)
+        last = max(last if in_turn else 0, *(found[i] for i in nodes))
+        complete[last].append(k)
     return list(zip(order, complete, strict=True))
 
 

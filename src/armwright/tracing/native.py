@@ -22,6 +22,10 @@ os.register_at_fork(before=_LOADING.acquire, after_in_parent=_LOADING.release, a
 # What is stored begins with this, and the object of the compiler follows.
 _SIGNATURE = b"object of LLVM\n"
 
+# The operations of longer IR, in lines, stay in its order: the one that LLVM finds keeps ever more values at a time,
+# which makes the derivatives of seven joints a tenth slower, and takes longer to find.
+_ORDERED = 5000
+
 
 class Processor(NamedTuple):
     """What code is made for.
@@ -79,8 +83,9 @@ def _compile(ir: str) -> bytes:
 
     module = llvm.parse_assembly(ir)
     module.verify()
-    # Operations stay in the order in which they are written, which is that of long lives at most: LLVM's own order
-    # makes the code of derivatives a tenth slower. The setting is that of the process, where Numba has the other.
+    if ir.count("\n") <= _ORDERED:
+        return bytes(_machine().emit_object(module))
+    # The setting is that of the process, where Numba compiles, too.
     llvm.set_option("armwright", "-enable-misched=false")
     try:
         return bytes(_machine().emit_object(module))
