@@ -49,6 +49,7 @@ MANY: dict[str, Door] = {
     "forward_dynamics: tau": lambda x: armwright.dynamics.forward_dynamics(PUMA, Q, Q, x),
     "inverse_dynamics_derivatives: q": lambda x: armwright.dynamics.inverse_dynamics_derivatives(PUMA, x, Q, Q).dq,
     "forward_dynamics_derivatives: tau": lambda x: armwright.dynamics.forward_dynamics_derivatives(PUMA, Q, Q, x).dq,
+    "base_regressor: qd": lambda x: armwright.dynamics.base_regressor(PUMA, Q, x, Q),
     "regressor: qd": lambda x: armwright.dynamics.regressor(PUMA, Q, x, Q),
     "toacc: q": lambda x: toacc(PUMA, x, Q, Q),
     "toacc: tau": lambda x: toacc(PUMA, Q, Q, x),

@@ -19,6 +19,7 @@ from armwright.compiled.quantities import emit_quantity, quantity_names
 from armwright.dynamics.accelerations import forward_dynamics
 from armwright.dynamics.derivatives import forward_dynamics_derivatives, inverse_dynamics_derivatives
 from armwright.dynamics.energy import kinetic_energy, potential_energy
+from armwright.dynamics.identification import base_regressor
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.regressors import regressor
@@ -64,6 +65,7 @@ PLAIN: dict[str, Callable[..., Any]] = {
     "inverse_dynamics_derivatives": inverse_dynamics_derivatives,
     "forward_dynamics_derivatives": forward_dynamics_derivatives,
     "regressor": regressor,
+    "base_regressor": base_regressor,
 }
 
 

@@ -7,6 +7,7 @@ from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
 from armwright.compiled.normal_equations import normal_equations
+from armwright.dynamics.identification import base_parameters, base_regressor
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.regressors import dynamic_parameters, regressor
 from armwright.errors import InvalidValueError, KindError, ShapeError
@@ -46,6 +47,20 @@ def test_fit(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(regressor(ARM, *others) @ theta, expected, atol=1e-6 * np.abs(expected).max())
     assert np.linalg.matrix_rank(A) < 84
     assert np.abs(theta - dynamic_parameters(ARM)).max() > 0.01
+
+
+def test_fit_of_base_parameters(rng: np.random.Generator) -> None:
+    """Base parameters are found again, from efforts of an arm whose rotors and friction count."""
+    q, qd, qdd = rng.normal(size=(3, 600, 6))
+    base = base_parameters(ARM)
+
+    A, b = normal_equations(ARM, q, qd, qdd, inverse_dynamics(ARM, q, qd, qdd), base=True)
+
+    Y = base_regressor(ARM, q, qd, qdd)
+    _assert_near(A, np.einsum("kij,kil->jl", Y, Y))
+    expected = base.combinations @ dynamic_parameters(ARM)
+    # The normal equations square the condition of the problem.
+    np.testing.assert_allclose(np.linalg.solve(A, b), expected, atol=1e-8 * np.abs(expected).max())
 
 
 def test_mistakes() -> None:

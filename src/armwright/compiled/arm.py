@@ -468,6 +468,26 @@ class CompiledArm:
             UnsupportedArmError: nothing is known of the mass of some link.
         """
 
+    @_kernel_method
+    def base_regressor(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, threads: int | None = None, out: Array | None = None
+    ) -> Array:
+        """Return the independent columns of the regressor: tau = Y pi, pi those of ``dynamics.base_parameters``.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            qdd: (..., n) joint accelerations [rad/s²] or [m/s²].
+            threads: how many cores to use; all when None.
+            out: (..., n, b) to fill.
+
+        Returns:
+            Y: (..., n, b) one column for each of the b base parameters.
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+
     def kernel(self, quantity: str) -> Kernel:
         """Return the kernel behind a function, whose part for one configuration other compiled code can call.
 

@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, broadcast_rows, exact_shape, joint_array
 from armwright.compiled.arm import CompiledArm, compile_arm
+from armwright.dynamics.identification import base_parameters
 from armwright.errors import InvalidValueError
 
 # Samples whose regressors exist at a time: 2 MB of them for six joints.
@@ -16,13 +17,15 @@ _BLOCK = 512
 
 
 class NormalEquations(NamedTuple):
-    """The normal equations A theta = b of least squares, whose parameters are those of ``dynamics.dynamic_parameters``.
+    """The normal equations A theta = b of least squares.
 
-    Those of several measurements are added.
+    The p parameters are those of ``dynamics.dynamic_parameters``, or of ``dynamics.base_parameters``. Equations of
+    several measurements are added.
 
     Attributes:
-        A: (14 n, 14 n) sum of Yᵀ W Y, symmetric. It is singular: not all parameters can be told apart.
-        b: (14 n,) sum of Yᵀ W tau.
+        A: (p, p) sum of Yᵀ W Y, symmetric. It is singular for all parameters, as not all can be told apart; for base
+            parameters it is not, if the motions excite them all.
+        b: (p,) sum of Yᵀ W tau.
     """
 
     A: Array
@@ -37,6 +40,7 @@ def normal_equations(
     tau: ArrayLike,
     *,
     weights: ArrayLike | None = None,
+    base: bool = False,
 ) -> NormalEquations:
     """Return the normal equations of measured motions, for the parameters of the dynamics.
 
@@ -49,9 +53,10 @@ def normal_equations(
         qdd: (..., n) joint accelerations.
         tau: (..., n) measured efforts [N m] or [N].
         weights: (n,) weight of each joint, 0 or more: the inverse of the variance of its effort; all 1 when left out.
+        base: whether they are those of the base parameters, not of all.
 
     Returns:
-        Their matrix (14 n, 14 n) and right side (14 n,).
+        Their matrix and right side.
 
     Raises:
         KindError: ``arm`` is no arm, or an array is something else than real numbers.
@@ -64,14 +69,14 @@ def normal_equations(
     """
     fast = arm if isinstance(arm, CompiledArm) else compile_arm(arm)
     n = fast.arm.n
-    regressor = fast.regressor
+    regressor = fast.base_regressor if base else fast.regressor
     W = np.ones(n) if weights is None else exact_shape(weights, (n,), "weights", LARGEST)
     if (W < 0).any():
         raise InvalidValueError(f"weights: expected numbers of 0 or more, got {W.tolist()}")
     named = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
     rows = broadcast_rows(", ".join(named), *(joint_array(x, n, name) for name, x in named.items()))
     q_, qd_, qdd_, tau_ = (x.reshape(-1, n) for x in rows)
-    columns = 14 * n
+    columns = len(base_parameters(fast.arm).columns) if base else 14 * n
     A, b = np.zeros((columns, columns)), np.zeros(columns)
     for first in range(0, len(q_), _BLOCK):
         block = slice(first, first + _BLOCK)

@@ -15,6 +15,7 @@ from armwright.dynamics.articulated_body import articulated_body
 from armwright.dynamics.derivatives import acceleration_partials, effort_partials, forward_dynamics_derivatives
 from armwright.dynamics.drives import less_friction, with_drives
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy, rotor_energy
+from armwright.dynamics.identification import base_parameters, effort_base_regressor
 from armwright.dynamics.inertia_matrix import composite_rigid_body
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.regressors import OF_DRIVE, OF_LINK, effort_regressor
@@ -199,6 +200,10 @@ def _regressor(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers) -> Rows:
     return [_flat(effort_regressor(arm, q, qd, qdd))]
 
 
+def _base_regressor(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers) -> Rows:
+    return [_flat(effort_base_regressor(arm, q, qd, qdd))]
+
+
 def _flat(A: Matrix) -> list[Scalar]:
     return [x for row in A for x in row]
 
@@ -209,7 +214,9 @@ def _pose(frame: tuple[Matrix, Vector]) -> Vector:
 
 
 class _Quantity(NamedTuple):
-    """One row of the table. In shapes, n is the number of joints, f that of the frames, p that of the parameters.
+    """One row of the table.
+
+    In shapes, n is the number of joints, f that of the frames, p that of the parameters, b that of the base parameters.
 
     Attributes:
         equation: over abstract scalars.
@@ -230,9 +237,11 @@ class _Quantity(NamedTuple):
 
 
 def _size(arm: Arm, letter: str | int) -> int:
-    return (
-        letter if isinstance(letter, int) else {"n": arm.n, "f": arm.n + 2, "p": (OF_LINK + OF_DRIVE) * arm.n}[letter]
-    )
+    if isinstance(letter, int):
+        return letter
+    if letter == "b":
+        return len(base_parameters(arm).columns)
+    return {"n": arm.n, "f": arm.n + 2, "p": (OF_LINK + OF_DRIVE) * arm.n}[letter]
 
 
 # The inputs that are positions of joints.
@@ -268,4 +277,5 @@ _QUANTITIES = {
         _forward_dynamics_derivatives, _FORCED, _THREE_MATRICES, plain=forward_dynamics_derivatives
     ),
     "regressor": _Quantity(_regressor, _MOTION, (("n", "p"),)),
+    "base_regressor": _Quantity(_base_regressor, _MOTION, (("n", "b"),)),
 }

@@ -8,6 +8,12 @@ from .derivatives import (
 )
 from .energy import kinetic_energy as kinetic_energy, potential_energy as potential_energy
 from .equation_of_motion import Terms as Terms, terms as terms
+from .identification import (
+    BaseParameters as BaseParameters,
+    base_parameters as base_parameters,
+    base_regressor as base_regressor,
+    parameter_names as parameter_names,
+)
 from .inertia_matrix import mass_matrix as mass_matrix
 from .lagrange_euler import (
     coriolis_matrix as coriolis_matrix,

@@ -1,0 +1,144 @@
+"""The parameters that motions of an arm can tell: linear combinations of its dynamic parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike
+from armwright.dynamics.arguments import Scalars, batch, stack_matrix, weighed
+from armwright.dynamics.regressors import OF_DRIVE, OF_LINK, effort_regressor
+from armwright.tracing.vectors import Matrix
+
+_OF_LINK = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+_OF_DRIVE = ("rotor", "viscous", "forward", "backward")
+# Motions of which the structure is found; each gives an equation per joint.
+_MOTIONS = 100
+# A column that is no longer than this part of the longest has no effect.
+_NO_EFFECT = 1e-12
+# What is left of a column behind others that it is a combination of, as a part of it: rounding leaves 1e-13.
+_DEPENDENT = 1e-10
+# A share of one column in another that is no more than rounding.
+_NO_SHARE = 1e-11
+
+
+class BaseParameters(NamedTuple):
+    """The base parameters of an arm, by the geometry and gravity alone.
+
+    Attributes:
+        columns: (b,) which columns of ``regressor`` are independent: those of ``base_regressor``.
+        names: of the parameter of each of these columns, such as ``Izz2`` of link 2; others are combined with it.
+        combinations: (b, 14 n) base parameters by the parameters of ``dynamic_parameters``: pi = combinations @ theta.
+    """
+
+    columns: tuple[int, ...]
+    names: tuple[str, ...]
+    combinations: Array
+
+
+def parameter_names(joints: int) -> list[str]:
+    """Return the names of the parameters of ``dynamic_parameters``.
+
+    Of link i they are ``mi``, ``mxi``, ``myi``, ``mzi``, ``Ixxi`` and so on, of the drive of joint i ``rotori``,
+    ``viscousi``, ``forwardi`` and ``backwardi``.
+
+    Args:
+        joints: how many joints, and links, there are.
+    """
+    return [f"{name}{i + 1}" for names in (_OF_LINK, _OF_DRIVE) for i in range(joints) for name in names]
+
+
+def base_parameters(arm: Arm) -> BaseParameters:
+    """Return the base parameters of an arm: the fewest numbers in which its efforts are linear.
+
+    A parameter whose effect on all efforts is a combination of the effects of others is no base parameter, but part of
+    theirs; one without effect is part of none. Parameters of links nearer to the base are kept, and of each link
+    rather first and second moments than the mass: the combinations then hold lengths and their squares, as in books.
+
+    Args:
+        arm: the arm, with n joints.
+
+    Returns:
+        Their columns, names and combinations, the same whenever it is called.
+
+    Raises:
+        KindError: ``arm`` is no arm.
+        UnsupportedArmError: the mass of a link is unknown.
+
+    Source:
+        Gautier (1991), Numerical calculation of the base inertial parameters of robots.
+    """
+    found = _base_parameters(weighed(arm))
+    return found._replace(combinations=found.combinations.copy())
+
+
+def base_regressor(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    """Return the columns of the regressor that are independent: tau = Y pi, with the base parameters pi.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint velocities.
+        qdd: (..., n) joint accelerations.
+
+    Returns:
+        Y: (..., n, b), one column for each of the b base parameters of ``base_parameters``.
+
+    Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
+        ShapeError: a last axis is not n long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
+        UnsupportedArmError: the mass of a link is unknown.
+
+    Source:
+        Khalil & Dombre (2002), chapters 9 and 12.
+    """
+    lead, scalars, _ = batch(arm, q=q, qd=qd, qdd=qdd)
+    return stack_matrix(effort_base_regressor(arm, *scalars), lead)
+
+
+def effort_base_regressor(arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars) -> Matrix:
+    """Return the independent columns of the regressor, n x b, over abstract scalars: see ``effort_regressor``."""
+    columns = _base_parameters(arm).columns
+    return [[row[k] for k in columns] for row in effort_regressor(arm, q, qd, qdd)]
+
+
+@lru_cache(maxsize=16)  # takes milliseconds, and an arm does not change
+def _base_parameters(arm: Arm) -> BaseParameters:
+    n = arm.n
+    rng = np.random.default_rng(0)
+    q, qd, qdd = rng.uniform(-3, 3, size=(3, n, _MOTIONS))
+    Y = stack_matrix(effort_regressor(arm, list(q), list(qd), list(qdd)), (_MOTIONS,))
+    Y = Y.reshape(-1, (OF_LINK + OF_DRIVE) * n)
+    lengths = np.linalg.norm(Y, axis=0)
+    has_effect = lengths > _NO_EFFECT * lengths.max()
+    # As many rows as columns tell the same.
+    units = np.array(np.linalg.qr(np.where(has_effect, Y / np.where(has_effect, lengths, 1.0), 0.0), mode="r"))
+    of_links = [OF_LINK * i + k for i in range(n) for k in (*range(1, OF_LINK), 0)]
+    columns = _independent(units, [*of_links, *range(OF_LINK * n, len(lengths))])
+    shares = np.linalg.lstsq(units[:, columns], units, rcond=None)[0]
+    shares[np.abs(shares) < _NO_SHARE] = 0.0
+    shares[:, columns] = np.eye(len(columns))
+    combinations = shares * lengths / lengths[columns][:, None]
+    names = parameter_names(n)
+    return BaseParameters(tuple(columns), tuple(names[k] for k in columns), combinations)
+
+
+def _independent(units: Array, order: Sequence[int]) -> list[int]:
+    """Return which columns, of length 1 or 0, are no combination of those before them in an order."""
+    basis = np.zeros((len(units), len(order)))
+    columns: list[int] = []
+    for k in order:
+        rest, known = units[:, k], basis[:, : len(columns)]
+        # Twice, as what rounding has left of the first time is not orthogonal.
+        for _ in range(2):
+            rest = rest - known @ (known.T @ rest)
+        length = np.linalg.norm(rest)
+        if length > _DEPENDENT:
+            basis[:, len(columns)] = rest / length
+            columns.append(k)
+    return sorted(columns)
