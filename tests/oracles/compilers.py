@@ -42,7 +42,7 @@ SANITIZED = {
     "clang": ["-fsanitize=undefined", "-fsanitize-trap=undefined"],
 }
 # As a processor with multiply-adds is told of them; others have them always, or never.
-_FMA = ["-mfma"] if processor().target.has_fma and "sse" in processor().features else []
+FMA = ["-mfma"] if processor().target.has_fma and "sse" in processor().features else []
 
 
 def build(compiler: str, text: str, target: Path, *options: str) -> Path:
@@ -100,7 +100,7 @@ class Compiled:
         loops = "\n".join(_loop(each, language, real, compiler) for each in self._functions.values())
         before = _DEVICE if language == "cuda" else ""
         target = folder / f"{compiler}_{language}_{real}.so"
-        build(compiler, f"{before}{text}\n{loops}", target, "-O2", *_FMA)
+        build(compiler, f"{before}{text}\n{loops}", target, "-O2", *FMA)
         self._library = ctypes.CDLL(str(target))
 
     def __call__(self, quantity: str, *inputs: Array) -> tuple[list[Array], Array]:

@@ -1,5 +1,6 @@
 """Quantities of an arm in C, C++ and CUDA, compiled and compared with what this processor computes."""
 
+import ctypes
 import re
 import subprocess
 from pathlib import Path
@@ -23,9 +24,9 @@ from armwright.kinematics.jacobians import jacobian
 from armwright.tracing.emit import Emitted, emit
 from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
 from armwright.tracing.identifiers import identifier
-from armwright.tracing.scalar import atan2, round_half_even, sqrt
+from armwright.tracing.scalar import Scalar, atan2, round_half_even, sqrt
 from oracles.arms import of_all_kinds, random_arm
-from oracles.compilers import COMPILERS, SANITIZED, Compiled, build, compiled_for_device, sizes_on_cortex_m7
+from oracles.compilers import COMPILERS, FMA, SANITIZED, Compiled, build, compiled_for_device, sizes_on_cortex_m7
 from samples import Sample
 from test_data_is_no_code import HOSTILE, random_name
 
@@ -119,6 +120,39 @@ def test_loops_of_long_arms(name: str, tmp_path: Path, sample: Sample) -> None:
     assert all("for (int i = 0; i < " in text for text in texts)
     assert len(texts[1]) < 1.7 * len(texts[0])
     sample.record(f"rows of an arm of 20 joints with the processor's bits, {name}", rows, 0)
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "g++"])
+def test_sums_of_neighbours(compiler: str, tmp_path: Path, rng: np.random.Generator) -> None:
+    """Products that stay by themselves are rounded, though gcc would make one instruction of them and their sums."""
+
+    def equation(a: list[Scalar], b: list[Scalar]) -> list[list[Scalar]]:
+        # The last of each are used in another way, too: so no sum takes them in.
+        products = [x * y for x, y in zip(a, b, strict=True)]
+        return [[x + y if k % 2 else x - y for k, (x, y) in enumerate(zip(products, b, strict=True))], products]
+
+    emitted = emit("neighbours", equation, {"a": 4, "b": 4})
+    arguments = [Argument(name, 4) for name in ("a", "b", "sums", "products")]
+    function = Function(
+        "neighbours", emitted.code, emitted.any_type, arguments[:2], arguments[2:], emitted.operations, ["Sums."]
+    )
+    text, prefix = (c_header([function]), "") if compiler == "gcc" else (cpp_header([function]), "armwright::")
+    export = 'extern "C" ' if compiler == "g++" else ""
+    text += f"""
+{export}int call(const double *x, double *y);
+{export}int call(const double *x, double *y)
+{{
+    return {prefix}neighbours(x, x + 4, y, y + 4);
+}}
+"""
+    call = ctypes.CDLL(str(build(compiler, text, tmp_path / "neighbours.so", "-O3", *FMA))).call
+
+    for x in rng.normal(size=(200, 8)):
+        found = np.empty(8)
+        assert call(ctypes.c_void_p(x.ctypes.data), ctypes.c_void_p(found.ctypes.data)) == 0
+        products = x[:4] * x[4:]
+        sums = products + x[4:] * (-1, 1, -1, 1)
+        np.testing.assert_array_equal(found, [*sums, *products])
 
 
 @pytest.mark.parametrize("real", ["double", "float"])

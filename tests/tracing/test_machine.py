@@ -1,5 +1,6 @@
 """From traced graphs to the operations of a processor, evaluated one by one with exact fractions."""
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 
@@ -9,7 +10,7 @@ import pytest
 from armwright.arrays import LARGEST
 from armwright.tracing.emit import Guarded, emit
 from armwright.tracing.graph import Graph, Traced
-from armwright.tracing.machine import LARGEST_ANGLE, MachineCode, fused, machine_code
+from armwright.tracing.machine import LARGEST_ANGLE, MachineCode, Watched, fused, machine_code, scheduled, with_results
 from armwright.tracing.scalar import Scalar, atan2, cos, round_half_even, select, sin, sqrt
 from oracles.graphs import evaluate_machine
 
@@ -182,3 +183,58 @@ def test_nothing_watched() -> None:
     code = one(lambda x: x + 1.0, 1)
 
     assert (code.invalid, code.unusual) == (None, None)
+
+
+def assert_orders(code: MachineCode, order: Sequence[int]) -> None:
+    """Check that an order has every node in use once, behind its operands."""
+    assert sorted(order) == sorted(code.order)
+    places = {node: place for place, node in enumerate(order)}
+    assert all(places[k] < place for node, place in places.items() for k in code.graph.nodes[node].operands)
+
+
+def chains(count: int) -> MachineCode:
+    """Sums of several numbers, each of which waits for the one before, and a condition."""
+    graph = Graph()
+    x, *others = graph.inputs(9)
+    ends = []
+    for k in range(count):
+        total = x
+        for y in others:
+            total = total * (y + k)
+        ends.append(total.node)
+    watched = Watched(others=[x.node], positive=[ends[0]])
+    return machine_code(graph, ends, watched)
+
+
+def test_results_are_known_early() -> None:
+    """Each result is known long before the end, conditions stand behind what they are about, and nothing is lost."""
+    code = chains(6)
+    groups = [code.outputs[k : k + 2] for k in (4, 0, 2)]
+
+    for in_turn, turns in ((False, [1, 2, 0]), (True, [0, 1, 2])):
+        found = with_results(code, groups, in_turn=in_turn)
+
+        order = [node for node, _ in found]
+        assert_orders(code, order)
+        assert [k for _, known in found for k in known] == turns
+        for place, (_, known) in enumerate(found):
+            assert all(set(groups[k]) <= set(order[: place + 1]) for k in known)
+        first = min(place for place, (_, known) in enumerate(found) if known)
+        assert first < 0.6 * len(order)
+    # The condition of the first output does not wait for the others.
+    order = [node for node, _ in with_results(code, groups)]
+    (less,) = (i for i in code.order if code.graph.nodes[i].op == "less")
+    assert order.index(less) == order.index(code.outputs[0]) + 1
+
+
+def test_operations_side_by_side() -> None:
+    """Chains whose operations wait for each other are done side by side."""
+    code = chains(4)
+
+    order = scheduled(code.graph, code.order)
+
+    assert_orders(code, order)
+    products = [i for i in order if code.graph.nodes[i].op == "multiply"]
+    neighbours = sum(a in code.graph.nodes[b].operands for a, b in itertools.pairwise(products))
+    in_order = [i for i in code.order if i in products]
+    assert neighbours < 0.2 * sum(a in code.graph.nodes[b].operands for a, b in itertools.pairwise(in_order))

@@ -17,7 +17,7 @@ import numpy as np
 from armwright.errors import InvalidValueError
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
 from armwright.tracing.graph import Graph, Loop, reachable, traced
-from armwright.tracing.machine import TRUTHS, MachineCode, machine_code
+from armwright.tracing.machine import TRUTHS, MachineCode, machine_code, scheduled
 from armwright.version import __version__
 
 Real: TypeAlias = Literal["double", "float"]
@@ -68,6 +68,8 @@ class _Dialect(NamedTuple):
         of_table: writes a constant in one.
         limit: writes a limit.
         calls: operations that are calls of a function.
+        in_parallel: whether operations that do not wait for each other stand side by side, for compilers that leave
+            them in their order.
     """
 
     real: str
@@ -77,6 +79,7 @@ class _Dialect(NamedTuple):
     table: str
     of_table: Callable[[float], str]
     calls: Mapping[str, str]
+    in_parallel: bool = True
 
 
 _OPERATORS = {
@@ -106,8 +109,12 @@ def c_header(functions: Sequence[Function], real: Real = "double") -> str:
         InvalidValueError: a constant is beyond the range of float.
     """
     dialect = _FLOAT if real == "float" else _DOUBLE
-    bodies = [_function(each, _code(each, real), dialect, "static inline int") for each in functions]
-    return _guarded(_comment(_C_RULES, real), _C_HELPERS[real], bodies)
+    bodies = [_function(each, _code(each, real), dialect, "ARMWRIGHT_FUNCTION int") for each in functions]
+    return _guarded(
+        _comment(_C_RULES, real),
+        _of_gcc("ARMWRIGHT_FUNCTION", "static inline", "static", "unused, ") + _C_HELPERS[real],
+        bodies,
+    )
 
 
 def cpp_header(functions: Sequence[Function]) -> str:
@@ -119,11 +126,14 @@ def cpp_header(functions: Sequence[Function]) -> str:
     helpers = _cpp_helpers()
     # Headers of several versions may meet in one program: each finds the helpers that it was written with.
     space = f"detail_{_digest(helpers)[:8]}"
-    bodies = [_function(each, each.any_type(), _cpp(space), "template <class Real>\ninline int") for each in functions]
+    bodies = [
+        _function(each, each.any_type(), _cpp(space), "template <class Real>\nARMWRIGHT_TEMPLATE int")
+        for each in functions
+    ]
     guard = f"ARMWRIGHT_{space.upper()}"
     start = f"#ifndef {guard}\n#define {guard}\nnamespace armwright {{\nnamespace {space} {{\n"
     includes = "#include <cmath>\n#include <cstdint>\n#include <cstring>\n#include <limits>\n\n"
-    helpers = f"{includes}{start}{helpers}}}\n}}\n#endif\n"
+    helpers = f"{_of_gcc('ARMWRIGHT_TEMPLATE', 'inline')}{includes}{start}{helpers}}}\n}}\n#endif\n"
     return _guarded(_comment(_CPP_RULES, "Real"), helpers, ["namespace armwright {\n", *bodies, "}\n"])
 
 
@@ -163,16 +173,26 @@ def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> lis
     # What makes a configuration valid comes first: at the end it would keep all inputs in registers until then.
     first = reachable(code.graph, [x for x in (code.invalid, code.unusual) if x is not None])
     order = [*first, *sorted(set(code.order).difference(first))]
-    names, lines = _Writer(dialect).operations(code.graph, order, places.__getitem__, "v")
+    results: dict[int, list[tuple[Argument, int]]] = {}
+    for place, result in zip([(x, i) for x in function.outputs for i in range(x.width)], code.outputs, strict=True):
+        results.setdefault(result, []).append(place)
+
+    def written(node: int, name: str) -> list[str]:
+        """Write the outputs that a node is."""
+        return [f"{x.name}[{i}] = {'(unsigned char)' * x.flag}{name};" for x, i in results.pop(node, [])]
+
+    if dialect.in_parallel and not code.graph.loops:
+        order = scheduled(code.graph, order)
+        names, lines = _Writer(dialect).operations(code.graph, order, places.__getitem__, "v", written)
+    else:
+        names, lines = _Writer(dialect).operations(code.graph, order, places.__getitem__, "v")
     read = {
         places[int(code.graph.nodes[i].value)].partition("[")[0] for i in order if code.graph.nodes[i].op == "input"
     }
     # Inputs on which nothing depends.
     lines[:0] = [f"(void){x.name};" for x in function.inputs if x.name not in read]
-    targets = [(x, i) for x in function.outputs for i in range(x.width)]
-    for (x, i), result in zip(targets, code.outputs, strict=True):
-        value = f"(unsigned char){names[result]}" if x.flag else names[result]
-        lines.append(f"{x.name}[{i}] = {value};")
+    for result in list(results):
+        lines += written(result, names[result])
     status = "0"
     for condition, bit in ((code.unusual, UNUSUAL), (code.invalid, MEANINGLESS)):
         if condition is not None:
@@ -187,7 +207,12 @@ class _Writer:
         self._dialect, self._loops = dialect, 0
 
     def operations(
-        self, graph: Graph, order: Sequence[int], read: Callable[[int], str], prefix: str
+        self,
+        graph: Graph,
+        order: Sequence[int],
+        read: Callable[[int], str],
+        prefix: str,
+        behind: Callable[[int, str], Sequence[str]] = lambda _node, _name: (),
     ) -> tuple[dict[int, str], list[str]]:
         """Write operations.
 
@@ -196,6 +221,7 @@ class _Writer:
             order: its nodes in use.
             read: returns where an input is read, by its number.
             prefix: of the names of the results.
+            behind: gives the statements behind that of an operation, by its node and the name of its result.
 
         Returns:
             The names of the results by node, and the statements.
@@ -223,6 +249,8 @@ class _Writer:
                     expression = {**_OPERATORS, **dialect.calls}[op].format(*(names[j] for j in operands))
                 names[i] = f"{prefix}{i}"
                 lines.append(f"const {dialect.truth if op in TRUTHS else dialect.real} {names[i]} = {expression};")
+                if op != "input":
+                    lines += behind(i, names[i])
         return names, lines
 
     def _loop(self, loop: Loop, operands: Sequence[str]) -> tuple[str, list[str]]:
@@ -338,7 +366,7 @@ _LARGEST = {
 _C_RULES = """\
 A multiplication and an addition are one instruction, rounded once, where the processor has one (ARMWRIGHT_FMA).
 Results have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, which
--std=c99 implies for gcc, and no -ffast-math."""
+-std=c99 implies for gcc, and no -ffast-math. Functions are not inlined by gcc, which would join some all the same."""
 _CPP_RULES = """\
 A multiplication and an addition are one instruction, rounded once, where the processor has one. Results in double
 have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, and no -ffast-math.
@@ -436,7 +464,9 @@ _FLOAT = _Dialect(
         "round": "rintf({0})",
     },
 )
-_CUDA = _DOUBLE._replace(calls={**_OF_MATH, "fma": "fma({0}, {1}, {2})", "bit": "armwright_bit({0}, {1})"})
+_CUDA = _DOUBLE._replace(
+    in_parallel=False, calls={**_OF_MATH, "fma": "fma({0}, {1}, {2})", "bit": "armwright_bit({0}, {1})"}
+)
 
 
 def _cpp(space: str) -> _Dialect:
@@ -452,6 +482,25 @@ def _has_fma(letter: str, of_arm: int) -> str:
     """Return when a processor multiplies and adds in one instruction; not every compiler defines what C99 asks for."""
     of_processor = f"defined __ARM_FEATURE_FMA && defined __ARM_FP && (__ARM_FP & {of_arm})"
     return f"#if defined FP_FAST_FMA{letter} || defined __FMA__ || ({of_processor})"
+
+
+def _of_gcc(name: str, kind: str, kind_of_gcc: str = "", attributes: str = "") -> str:
+    """Return the definition of what stands before a function.
+
+    gcc joins the multiplications and additions of neighbours when it makes vectors of them, -ffp-contract=off or not:
+    for a function of its own that can be forbidden.
+    """
+    forbidden = f'__attribute__(({attributes}noinline, optimize("no-tree-slp-vectorize")))'
+    return f"""\
+#ifndef {name}
+#if defined __GNUC__ && !defined __clang__
+#define {name} {f"{kind_of_gcc} {forbidden}".strip()}
+#else
+#define {name} {kind}
+#endif
+#endif
+
+"""
 
 
 _BIT = """\

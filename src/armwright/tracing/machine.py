@@ -134,6 +134,46 @@ def with_results(
     return list(zip(order, complete, strict=True))
 
 
+# A processor for which operations are put in order: how many of either kind it begins at a time, when the results of
+# them and of all others are known, and among how many it chooses.
+_AT_A_TIME, _LATENCY, _OTHERS, _CHOICE = 2, 4, 1, 100
+_MULTIPLY = frozenset({"multiply", "fma"})
+_AT_ONCE = frozenset({"constant", "limit", "input"})
+
+
+def scheduled(graph: Graph, order: Sequence[int]) -> list[int]:
+    """Return nodes in an order in which a processor that begins several at a time need not wait for results.
+
+    Operations of one sum or one sweep wait for each other; others stand between them then. The order given is kept as
+    far as that allows, so that not many more values live at a time.
+
+    Args:
+        graph: their graph.
+        order: nodes, each behind its operands; no loops.
+    """
+    nodes = graph.nodes
+    result = [i for i in order if nodes[i].op in _AT_ONCE]
+    known: dict[int, int] = dict.fromkeys(result, 0)
+    waiting = [i for i in order if i not in known]
+    time = 0
+    while waiting:
+        free = {True: _AT_A_TIME, False: _AT_A_TIME}
+        begun = set()
+        for i in waiting[:_CHOICE]:
+            op, operands, _ = nodes[i]
+            kind = op in _MULTIPLY
+            if free[kind] and all(known.get(k, time + 1) <= time for k in operands):
+                begun.add(i)
+                if kind or op in _SUMS:
+                    free[kind] -= 1
+                known[i] = time + (_LATENCY if kind or op in _SUMS else _OTHERS)
+                result.append(i)
+        if begun:
+            waiting = [*(i for i in waiting[:_CHOICE] if i not in begun), *waiting[_CHOICE:]]
+        time += 1
+    return result
+
+
 def _product(graph: Graph, number: int | None) -> tuple[int, Node] | None:
     return None if number is None else (number, graph.nodes[number])
 
