@@ -16,6 +16,7 @@ Source:
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import overload
 
 from armwright.tracing.graph import Graph, Traced, operation_count, reachable
 from armwright.tracing.scalar import Scalar
@@ -38,16 +39,33 @@ def jacobian(outputs: Sequence[Scalar], inputs: Sequence[Traced]) -> Matrix:
     graph = inputs[0].graph
     ends = [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in outputs]
     starts = [x.node for x in inputs]
-    modes = [forward_mode(graph, ends, starts)]
+    rows = None
     if not _may_divide_by_zero(graph, ends):
-        modes.append(reverse_mode(graph, ends, starts))
-    rows = min(modes, key=lambda rows: _count(graph, rows))
+        rows = reverse_mode(graph, ends, starts)
+        count = _count(graph, rows)
+        other = forward_mode(graph, ends, starts, max_new=count)
+        if other is not None and _count(graph, other) <= count:
+            rows = other
+    rows = rows or forward_mode(graph, ends, starts)
     return [[Traced(graph, node) for node in row] for row in rows]
 
 
-def forward_mode(graph: Graph, outputs: Sequence[int], inputs: Sequence[int]) -> Rows:
-    """Return the nodes of the derivatives of outputs by inputs, one sweep per input."""
-    order = reachable(graph, outputs)
+@overload
+def forward_mode(graph: Graph, outputs: Sequence[int], inputs: Sequence[int]) -> Rows: ...
+
+
+@overload
+def forward_mode(graph: Graph, outputs: Sequence[int], inputs: Sequence[int], max_new: int) -> Rows | None: ...
+
+
+def forward_mode(
+    graph: Graph, outputs: Sequence[int], inputs: Sequence[int], max_new: int | None = None
+) -> Rows | None:
+    """Return the nodes of the derivatives of outputs by inputs, one sweep per input.
+
+    None where that takes more than ``max_new`` new nodes: to go on is a waste of time then.
+    """
+    order, first = reachable(graph, outputs), len(graph.nodes)
     zero = graph.constant(0.0)
     columns = []
     for x in inputs:
@@ -56,6 +74,8 @@ def forward_mode(graph: Graph, outputs: Sequence[int], inputs: Sequence[int]) ->
             if i != x and (tangent := _tangent(graph, i, tangents)) is not None:
                 tangents[i] = tangent
         columns.append([tangents.get(i, zero) for i in outputs])
+        if max_new is not None and len(graph.nodes) - first > max_new:
+            return None
     return [list(row) for row in zip(*columns, strict=True)]
 
 

@@ -116,13 +116,15 @@ def with_results(
     Returns:
         Of each node its number, and the numbers of the groups of which it is the last.
     """
-    needed = set(reachable(code.graph, code.outputs))
-    place: dict[int, int] = {i: i for i in needed}
-    if in_turn:
-        for k, nodes in reversed(list(enumerate(groups))):
-            place.update(dict.fromkeys(reachable(code.graph, nodes), k))
+    place: dict[int, int] = {i: i for i in reachable(code.graph, code.outputs)} if not in_turn else {}
+    for k, nodes in enumerate(groups if in_turn else ()):
+        waiting = list(nodes)
+        while waiting:
+            if (i := waiting.pop()) not in place:
+                place[i] = k
+                waiting.extend(code.graph.nodes[i].operands)
     for i in code.order:
-        if i not in needed:
+        if i not in place:
             place[i] = max((place[k] for k in code.graph.nodes[i].operands), default=0)
     order = sorted(code.order, key=lambda i: (place[i], i))
     found = {node: k for k, node in enumerate(order)}
