@@ -22,10 +22,10 @@ os.register_at_fork(before=_LOADING.acquire, after_in_parent=_LOADING.release, a
 # What is stored begins with this, and the object of the compiler follows.
 _SIGNATURE = b"object of LLVM\n"
 
-# The operations of longer IR, in lines, stay in its order: the one that LLVM finds keeps ever more values at a time,
-# which makes the derivatives of seven joints a tenth slower. With less effort they are a hundredth slower, but done in
-# half the time.
-_LONG = 5000
+# The operations of longer IR, in lines, stay in its order, and are compiled with less effort: the order that LLVM finds
+# keeps ever more values at a time, which makes derivatives up to two fifths slower, and takes twice as long to find.
+# Where more than this part are divisions and roots, as in closed-form inverse kinematics, it is better.
+_LONG, _MANY_QUOTIENTS = 2500, 0.005
 
 
 class Processor(NamedTuple):
@@ -84,7 +84,8 @@ def _compile(ir: str) -> bytes:
 
     module = llvm.parse_assembly(ir)
     module.verify()
-    if ir.count("\n") <= _LONG:
+    lines, quotients = ir.count("\n"), ir.count(" fdiv ") + ir.count("@llvm.sqrt")
+    if lines <= _LONG or quotients > _MANY_QUOTIENTS * lines:
         return bytes(_machine().emit_object(module))
     # The setting is that of the process, where Numba compiles, too.
     llvm.set_option("armwright", "-enable-misched=false")
