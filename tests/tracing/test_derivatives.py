@@ -1,5 +1,6 @@
 """Derivatives of traced equations, by both modes."""
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -185,3 +186,22 @@ def test_evaluated_with_arrays(rng: np.random.Generator) -> None:
         np.testing.assert_allclose([np.broadcast_to(x, (3, 2))[at] for x in found], expected, rtol=0, atol=ROUNDING)
         alone = evaluate(graph, outputs, arrays[:, *at].tolist())
         np.testing.assert_allclose(np.array(alone, dtype=float), expected, rtol=0, atol=ROUNDING)
+
+
+def test_modes_give_up() -> None:
+    """Forward mode stops where it takes more than it may; the mode with fewer operations is the one that is kept."""
+    inputs = Graph().inputs(12)
+    graph = inputs[0].graph
+    total = sum((sin(x) * cos(y) for x, y in itertools.pairwise(inputs)), start=inputs[0])
+    starts = [x.node for x in inputs]
+
+    assert forward_mode(graph, [total.node], starts, 5) is None
+    assert forward_mode(graph, [total.node], starts, 10_000) == forward_mode(graph, [total.node], starts)
+
+    (x,) = Graph().inputs(1)
+    powers = [x]
+    for _ in range(20):
+        powers.append(powers[-1] * x)
+    rows = [row[0].node for row in jacobian(powers, [x])]
+    of_forward = [row[0] for row in forward_mode(x.graph, [y.node for y in powers], [x.node])]
+    assert rows == of_forward
