@@ -154,9 +154,7 @@ def emit(
     translate = partial(_translated, equation, input_shapes, known, tuple(flags), bounds or {}, max_straight)
     if not origin:
         translation, outputs = translate()
-        return Emitted(
-            title=title, inputs=input_shapes, outputs=outputs, flags=tuple(flags), trace=lambda: translation
-        )
+        return Emitted(title=title, inputs=input_shapes, outputs=outputs, flags=tuple(flags), trace=lambda: translation)
     return Emitted(
         title=title,
         inputs=input_shapes,
