@@ -151,7 +151,15 @@ def emit(
             raise InvalidValueError(f"inputs: expected names such as 'qd', got {shown(name)}")
     input_shapes = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}
     known = None if shapes is None else tuple(shapes)
-    translate = partial(_translated, equation, input_shapes, known, tuple(flags), bounds or {}, max_straight)
+    translate = partial(
+        _translated,
+        equation,
+        input_shapes,
+        outputs=known,
+        flags=tuple(flags),
+        bounds=bounds or {},
+        max_straight=max_straight,
+    )
     if not origin:
         translation, outputs = translate()
         return Emitted(title=title, inputs=input_shapes, outputs=outputs, flags=tuple(flags), trace=lambda: translation)
@@ -175,6 +183,7 @@ def _vectors(equation: Equation, shapes: Mapping[str, Shape]) -> tuple[Shape, ..
 def _translated(
     equation: Equation,
     shapes: Mapping[str, Shape],
+    *,
     outputs: tuple[Shape, ...] | None,
     flags: tuple[int, ...],
     bounds: Mapping[str, Sequence[float]],

@@ -59,26 +59,33 @@ def linked(code: bytes, name: str) -> bytes | None:
     if machine != _X86_64:
         return None
     sections = [_Section(*_SECTION.unpack_from(code, table + _SECTION.size * i)) for i in range(count)]
+    kept = {i: x for i, x in enumerate(sections) if x.flags & _ALLOCATED and x.size}
+    if any(x.flags & _WRITABLE or x.kind == _BLANK for x in kept.values()):
+        return None
     image, starts = bytearray(), dict[int, int]()
-    for i, section in enumerate(sections):
-        if section.flags & _ALLOCATED and section.size:
-            if section.flags & _WRITABLE or section.kind == _BLANK:
-                return None
-            if section.kind == _CONTENT:  # other kinds are for debuggers
-                image += bytes(-len(image) % max(section.alignment, 1))
-                starts[i] = len(image)
-                image += section.of(code)
+    for i, section in kept.items():
+        if section.kind == _CONTENT:  # other kinds are for debuggers
+            image += bytes(-len(image) % max(section.alignment, 1))
+            starts[i] = len(image)
+            image += section.of(code)
+    entry = _offset_of(name, code, sections, starts)
+    if entry is None or not _filled_in(image, code, sections, starts):
+        return None
+    return _START.pack(entry) + bytes(image)
+
+
+def _filled_in(image: bytearray, code: bytes, sections: list[_Section], starts: dict[int, int]) -> bool:
+    """Fill in the distances between the parts of an image; return whether these are all that it refers to."""
     for section in sections:
         if section.kind == _RELOCATIONS and section.target in starts:
             symbols = list(_SYMBOL.iter_unpack(sections[section.link].of(code)))
             for offset, info, addend in _RELOCATION.iter_unpack(section.of(code)):
                 _, _, _, home, value, _ = symbols[info >> 32]
                 if info & 0xFFFFFFFF not in _DISTANCES or home not in starts:
-                    return None
+                    return False
                 at = starts[section.target] + offset
                 struct.pack_into("<i", image, at, starts[home] + value + addend - at)
-    entry = _offset_of(name, code, sections, starts)
-    return None if entry is None else _START.pack(entry) + bytes(image)
+    return True
 
 
 def _offset_of(name: str, code: bytes, sections: list[_Section], starts: dict[int, int]) -> int | None:
