@@ -190,8 +190,8 @@ def test_poison_is_not_loaded(tmp_path: Path, stored: Path, start: Callable[...,
 
 
 def test_files_may_not_grow(tmp_path: Path, start: Callable[..., str]) -> None:
-    """Where files may not grow, as with ulimit -f 1, the kernel is compiled for the process alone, and kept later."""
-    assert start(tmp_path, file_size=1024) == "0"
+    """Where files may not grow, as with ulimit -f, the kernel is compiled for the process alone, and kept later."""
+    assert start(tmp_path, file_size=128) == "0"
     assert entries(tmp_path) == []
     assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
 

@@ -377,7 +377,7 @@ x = np.arange(20_000.0)[:, None]
 double(x, threads=4)
 ready, done = threading.Event(), threading.Event()
 def compile_slowly():
-    with native._LOADING:
+    with native._COMPILING:
         ready.set()
         done.wait(0.2)
 threading.Thread(target=compile_slowly).start()

@@ -69,6 +69,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
+    from armwright.compiled.arm import compile_arm
     from armwright.motion.certificate import slower
     from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
     from armwright.motion.move_assessment import MoveAssessment
@@ -86,19 +87,20 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     deviation = within(0.1 if deviation_mm is None else deviation_mm, _DEVIATION_MM, "--deviation-mm") * 1e-3
     warn_of_stray(poses)
     model, file = load_arm(arm), read_poses(poses)
+    fast = compile_arm(model)
     start = None if near is None else joint_values(model, near, "--near")
     timed: dict[str, Any] = {"times": file.times, "blend": file.blend, "near": start, "ends": ends}
     if kind == "joint":
-        planned = joint_move(model, file.poses, **timed)
+        planned = joint_move(fast, file.poses, **timed)
     else:
         with _detour_hint(poses, around):
             if around is None:
                 axis = orientation or "geodesic"
-                planned = cartesian_move(model, file.poses, **timed, orientation=axis, deviation=deviation)
+                planned = cartesian_move(fast, file.poses, **timed, orientation=axis, deviation=deviation)
             else:
-                planned = stopping_move(model, file.poses, method=around, near=start, deviation=deviation)
+                planned = stopping_move(fast, file.poses, method=around, near=start, deviation=deviation)
     notes = list(file.notes)
-    factor, reason = slowing_for_limits(planned.arm, planned.trajectory)
+    factor, reason = slowing_for_limits(fast, planned.trajectory)
     if reason is not None and factor > 1 + ROUNDING:
         slowing = slower(planned.arm, factor, reason)
         notes.append(

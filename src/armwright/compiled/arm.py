@@ -8,7 +8,7 @@ from __future__ import annotations  # what help shows keeps the names of array t
 import os
 from collections import OrderedDict
 from collections.abc import Callable
-from functools import wraps
+from functools import cached_property, wraps
 from threading import RLock
 from typing import Any, TypeVar, cast
 
@@ -62,7 +62,7 @@ def _bits(value: object) -> object:
     if isinstance(value, tuple):
         return tuple(map(_bits, value))
     if attrs.has(kind := type(value)):
-        return tuple(_bits(getattr(value, field.name)) for field in attrs.fields(kind))
+        return kind.__qualname__, *(_bits(getattr(value, field.name)) for field in attrs.fields(kind))
     return value.hex() if isinstance(value, float) else value
 
 
@@ -107,6 +107,7 @@ class CompiledArm:
     """
 
     arm: Arm
+    _kernels: dict[str, Kernel] = attrs.field(factory=dict, init=False, eq=False, repr=False)
 
     @_kernel_method
     def forward(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
@@ -498,7 +499,13 @@ class CompiledArm:
             UnknownNameError: no such function.
             UnsupportedArmError: the arm has no such function.
         """
-        return quantity_kernel(self.arm, quantity)
+        if quantity not in self._kernels:
+            self._kernels[quantity] = quantity_kernel(self.arm, quantity, self._origin)
+        return self._kernels[quantity]
+
+    @cached_property
+    def _origin(self) -> str:
+        return repr(_bits(self.arm))
 
     def __reduce__(self) -> tuple[Callable[[Arm], CompiledArm], tuple[Arm]]:
         """Let another process compile for itself: it finds the kernels on disk."""

@@ -37,13 +37,14 @@ Inputs = Sequence[Traced]
 Rows = list[list[Scalar]]
 
 
-def emit_quantity(arm: Arm, name: str, *, loops: bool | None = None) -> Emitted:
+def emit_quantity(arm: Arm, name: str, *, loops: bool | None = None, origin: str = "") -> Emitted:
     """Return the code of a quantity's kernel and its operation count.
 
     Args:
         arm: the arm.
         name: of a quantity of ``CompiledArm``.
         loops: whether loops over the links stay loops, where the equation has them; None for long code only.
+        origin: all that the arm is: see ``tracing.emit``.
 
     Raises:
         UnknownNameError: no such quantity.
@@ -54,6 +55,8 @@ def emit_quantity(arm: Arm, name: str, *, loops: bool | None = None) -> Emitted:
     quantity = _QUANTITIES[name]
     if name not in _GEOMETRY:
         weighed(arm)
+    if name == "inverse_branches":
+        closed_form_geometry(arm)
     outputs = [tuple(_size(arm, x) for x in shape) for shape in quantity.outputs]
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
     max_straight = quantity.max_straight
@@ -69,21 +72,23 @@ def emit_quantity(arm: Arm, name: str, *, loops: bool | None = None) -> Emitted:
         flags=quantity.flags,
         bounds=bounds,
         max_straight=max_straight,
+        origin=origin and f"{__name__} {name} {loops} {origin}",
     )
 
 
-def quantity_kernel(arm: Arm, name: str) -> Kernel:
+def quantity_kernel(arm: Arm, name: str, origin: str = "") -> Kernel:
     """Return the kernel of a quantity, with the errors and the warnings of the plain function; compiled when called.
 
     Args:
         arm: the arm.
         name: of a quantity of ``CompiledArm``.
+        origin: all that the arm is: see ``tracing.emit``.
 
     Raises:
         UnknownNameError: no such quantity.
         UnsupportedArmError: the arm has no such quantity.
     """
-    emitted = emit_quantity(arm, name)
+    emitted = emit_quantity(arm, name, origin=origin)
     plain, remark = _QUANTITIES[name].plain, partial(_ask_for_degrees, arm, emitted.inputs)
     return Kernel(emitted=emitted, raise_for_invalid=plain and partial(plain, arm), remark=remark)
 

@@ -106,6 +106,8 @@ class Store:
         while time.monotonic() < deadline:
             with contextlib.suppress(BlockingIOError):
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # A process that was forked meanwhile has the file open as well, and would keep the lock.
+                stack.callback(fcntl.flock, handle, fcntl.LOCK_UN)
                 return
             time.sleep(_LOCK_POLL)
 

@@ -66,5 +66,12 @@ def by_kernels(equation: RowEquation, of_joints: Sequence[Array], of_rows: Seque
 def _kernel(equation: RowEquation, *widths: int) -> Callable[..., Any]:
     """Return the kernel of an equation for inputs of so many scalars."""
     name = equation.__name__.strip("_")
-    emitted = emit(name, equation, {f"x{i}": width for i, width in enumerate(widths)})
+    inputs = {f"x{i}": width for i, width in enumerate(widths)}
+    emitted = emit(name, equation, inputs, origin=_origin(equation, widths))
     return Kernel(emitted=emitted).function(name)
+
+
+def _origin(equation: RowEquation, widths: Sequence[int]) -> str:
+    """Name an equation for other processes; empty for one that is not a function of a module of armwright."""
+    module, name = equation.__module__, equation.__qualname__
+    return f"{module} {name} {widths}" if name.isidentifier() and module.startswith(f"{__package__}.") else ""

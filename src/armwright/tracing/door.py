@@ -32,6 +32,8 @@ _READABLE, _WRITABLE = 0x101, 0x501
 _METH_FASTCALL, _METH_KEYWORDS = 0x80, 0x02
 # From so many rows on other threads of Python may run meanwhile.
 _ROWS_TO_LET_GO = 256
+# From so many rows a call on one thread goes to the function in Python, which hears signals meanwhile.
+_ROWS_ALONE = 65536
 
 # What a function needs to know, by the places in its table; the arrays follow, inputs first.
 _FIELDS = (
@@ -118,7 +120,8 @@ class Door:
         for shape, kind in zip(shapes, kinds, strict=True):
             lengths = [*shape, *[0] * (_AXES_MAX - len(shape))]
             words += [len(shape), *lengths, math.prod(shape) * kind.itemsize, id(kind), id(shape)]
-        address = function_address(_ir(len(self._inputs), len(self._outputs)), "call")
+        numbers = len(self._inputs), len(self._outputs)
+        address = function_address(lambda: _ir(*numbers), "call", f"{__name__} {numbers}")
         texts = name.encode(), doc.encode()
         definition = [_address_of(texts[0]), address, _METH_FASTCALL | _METH_KEYWORDS, _address_of(texts[1])]
         table = _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())
@@ -306,8 +309,9 @@ def _case(text: _Text, objects: Sequence[str], axes: Sequence[str], ins: range, 
     if many:
         text.unless(text.equal(axes[0], text.let(f"add i64 {text.of(0, 'axes')}, 1"), "i64"), "careful")
         text.do("%rows = load i64, ptr " + text.load("ptr", objects[0], _LENGTHS))
-        few = text.let(f"icmp ult i64 %rows, {text.known('few', 'i64')}")
-        text.unless(text.let(f"or i1 %alone, {few}"), "careful")
+        # The function in Python hears signals between parts of many rows.
+        most = text.let(f"select i1 %alone, i64 {_ROWS_ALONE}, i64 {text.known('few', 'i64')}")
+        text.unless(text.let(f"icmp ult i64 %rows, {most}"), "careful")
     for k, x in zip(ins, objects, strict=True):
         text.unless(text.all(_fits(text, x, k, many, axes[k])), "careful")
         text.do(f"store ptr {text.load('ptr', x, _DATA)}, ptr {text.at('%arrays', 8 * k)}")
@@ -329,6 +333,12 @@ def _case(text: _Text, objects: Sequence[str], axes: Sequence[str], ins: range, 
         text.do(f"ret ptr {fresh[0]}")
     else:
         answer = text.call("ptr", text.known("PyTuple_New"), f"i64 {len(fresh)}")
+        text.do(f"br i1 {text.equal(answer, 'null')}, label %{case}_missing, label %{case}_tuple")
+        text.do(f"{case}_missing:")
+        for x in fresh:
+            text.do(f"call void {text.known('Py_DecRef')}(ptr {x})")
+        text.do("ret ptr null")
+        text.do(f"{case}_tuple:")
         for i, x in enumerate(fresh):
             text.call("i32", text.known("PyTuple_SetItem"), f"ptr {answer}", f"i64 {i}", f"ptr {x}")
         text.do(f"ret ptr {answer}")

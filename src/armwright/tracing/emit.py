@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from keyword import iskeyword
 from typing import NamedTuple, TypeAlias
 
 import attrs
+import numpy as np
 
-from armwright.errors import InvalidValueError, shown
+from armwright.errors import InvalidValueError, ShapeError, shown
 from armwright.tracing.emit_llvm import Column, Target, lanes_ir, rows_ir, single_ir
 from armwright.tracing.graph import Graph, TooManyNodesError, Traced, operation_count, turned
 from armwright.tracing.machine import MachineCode, Watched, machine_code
@@ -36,7 +37,16 @@ class Guarded(NamedTuple):
 Equation: TypeAlias = Callable[..., Sequence[Sequence[Scalar]] | Guarded]
 
 
-@attrs.frozen(kw_only=True)
+class Translation(NamedTuple):
+    """What tracing an equation yields: see ``Emitted``."""
+
+    code: MachineCode
+    any_type: Callable[[], MachineCode]
+    angles: frozenset[str]
+    operations: dict[str, int]
+
+
+@attrs.frozen(kw_only=True, eq=False, slots=False)
 class Emitted:
     """The code of a kernel and what it takes.
 
@@ -47,23 +57,43 @@ class Emitted:
 
     Attributes:
         title: what it computes, in words.
-        code: the operations of the processor.
-        any_type: gives the operations for any type of numbers: see ``machine``.
         inputs: shape of one value of each input, by its name.
-        angles: the names of inputs that hold a number whose sine is taken.
         outputs: shape of one value of each output.
         flags: numbers of the outputs that are truth values.
-        operations: how many of each kind the equation takes, per configuration.
+        origin: what the code follows from; empty where that cannot be said. See ``native.function_address``.
+        trace: traces the equation, which is done when something of it is first needed.
     """
 
     title: str
-    code: MachineCode
-    any_type: Callable[[], MachineCode]
     inputs: dict[str, Shape]
-    angles: frozenset[str]
     outputs: tuple[Shape, ...]
     flags: tuple[int, ...]
-    operations: dict[str, int]
+    origin: str = ""
+    trace: Callable[[], Translation]
+
+    @cached_property
+    def _translation(self) -> Translation:
+        return self.trace()
+
+    @property
+    def code(self) -> MachineCode:
+        """The operations of the processor."""
+        return self._translation.code
+
+    @property
+    def any_type(self) -> Callable[[], MachineCode]:
+        """What gives the operations for any type of numbers: see ``machine``."""
+        return self._translation.any_type
+
+    @property
+    def angles(self) -> frozenset[str]:
+        """The names of inputs that hold a number whose sine is taken."""
+        return self._translation.angles
+
+    @property
+    def operations(self) -> dict[str, int]:
+        """How many operations of each kind the equation takes, per configuration."""
+        return self._translation.operations
 
     @property
     def joined(self) -> int:
@@ -92,8 +122,9 @@ def emit(
     flags: Collection[int] = (),
     bounds: Mapping[str, Sequence[float]] | None = None,
     max_straight: int | None = None,
+    origin: str = "",
 ) -> Emitted:
-    """Trace an equation and write its kernel.
+    """Trace an equation, and give the code of its kernel.
 
     Args:
         title: what it computes, in words; it stands beside the code, not in it.
@@ -105,10 +136,13 @@ def emit(
         bounds: by the name of an input, how far from 0 each of its numbers usually is; farther numbers are reported.
         max_straight: the number of nodes of the graph beyond which scans are loops of the code, and not written out;
             None if they never are.
+        origin: what the equation and all other arguments follow from, for equations of armwright itself: it is traced
+            only where no process has compiled the same before. Empty for other equations.
 
     Raises:
         InvalidValueError: there is no input, or the name of one is no identifier, as which a caller may write it, or
             that of an option of every kernel.
+        ShapeError: ``shapes`` do not fit what the equation returns.
     """
     if not inputs:
         raise InvalidValueError("inputs: expected at least one")
@@ -116,13 +150,57 @@ def emit(
         if name in _OPTIONS or not (name.isascii() and name.isidentifier()) or iskeyword(name):
             raise InvalidValueError(f"inputs: expected names such as 'qd', got {shown(name)}")
     input_shapes = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}
+    known = None if shapes is None else tuple(shapes)
+    translate = partial(
+        _translated,
+        equation,
+        input_shapes,
+        outputs=known,
+        flags=tuple(flags),
+        bounds=bounds or {},
+        max_straight=max_straight,
+    )
+    if not origin:
+        translation, outputs = translate()
+        return Emitted(title=title, inputs=input_shapes, outputs=outputs, flags=tuple(flags), trace=lambda: translation)
+    return Emitted(
+        title=title,
+        inputs=input_shapes,
+        outputs=_vectors(equation, input_shapes) if known is None else known,
+        flags=tuple(flags),
+        origin=origin,
+        trace=lambda: translate()[0],
+    )
+
+
+def _vectors(equation: Equation, shapes: Mapping[str, Shape]) -> tuple[Shape, ...]:
+    """Return the shapes of what an equation returns, by running it on arrays."""
+    with np.errstate(all="ignore"):
+        result = equation(*([np.ones(1)] * math.prod(shape) for shape in shapes.values()))
+    return tuple((len(row),) for row in (result.values if isinstance(result, Guarded) else result))
+
+
+def _translated(
+    equation: Equation,
+    shapes: Mapping[str, Shape],
+    *,
+    outputs: tuple[Shape, ...] | None,
+    flags: tuple[int, ...],
+    bounds: Mapping[str, Sequence[float]],
+    max_straight: int | None,
+) -> tuple[Translation, tuple[Shape, ...]]:
+    """Trace an equation; return the translation, and the shapes of the outputs."""
     try:
-        graph, scalars, (rows, positive) = _traced(Graph(max_nodes=max_straight), equation, input_shapes)
+        graph, scalars, (rows, positive) = _traced(Graph(max_nodes=max_straight), equation, shapes)
     except TooManyNodesError:
-        graph, scalars, (rows, positive) = _traced(Graph(rolls=True), equation, input_shapes)
-    outputs = [[graph.node(x) for x in row] for row in rows]
-    flat = [node for row in outputs for node in row]
-    are_flags = [i in flags for i, row in enumerate(outputs) for _ in row]
+        graph, scalars, (rows, positive) = _traced(Graph(rolls=True), equation, shapes)
+    widths = [len(row) for row in rows]
+    outputs = tuple((width,) for width in widths) if outputs is None else outputs
+    if [math.prod(shape) for shape in outputs] != widths:
+        raise ShapeError(f"shapes: expected values of {shown(widths)} numbers, as the equation returns, got {outputs}")
+    nodes_of_rows = [[graph.node(x) for x in row] for row in rows]
+    flat = [node for row in nodes_of_rows for node in row]
+    are_flags = [i in flags for i, row in enumerate(nodes_of_rows) for _ in row]
     of_angles = turned(graph)
     nodes = [x.node for row in scalars.values() for x in row]
     watched = Watched(
@@ -131,22 +209,19 @@ def emit(
         positive=[graph.node(x) for x in positive],
         bounds={
             x.node: float(bound)
-            for name, numbers in (bounds or {}).items()
+            for name, numbers in bounds.items()
             for x, bound in zip(scalars.get(name, ()), numbers, strict=False)
             if math.isfinite(bound)
         },
     )
     translate = partial(machine_code, graph, flat, watched, [i for i, flag in enumerate(are_flags) if flag])
-    return Emitted(
-        title=title,
+    translation = Translation(
         code=translate(),
         any_type=partial(translate, any_type=True),
-        inputs=input_shapes,
         angles=frozenset(name for name, row in scalars.items() if of_angles.intersection(x.node for x in row)),
-        outputs=tuple((len(row),) for row in outputs) if shapes is None else tuple(shapes),
-        flags=tuple(flags),
         operations=operation_count(graph, flat),
     )
+    return translation, outputs
 
 
 def _traced(

@@ -46,6 +46,29 @@ _DOUBLE, _LINE = 8, 64
 _LONG_ROW = 2048
 
 
+def _copy() -> str:
+    """Return a function that copies bytes, many at once as long as there are so many: code of ours calls no library."""
+    lines = ["define internal void @copy(ptr %to, ptr %from, i64 %size) nounwind {", "entry:", "  br label %by64"]
+    done, before = "0", "entry"
+    for size, then in ((64, "by8"), (8, "by1"), (1, "end")):
+        kind = f"<{size} x i8>" if size > 1 else "i8"
+        lines += [
+            f"by{size}:",
+            f"  %at{size} = phi i64 [{done}, %{before}], [%next{size}, %copy{size}]",
+            f"  %next{size} = add i64 %at{size}, {size}",
+            f"  %fits{size} = icmp ule i64 %next{size}, %size",
+            f"  br i1 %fits{size}, label %copy{size}, label %{then}",
+            f"copy{size}:",
+            f"  %from{size} = getelementptr i8, ptr %from, i64 %at{size}",
+            f"  %to{size} = getelementptr i8, ptr %to, i64 %at{size}",
+            f"  %x{size} = load {kind}, ptr %from{size}, align 1",
+            f"  store {kind} %x{size}, ptr %to{size}, align 1",
+            f"  br label %by{size}",
+        ]
+        done, before = f"%at{size}", f"by{size}"
+    return "\n".join([*lines, "end:", "  ret void", "}"])
+
+
 class Column(NamedTuple):
     """An array of a kernel: how many numbers a row has, and whether they are truth values, of one byte each."""
 
@@ -125,8 +148,8 @@ class _Text:
 
     def copy(self, to: str, source: str, size: str) -> None:
         """Write the copy of so many bytes."""
-        self.intrinsics.add("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
-        self.do(f"call void @llvm.memcpy.p0.p0.i64(ptr {to}, ptr {source}, i64 {size}, i1 false)")
+        self.intrinsics.add(_copy())
+        self.do(f"call void @copy(ptr {to}, ptr {source}, i64 {size})")
 
     def address(self, pointer: str, offset: str | int, kind: str = "double") -> str:
         """Return the address of an element of an array."""

@@ -101,9 +101,9 @@ class Kernel:
 
     def _address(self, part: Literal["single", "rows"]) -> int:
         """Return the address of a function, which is compiled when it is first asked for."""
-        target = processor().target
-        ir = self.emitted.single_ir(target) if part == "single" else self.emitted.rows_ir(target)
-        address = function_address(ir, part)
+        emitted = self.emitted
+        ir = emitted.single_ir if part == "single" else emitted.rows_ir
+        address = function_address(lambda: ir(processor().target), part, emitted.origin)
         self._door.connect(part, address)
         return address
 

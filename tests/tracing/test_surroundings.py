@@ -1,0 +1,116 @@
+"""What follows from the same is found again: by the sources, the arm and the processor, and never by less."""
+
+import os
+import shutil
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import attrs
+import pytest
+
+import armwright
+from armwright.arm.load import load_arm
+from armwright.compiled.arm import compile_arm
+from armwright.tracing import native, surroundings
+from armwright.tracing.emit import emit
+from armwright.tracing.image import CAN_BE_LINKED, linked, placed
+from armwright.tracing.kernel import Kernel
+
+ROOT = Path(armwright.__file__).parent
+_FORWARD = """
+import sys
+import numpy as np
+from armwright.arm.load import load_arm
+from armwright.compiled.arm import compile_arm
+from armwright.tracing import emit
+traced, trace = [], emit._traced
+emit._traced = lambda *given: traced.append(0) or trace(*given)
+X = compile_arm(load_arm("puma560")).forward(np.full((3, 6), 0.5))
+print(X.tobytes().hex(), len(traced), int("llvmlite" in sys.modules))
+"""
+
+
+def _run(sources: Path, cache: Path) -> list[str]:
+    environment = os.environ | {"PYTHONPATH": str(sources), "ARMWRIGHT_CACHE": str(cache)}
+    command = [sys.executable, "-B", "-c", _FORWARD]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+
+
+@pytest.mark.skipif(not CAN_BE_LINKED, reason="LLVM loads objects of other forms")
+def test_later_processes_need_no_compiler_until_a_source_changes(tmp_path: Path) -> None:
+    """The second process neither traces nor loads LLVM, and has the same bits; after a change of a source it traces."""
+    sources = shutil.copytree(ROOT, tmp_path / "src" / "armwright", ignore=shutil.ignore_patterns("__pycache__")).parent
+    first, second = (_run(sources, tmp_path / "cache") for _ in range(2))
+    with (sources / "armwright" / "kinematics" / "forward_kinematics.py").open("a", encoding="utf-8") as file:
+        file.write("# changed\n")
+    third = _run(sources, tmp_path / "cache")
+
+    assert first[1:] == ["1", "1"]
+    assert second[1:] == ["0", "0"]
+    assert third[1] == "1"
+    assert first[0] == second[0] == third[0]
+
+
+@pytest.mark.parametrize("name", ["tracing/graph.py", "kinematics/inverse_kinematics/branches.py", "arrays.py"])
+def test_every_source_counts(name: str, tmp_path: Path) -> None:
+    """The stamp of the sources changes with a file of any folder, though its length and its time remain."""
+    root = shutil.copytree(ROOT, tmp_path / "armwright", ignore=shutil.ignore_patterns("__pycache__"))
+    before, about = surroundings.stamp(root), (root / name).stat()
+    (root / name).write_bytes((root / name).read_bytes()[::-1])
+    os.utime(root / name, ns=(about.st_atime_ns, about.st_mtime_ns))
+
+    assert before
+    assert surroundings.stamp(root) != before
+
+
+def test_no_reference_after_the_sources_have_changed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A process whose sources were changed after its start leaves nothing that others would find by the new ones."""
+    monkeypatch.setenv("ARMWRIGHT_CACHE", str(tmp_path))
+    monkeypatch.setattr(native, "sources_are_unchanged", lambda: False)
+    emitted = emit("sum", lambda x: [[x[0] + 1.25]], {"x": 1}, shapes=[(1,)], origin="a sum")
+
+    assert Kernel(emitted=emitted)([2.0]) == 3.25
+    stored = [path.read_bytes() for path in (tmp_path / "compiled").iterdir()]
+    assert not any(native._REFERENCE in data for data in stored)
+
+
+def test_arms_that_differ_in_one_bit_have_other_origins() -> None:
+    """Any number of an arm counts, the sign of a zero too, and so do its names."""
+    arm = load_arm("puma560")
+    others = [
+        attrs.evolve(arm, tool_speed=arm.tool_speed * (1 + 1e-15)),
+        attrs.evolve(arm, title=f"{arm.title}."),
+        attrs.evolve(arm, joints=(attrs.evolve(arm.joints[0], d=-arm.joints[0].d), *arm.joints[1:])),
+    ]
+    origins = {compile_arm(one)._origin for one in (arm, *others)}
+
+    assert len(origins) == 4
+    assert compile_arm(attrs.evolve(arm))._origin in origins
+
+
+def test_objects_of_other_forms_are_left_to_llvm() -> None:
+    """What is no object of this processor, or refers to what is outside of it, has no image."""
+    assert linked(b"", "f") is None
+    assert linked(b"\xcf\xfa\xed\xfe" + bytes(200), "f") is None
+    assert linked(b"\x7fELF\x02\x01\x01" + bytes(9) + struct.pack("<HH", 1, 183) + bytes(100), "f") is None
+
+
+@pytest.mark.skipif(not CAN_BE_LINKED, reason="LLVM loads objects of other forms")
+def test_code_that_calls_a_library_is_left_to_llvm() -> None:
+    """An object that calls a function of the C library has no image; without that call it has one, which runs."""
+    calling = native._compile(
+        "declare double @sin(double)\ndefine double @f(double %x) { %y = call double @sin(double %x) ret double %y }"
+    )
+    alone = native._compile("define i64 @f(i64 %x) { ret i64 7 }")
+    image = linked(alone, "f")
+
+    assert linked(calling, "f") is None
+    assert linked(alone, "g") is None
+    assert image is not None
+    address, keeper = placed(image)
+    import ctypes
+
+    assert ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(1) == 7
+    assert keeper is not None
