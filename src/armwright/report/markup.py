@@ -111,8 +111,13 @@ def _array_rows(array: Array) -> list[object]:
         return [_round_significant(number, _DIGITS_OF_SCALARS) for number in array.tolist()]
     rows: list[object] = []
     last: list[object] | None = None
+    exact: list[float] | None = None
     for numbers in array.reshape(len(array), math.prod(array.shape[1:])).tolist():
+        # Numbers that are equal are equal when rounded, too.
+        if last is not None and numbers == exact:
+            rows.append(_REPEATED_ROW)
+            continue
         row: list[object] = [_round_significant(number, _DIGITS) for number in numbers]
         rows.append(_REPEATED_ROW if row == last else row)
-        last = row
+        last, exact = row, numbers
     return rows
