@@ -16,6 +16,7 @@ from armwright.motion.quintic_polynomials import PEAK_ACCELERATION, quintic
 from armwright.motion.straight import straight_line
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.motion.xspline_path import xspline
+from armwright.program.vm.recording import ToolWrenches, trajectory_efforts
 from armwright.spatial import pose
 from samples import Sample
 
@@ -233,3 +234,16 @@ def test_bad_input() -> None:
         slowing_for_efforts(PUMA, 3)  # type: ignore[arg-type]
     with pytest.raises(ShapeError, match="trajectory: expected one of 6 joints, as 'puma560-seed' has, got one of 1"):
         effort_peaks(PUMA, move)
+
+
+@pytest.mark.parametrize("rounding", [1e-16, -1e-16, 1e-13])
+def test_a_joint_that_stands_has_no_friction_of_motion(rounding: float) -> None:
+    """The sign of a speed that is rounding decides no effort: not of the motion, and not of its recording."""
+    start, end = np.zeros(6), np.array([0.0, 0.4, 0.0, 0.3, 0.0, 0.2])
+    still = quintic(start, end, 1.0)
+    noisy = quintic(start, end + np.array([1.0, 0.0, -1.0, 0.0, 1.0, 0.0]) * rounding, 1.0)
+
+    np.testing.assert_allclose(effort_peaks(PUMA, noisy).peaks, effort_peaks(PUMA, still).peaks, rtol=1e-9)
+    free = ToolWrenches(0.0, np.zeros((1, 6)))
+    recorded, expected = (trajectory_efforts(PUMA, each, 0.01, free) for each in (noisy, still))
+    np.testing.assert_allclose(recorded, expected, rtol=0, atol=1e-9)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from armwright.cell.simulator import Simulator
+from armwright.compiled.arm import compile_arm
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.through import through_frames
 from armwright.motion.trajectory import whole_ticks
@@ -65,7 +66,7 @@ def test_the_report_keeps_its_spline() -> None:
     (stage,) = run_code(code).stages
 
     arm, q = CELL.arms["ARM_1"].arm, CELL.arms["ARM_1"].start
-    report = through_frames(arm, q, _frames(), deviation=CELL.deviation)
+    report = through_frames(compile_arm(arm), q, _frames(), deviation=CELL.deviation)
     expected = whole_ticks(report.trajectory, CELL.period)
     np.testing.assert_array_equal(stage.stage.trajectory.coefficients, expected.coefficients)
     np.testing.assert_array_equal(stage.stage.trajectory.times, expected.times)

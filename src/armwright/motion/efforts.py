@@ -32,7 +32,7 @@ _INSIDE = 1e-8
 _HALVINGS = 16
 # From so many of the largest samples the peak is sought: so often, with so many samples, each time closer.
 _TOPS, _ZOOMS, _CLOSER = 6, 6, 9
-# A joint that moves at less than this part of its top speed stands: the sign of its speed is rounding.
+# A joint that moves at less than this part of the top speed of all stands: the sign of its speed is rounding.
 _STANDS = 1e-9
 # A limit passed by this part of it is rounding.
 _ROUNDING = 1e-9
@@ -224,8 +224,18 @@ def _states(trajectory: Trajectory, samples: _Samples) -> tuple[Array, Array, Ar
     q, qd, qdd = (evaluate(derivative(terms, order), local) for order in range(3))
     # No joint is faster than this, and few are many times slower.
     h = np.diff(trajectory.times)[:, None]
-    fastest = evaluate(np.abs(derivative(trajectory.coefficients, 1)), h).max(axis=0)
-    return q, np.where(np.abs(qd) > _STANDS * fastest, qd, 0.0), qdd
+    fastest = float(evaluate(np.abs(derivative(trajectory.coefficients, 1)), h).max())
+    return q, without_rounding(qd, fastest), qdd
+
+
+def without_rounding(qd: Array, fastest: float) -> Array:
+    """Return the velocities of joints, 0 of those that stand: dry friction would take the sign of their rounding.
+
+    Args:
+        qd: (..., n) velocities.
+        fastest: the top speed of the motion.
+    """
+    return np.where(np.abs(qd) > _STANDS * fastest, qd, 0.0)
 
 
 def _efforts(solver: Solver, trajectory: Trajectory, samples: _Samples) -> Array:

@@ -12,6 +12,7 @@ from armwright.arrays import Array
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell, CellArm
 from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.motion.efforts import without_rounding
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
@@ -301,10 +302,12 @@ def trajectory_efforts(
 
 def _efforts(arm: Arm, states: tuple[Array, Array, Array], wrench: Array) -> Array:
     """Return the efforts (k, n) of positions, speeds and accelerations (k, n), with wrenches (k, 6) on the tool."""
-    tau = np.empty_like(states[0])
+    q, qd, qdd = states
+    qd = without_rounding(qd, float(np.abs(qd).max(initial=0.0)))
+    tau = np.empty_like(q)
     for rows in _chunks(len(tau)):
-        q, qd, qdd = (each[rows] for each in states)
-        tau[rows] = inverse_dynamics(arm, q, qd, qdd, wrench=wrench[rows] if wrench[rows].any() else None)
+        push = wrench[rows] if wrench[rows].any() else None
+        tau[rows] = inverse_dynamics(arm, q[rows], qd[rows], qdd[rows], wrench=push)
     return tau
 
 
