@@ -72,7 +72,7 @@ class _Piece(NamedTuple):
 
     output: Argument
     first: int
-    count: int
+    length: int
 
 
 def cuda_source(functions: Sequence[Function]) -> str:
@@ -102,7 +102,7 @@ def _body(function: Function) -> Iterator[str]:
     code, widths = function.code, [_odd(x.width) for x in function.inputs]
     staged = sum(widths) <= _TILE
     pieces = list(_pieces(function.outputs))
-    size = max([sum(widths) if staged else 1, *(_odd(piece.count) for piece in pieces)])
+    size = max([sum(widths) if staged else 1, *(_odd(piece.length) for piece in pieces)])
     yield f"__shared__ double tile[{BLOCK * size}];"
     yield f"const long long first = (long long)blockIdx.x * {BLOCK};"
     yield f"const int count = rows - first < {BLOCK} ? (int)(rows - first) : {BLOCK};"
@@ -123,7 +123,7 @@ def _body(function: Function) -> Iterator[str]:
     ends = [x for x in (code.invalid, code.unusual) if x is not None]
     for piece in [None, *pieces]:
         if piece is not None:
-            ends = [next(results) for _ in range(piece.count)]
+            ends = [next(results) for _ in range(piece.length)]
         # What makes a configuration valid comes first: at the end it would keep all inputs in registers until then.
         order = [i for i in reachable(code.graph, ends) if i not in names]
         names, lines = writer.operations(code.graph, order, places.__getitem__, "v", names)
