@@ -103,7 +103,7 @@ def test_bits_of_the_processor(name: str, kind: str, tmp_path: Path, sample: Sam
     sample.record(f"rows of all quantities with the processor's bits, {name}, {kind}", rows, 0)
 
 
-@pytest.mark.parametrize("name", [name for name in LANGUAGES if name != FOR_DEVICE])
+@pytest.mark.parametrize("name", LANGUAGES)
 @pytest.mark.drawn(0.2)
 def test_loops_of_long_arms(name: str, tmp_path: Path, sample: Sample) -> None:
     """Loops over the links of a long arm stay loops, with the bits of the processor, and no text gets much longer."""
@@ -313,6 +313,13 @@ def test_registers_of_a_device(name: str) -> None:
     assert "0 bytes stack frame, 0 bytes spill stores, 0 bytes spill loads" in log
     (registers,) = re.findall(r"Used (\d+) registers", log)
     assert int(registers) <= 128
+
+
+def test_long_arms_of_a_device(rng: np.random.Generator) -> None:
+    """Inverse dynamics of a long arm stays a loop on a device: nothing is spilled."""
+    log = compiled_for_device(source_text(random_arm(rng, 20), ["inverse_dynamics"], "cuda"))
+
+    assert "0 bytes spill stores, 0 bytes spill loads" in log
 
 
 @pytest.mark.drawn(0.1)

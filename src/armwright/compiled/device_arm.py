@@ -103,8 +103,8 @@ class DeviceKernel:
             pointers = [int(buffer.handle) for buffer in buffers]
             for start in range(0, rows, part):
                 end = min(start + part, rows)
-                for x, buffer in zip(inputs, buffers, strict=False):
-                    self._device.upload(buffer, x[start:end])
+                for x, pointer in zip(inputs, pointers, strict=False):
+                    self._device.upload(pointer, x[start:end])
                 status |= self._device.launch(self._compiled, pointers, end - start)
                 for x, pointer in zip(outputs, pointers[len(inputs) :], strict=True):
                     self._device.download(x[start:end], pointer)

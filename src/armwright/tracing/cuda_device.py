@@ -36,6 +36,12 @@ class CudaDevice:
                 self._device.set_current()
                 self._stream = self._device.create_stream()
 
+    @property
+    def bandwidth(self) -> float:
+        """What its memory transfers [B/s], by its clock and width; two transfers in a cycle."""
+        properties = self._device.properties
+        return 2e3 * float(properties.memory_clock_rate) * float(properties.global_memory_bus_width) / 8
+
     @contextmanager
     def current(self, work: str) -> Iterator[None]:
         """Make the device that of this thread for a while; errors of CUDA become ours.
@@ -78,9 +84,9 @@ class CudaDevice:
         buffer.set_deallocation_stream(self._core.LEGACY_DEFAULT_STREAM)
         return buffer
 
-    def upload(self, buffer: Any, array: np.ndarray[Any, Any]) -> None:
+    def upload(self, pointer: int, array: np.ndarray[Any, Any]) -> None:
         """Copy an array in C order to memory of the device."""
-        self._driver_call("cuMemcpyHtoDAsync", int(buffer.handle), array.ctypes.data, array.nbytes)
+        self._driver_call("cuMemcpyHtoDAsync", pointer, array.ctypes.data, array.nbytes)
 
     def download(self, array: np.ndarray[Any, Any], pointer: int) -> None:
         """Copy memory of the device to an array in C order."""
@@ -92,7 +98,7 @@ class CudaDevice:
         status = np.zeros(1, dtype=np.intc)
         if rows:
             on_device = self.allocate(status.nbytes)
-            self.upload(on_device, status)
+            self.upload(int(on_device.handle), status)
             config = self._core.LaunchConfig(grid=-(-rows // BLOCK), block=BLOCK)
             arguments = [*pointers, 0, int(on_device.handle), np.int64(rows)]
             self._core.launch(self._stream, config, kernel, *arguments)
