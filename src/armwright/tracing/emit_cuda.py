@@ -100,9 +100,12 @@ def _number(output: Argument) -> str:
 def _body(function: Function) -> Iterator[str]:
     """Write what a thread does."""
     code, widths = function.code, [_odd(x.width) for x in function.inputs]
-    staged = sum(widths) <= _TILE
-    pieces = list(_pieces(function.outputs))
-    size = max([sum(widths) if staged else 1, *(_odd(piece.length) for piece in pieces)])
+    staged = sum(widths) + 5 <= _TILE
+    # Inputs are read again for every piece: results lie beside them, but those of a single piece lie in their place.
+    at_once = sum(x.width for x in function.outputs) < _TILE and len(function.outputs) == 1
+    beside = sum(widths) if staged and not at_once else 0
+    pieces = list(_pieces(function.outputs, _TILE - beside))
+    size = max([sum(widths) if staged else 1, *(beside + _odd(piece.length) for piece in pieces)])
     yield f"__shared__ double tile[{BLOCK * size}];"
     yield f"const long long first = (long long)blockIdx.x * {BLOCK};"
     yield f"const int count = rows - first < {BLOCK} ? (int)(rows - first) : {BLOCK};"
@@ -118,6 +121,7 @@ def _body(function: Function) -> Iterator[str]:
             places += [f"{x.name}[row * {x.width} + {k}]" for k in range(x.width)]
     if staged:
         yield "__syncthreads();"
+        yield "const volatile double *const again = tile;"
     writer, names = Writer(_DIALECT), dict[int, str]()
     results = iter(code.outputs)
     ends = [x for x in (code.invalid, code.unusual) if x is not None]
@@ -130,6 +134,10 @@ def _body(function: Function) -> Iterator[str]:
         yield from lines
         if piece is None:
             yield f"const int of_row = {status_of(code, names)};"
+            if staged:
+                # From here on they are read from shared memory at each use, and take no registers until then.
+                inputs = [i for i in names if code.graph.nodes[i].op == "input"]
+                names |= {i: places[int(code.graph.nodes[i].value)].replace("tile", "again", 1) for i in inputs}
             yield "if ((int)threadIdx.x < count) {"
             yield "    if (status) {"
             yield "        status[first + threadIdx.x] = of_row;"
@@ -139,23 +147,24 @@ def _body(function: Function) -> Iterator[str]:
             yield "    }"
             yield "}"
         else:
-            yield from _stored(piece, [names[i] for i in ends])
+            yield from _stored(piece, BLOCK * beside, [names[i] for i in ends])
 
 
-def _stored(piece: _Piece, values: Sequence[str]) -> Iterator[str]:
-    """Write how a block stores a piece of its rows."""
-    output, first, count = piece
+def _stored(piece: _Piece, start: int, values: Sequence[str]) -> Iterator[str]:
+    """Write how a block stores a piece of its rows, which lie in shared memory from ``start`` on."""
+    output, first, length = piece
     yield "__syncthreads();"
     for k, value in enumerate(values):
-        yield f"tile[threadIdx.x * {_odd(count)} + {k}] = {value};"
+        yield f"tile[{start} + threadIdx.x * {_odd(length)} + {k}] = {value};"
     yield "__syncthreads();"
-    yield f"armwright_store<{output.width}, {count}>(tile, {output.name} + first * {output.width} + {first}, count);"
+    to = f"{output.name} + first * {output.width} + {first}"
+    yield f"armwright_store<{output.width}, {length}>(tile + {start}, {to}, count);"
 
 
-def _pieces(outputs: Sequence[Argument]) -> Iterator[_Piece]:
-    """Cut outputs into pieces that shared memory holds, of whole sectors of memory where there are several."""
+def _pieces(outputs: Sequence[Argument], room: int) -> Iterator[_Piece]:
+    """Cut outputs into pieces that shared memory has room for, of whole sectors of memory where there are several."""
     for x in outputs:
-        most = x.width if _odd(x.width) <= _TILE else _TILE // 8 * 4
+        most = x.width if _odd(x.width) <= room else (room - 1) // 4 * 4
         for first in range(0, x.width, most):
             yield _Piece(x, first, min(most, x.width - first))
 
