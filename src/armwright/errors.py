@@ -137,6 +137,10 @@ class MissingExtraError(ArmwrightError, ImportError):
     """A function needs a library that the core does not install; the message has the command that installs it."""
 
 
+class DeviceError(ArmwrightError, RuntimeError):
+    """There is no device of CUDA, or something went wrong on it; the message has what its driver reports."""
+
+
 class OutputError(ArmwrightError, OSError):
     """A result could not be written; incomplete files have been removed."""
 

@@ -25,16 +25,48 @@ COMPILERS: dict[str, tuple[list[str], str]] = {
 }
 _STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off"]
 _CORTEX_M7 = ["-target", "thumb-linux-musleabihf", "-mcpu=cortex_m7+fp_armv8d16"]
-# What the device has and a processor has not.
+# What the device has and a processor has not. The threads of a block are contexts of one thread here, each of which
+# runs until it waits for the others.
 _DEVICE = """\
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
+#include <ucontext.h>
 #define __global__
 #define __device__
 #define __forceinline__ inline
 #define __launch_bounds__(threads)
+#define __shared__ static
 struct Three { unsigned x; };
-static Three blockIdx, blockDim, threadIdx;
+static Three blockIdx, threadIdx;
+static ucontext_t of_thread[128], of_block;
+static char stacks[128][1 << 16];
+static void (*work)();
+static inline void __syncthreads() { swapcontext(&of_thread[threadIdx.x], &of_block); }
+static inline void atomicOr(int *all, int one) { *all |= one; }
+static bool ended[128];
+static void begin() { work(); ended[threadIdx.x] = true; }
+/* Runs a block, its threads in order or in the opposite one: a barrier that is missing shows in one of them. */
+static void run_block(bool backwards)
+{
+    for (int t = 0; t < 128; t++) {
+        getcontext(&of_thread[t]);
+        of_thread[t].uc_stack.ss_sp = stacks[t];
+        of_thread[t].uc_stack.ss_size = sizeof stacks[t];
+        of_thread[t].uc_link = &of_block;
+        makecontext(&of_thread[t], begin, 0);
+        ended[t] = false;
+    }
+    for (int left = 128; left > 0;) {
+        for (int t = 0; t < 128; t++) {
+            threadIdx.x = backwards ? 127 - t : t;
+            if (!ended[threadIdx.x]) {
+                swapcontext(&of_block, &of_thread[threadIdx.x]);
+                left -= ended[threadIdx.x];
+            }
+        }
+    }
+}
 """
 # Undefined behaviour ends a program: with a message, or in clang without its library with a signal.
 SANITIZED = {
@@ -127,16 +159,38 @@ def _loop(function: Function, language: Language, real: Real, compiler: str) -> 
     head = f"void rows_{function.name}(long rows, {', '.join(parameters)}, int *status)"
     of_row = ", ".join(f"{x.name} + r * {x.width}" for x in arrays)
     if language == "cuda":
-        names = ", ".join(x.name for x in arrays)
-        return (
-            f'extern "C" {head} {{ blockDim.x = 128; for (blockIdx.x = 0; blockIdx.x * 128 < rows; blockIdx.x++)\n'
-            f"for (threadIdx.x = 0; threadIdx.x < 128; threadIdx.x++) {function.name}({names}, status, rows); }}\n"
-        )
+        return _blocks(function, parameters, head)
     called = function.name if language == "c" else f"armwright::{function.name}<{real}>"
     linkage = 'extern "C" ' if COMPILERS[compiler][1] == ".cpp" else ""
     return (
         f"{linkage}{head};\n{linkage}{head} {{ long r; for (r = 0; r < rows; r++) status[r] = {called}({of_row}); }}\n"
     )
+
+
+def _blocks(function: Function, parameters: Sequence[str], head: str) -> str:
+    """Return the text of a function of rows that runs the blocks of a kernel; it begins at odd ones backwards."""
+    names = [x.name for x in (*function.inputs, *function.outputs)]
+    kept = "\n".join(f"static {x.replace('*', '*g_')};" for x in parameters)
+    passed = ", ".join([f"g_{name}" for name in names] + ["g_status", "g_all", "g_rows"])
+    given = " ".join(f"g_{name} = {name};" for name in names)
+    whole = head.replace(f"rows_{function.name}", f"all_{function.name}").replace(
+        "int *status", "int *status, int *all"
+    )
+    return f"""\
+namespace of_{function.name} {{
+{kept}
+static int *g_status, *g_all;
+static long g_rows;
+static void run() {{ {function.name}({passed}); }}
+}}
+extern "C" {whole}
+{{
+    using namespace of_{function.name};
+    {given} g_status = status; g_all = all; g_rows = rows; work = run;
+    for (blockIdx.x = 0; blockIdx.x * 128L < rows; blockIdx.x++) run_block(blockIdx.x % 2);
+}}
+extern "C" {head} {{ all_{function.name}(rows, {", ".join(names)}, status, nullptr); }}
+"""
 
 
 def compiled_for_device(text: str) -> str:

@@ -25,6 +25,7 @@ from armwright.tracing.emit import Emitted, emit
 from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
 from armwright.tracing.identifiers import identifier
 from armwright.tracing.scalar import Scalar, atan2, round_half_even, sqrt
+from oracles import compilers
 from oracles.arms import of_all_kinds, random_arm
 from oracles.compilers import COMPILERS, FMA, SANITIZED, Compiled, build, compiled_for_device, sizes_on_cortex_m7
 from samples import Sample
@@ -104,7 +105,7 @@ def test_bits_of_the_processor(name: str, kind: str, tmp_path: Path, sample: Sam
     sample.record(f"rows of all quantities with the processor's bits, {name}, {kind}", rows, 0)
 
 
-@pytest.mark.parametrize("name", [name for name in LANGUAGES if name != FOR_DEVICE])
+@pytest.mark.parametrize("name", LANGUAGES)
 @pytest.mark.drawn(0.2)
 def test_loops_of_long_arms(name: str, tmp_path: Path, sample: Sample) -> None:
     """Loops over the links of a long arm stay loops, with the bits of the processor, and no text gets much longer."""
@@ -347,6 +348,29 @@ def test_registers_of_a_device(name: str) -> None:
     assert "0 bytes stack frame, 0 bytes spill stores, 0 bytes spill loads" in log
     (registers,) = re.findall(r"Used (\d+) registers", log)
     assert int(registers) <= 128
+
+
+@pytest.mark.parametrize("barrier", range(3))
+def test_missing_barriers_show(barrier: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without one of the barriers between the threads of a block, rows come out wrong."""
+    arm, text = load_arm("stanford"), source_text(load_arm("stanford"), ["jacobian"], "cuda")
+    parts = text.split("__syncthreads();")
+    assert len(parts) == 4
+    wrong = "__syncthreads();".join([*parts[:barrier], parts[barrier] + parts[barrier + 1], *parts[barrier + 2 :]])
+    q = np.linspace(-1.0, 1.0, 300 * 6).reshape(300, 6)
+    expected = compile_arm(arm).jacobian(q)
+
+    monkeypatch.setattr(compilers, "source_text", lambda *_: wrong)
+    (J,), _ = Compiled(arm, ["jacobian"], tmp_path, compiler="g++", language="cuda")("jacobian", q)
+
+    assert not np.array_equal(J, expected.reshape(300, 36))
+
+
+def test_long_arms_of_a_device(rng: np.random.Generator) -> None:
+    """Inverse dynamics of a long arm stays a loop on a device: nothing is spilled."""
+    log = compiled_for_device(source_text(random_arm(rng, 20), ["inverse_dynamics"], "cuda"))
+
+    assert "0 bytes spill stores, 0 bytes spill loads" in log
 
 
 @pytest.mark.drawn(0.1)

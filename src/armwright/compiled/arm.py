@@ -33,7 +33,7 @@ os.register_at_fork(
 )
 
 
-def compile_arm(arm: Arm) -> CompiledArm:
+def compile_arm(arm: Arm, *, device: str | None = None) -> CompiledArm:
     """Return an arm whose quantities are compiled, each when it is first asked for.
 
     A first compilation takes hundredths to tenths of a second and is kept on disk: see
@@ -42,17 +42,30 @@ def compile_arm(arm: Arm) -> CompiledArm:
 
     Args:
         arm: the arm, with n joints.
+        device: ``cuda`` or ``cuda:1``, a device that computes the quantities (extra ``cuda``); the processor when None.
 
     Raises:
         KindError: ``arm`` is no arm.
+        InvalidValueError: a device is called otherwise.
+        MissingExtraError: the libraries of CUDA are not installed.
+        DeviceError: there is no such device.
     """
-    key = _bits(known_arm(arm))
+    key = (_bits(known_arm(arm)), device)
     with _COMPILED_LOCK:
-        compiled = _COMPILED.pop(key, None) or CompiledArm(arm=arm)
+        compiled = _COMPILED.pop(key, None) or _new(arm, device)
         _COMPILED[key] = compiled
         if len(_COMPILED) > _MAX_ARMS:
             _COMPILED.popitem(last=False)
     return compiled
+
+
+def _new(arm: Arm, device: str | None) -> CompiledArm:
+    if device is None:
+        return CompiledArm(arm=arm)
+    from armwright.compiled.device_arm import DeviceArm, device_number  # noqa: PLC0415 - only where it is asked for
+    from armwright.tracing.cuda_device import CudaDevice  # noqa: PLC0415
+
+    return DeviceArm(arm=arm, device=CudaDevice(device_number(device)))
 
 
 def _bits(value: object) -> object:
@@ -76,7 +89,7 @@ class _KernelMethod:
         method, name = self._method, self._method.__name__
         if compiled is None:
             return wraps(method)(lambda arm, *inputs, **options: getattr(arm, name)(*inputs, **options))
-        function = compiled.kernel(name).function(name, str(method.__doc__), compiled.__reduce__())
+        function = compiled._function(name, str(method.__doc__))  # noqa: SLF001 - where it is computed
         # Found there before this descriptor from now on.
         compiled.__dict__[name] = function
         return function
@@ -488,6 +501,10 @@ class CompiledArm:
         Raises:
             UnsupportedArmError: nothing is known of the mass of some link.
         """
+
+    def _function(self, name: str, doc: str) -> Callable[..., Any]:
+        """Return the function of a quantity."""
+        return self.kernel(name).function(name, doc, self.__reduce__())
 
     def kernel(self, quantity: str) -> Kernel:
         """Return the kernel behind a function, whose part for one configuration other compiled code can call.

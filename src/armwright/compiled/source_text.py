@@ -15,7 +15,8 @@ from armwright.arm.model import Arm
 from armwright.compiled.arm import CompiledArm
 from armwright.compiled.quantities import emit_quantity
 from armwright.errors import InvalidValueError
-from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header, cuda_source
+from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
+from armwright.tracing.emit_cuda import cuda_source
 from armwright.tracing.identifiers import identifier
 
 Language: TypeAlias = Literal["c", "cpp", "cuda"]
@@ -83,7 +84,8 @@ def arm_functions(arm: Arm, quantities: Sequence[str], language: Language, real:
 
 
 def _function(arm: Arm, quantity: str, name: str, language: Language) -> Function:
-    emitted = emit_quantity(arm, quantity, loops=language != "cuda" and arm.n >= _LOOPS_FROM)
+    # A device computes what the kernel of the processor computes, long arms included.
+    emitted = emit_quantity(arm, quantity, loops=None if language == "cuda" else arm.n >= _LOOPS_FROM)
     doc = getdoc(getattr(CompiledArm, quantity)) or ""
     arguments: list[Argument] = []
     names = [*emitted.inputs, *_output_names(doc, len(emitted.outputs))]

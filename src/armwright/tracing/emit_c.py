@@ -1,4 +1,4 @@
-"""From the operations of a graph to text for other compilers: C99, a C++ template and CUDA.
+"""From the operations of a graph to text for other compilers: C99 and a C++ template.
 
 The text is straight-line code for one configuration, and computes what the kernel of this processor computes: the same
 operations in the same order, so the same bits in double, wherever multiply-adds are one instruction there and here.
@@ -57,7 +57,7 @@ class Function(NamedTuple):
     description: Sequence[str] = ()
 
 
-class _Dialect(NamedTuple):
+class Dialect(NamedTuple):
     """How a language writes operations.
 
     Attributes:
@@ -68,8 +68,6 @@ class _Dialect(NamedTuple):
         of_table: writes a constant in one.
         limit: writes a limit.
         calls: operations that are calls of a function.
-        in_parallel: whether operations that do not wait for each other stand side by side, for compilers that leave
-            them in their order.
     """
 
     real: str
@@ -79,7 +77,6 @@ class _Dialect(NamedTuple):
     table: str
     of_table: Callable[[float], str]
     calls: Mapping[str, str]
-    in_parallel: bool = True
 
 
 _OPERATORS = {
@@ -108,10 +105,10 @@ def c_header(functions: Sequence[Function], real: Real = "double") -> str:
     Raises:
         InvalidValueError: a constant is beyond the range of float.
     """
-    dialect = _FLOAT if real == "float" else _DOUBLE
+    dialect = _FLOAT if real == "float" else DOUBLE
     bodies = [_function(each, _code(each, real), dialect, "ARMWRIGHT_FUNCTION int") for each in functions]
-    return _guarded(
-        _comment(_C_RULES, real),
+    return guarded(
+        contract(_C_RULES, real),
         _of_gcc("ARMWRIGHT_FUNCTION", "static inline", "static", "unused, ") + _C_HELPERS[real],
         bodies,
     )
@@ -134,21 +131,7 @@ def cpp_header(functions: Sequence[Function]) -> str:
     start = f"#ifndef {guard}\n#define {guard}\nnamespace armwright {{\nnamespace {space} {{\n"
     includes = "#include <cmath>\n#include <cstdint>\n#include <cstring>\n#include <limits>\n\n"
     helpers = f"{_of_gcc('ARMWRIGHT_TEMPLATE', 'inline')}{includes}{start}{helpers}}}\n}}\n#endif\n"
-    return _guarded(_comment(_CPP_RULES, "Real"), helpers, ["namespace armwright {\n", *bodies, "}\n"])
-
-
-def cuda_source(functions: Sequence[Function]) -> str:
-    """Return a source of CUDA: a kernel for each function, of which every thread does one row.
-
-    Args:
-        functions: what becomes a kernel, their names unlike.
-    """
-    bodies = []
-    for each in functions:
-        of_row = each._replace(name=f"{each.name}_row", description=())
-        body = _function(of_row, each.code, _CUDA, _ON_DEVICE)
-        bodies.append(f"{body}\n{_comment_of(each, each.code)}{_cuda_kernel(each)}")
-    return _guarded(_comment(_CUDA_RULES, "double"), _CUDA_HELPERS, bodies)
+    return guarded(contract(_CPP_RULES, "Real"), helpers, ["namespace armwright {\n", *bodies, "}\n"])
 
 
 def _code(function: Function, real: Real) -> MachineCode:
@@ -158,17 +141,17 @@ def _code(function: Function, real: Real) -> MachineCode:
 # ---- a function ----
 
 
-def _function(function: Function, code: MachineCode, dialect: _Dialect, kind: str) -> str:
+def _function(function: Function, code: MachineCode, dialect: Dialect, kind: str) -> str:
     parameters = [f"const {dialect.real} {x.name}[{x.width}]" for x in function.inputs]
     parameters += [f"{'unsigned char' if x.flag else dialect.real} {x.name}[{x.width}]" for x in function.outputs]
     above, _, kind = kind.rpartition("\n")
     head = textwrap.wrap(f"{kind} {function.name}({', '.join(parameters)})", _LINE, subsequent_indent="    ")
     body = (f"    {line}" for line in _statements(function, code, dialect))
-    comment = _comment_of(function, code) if function.description else ""
+    comment = comment_of(function, code) if function.description else ""
     return comment + "\n".join([*above.splitlines(), *head, "{", *body, "}", ""])
 
 
-def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> list[str]:
+def _statements(function: Function, code: MachineCode, dialect: Dialect) -> list[str]:
     places = [f"{x.name}[{i}]" for x in function.inputs for i in range(x.width)]
     # What makes a configuration valid comes first: at the end it would keep all inputs in registers until then.
     first = reachable(code.graph, [x for x in (code.invalid, code.unusual) if x is not None])
@@ -181,11 +164,11 @@ def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> lis
         """Write the outputs that a node is."""
         return [f"{x.name}[{i}] = {'(unsigned char)' * x.flag}{name};" for x, i in results.pop(node, [])]
 
-    if dialect.in_parallel and not code.graph.loops:
+    if not code.graph.loops:
         order = scheduled(code.graph, order)
-        names, lines = _Writer(dialect).operations(code.graph, order, places.__getitem__, "v", written)
+        names, lines = Writer(dialect).operations(code.graph, order, places.__getitem__, "v", behind=written)
     else:
-        names, lines = _Writer(dialect).operations(code.graph, order, places.__getitem__, "v")
+        names, lines = Writer(dialect).operations(code.graph, order, places.__getitem__, "v")
     read = {
         places[int(code.graph.nodes[i].value)].partition("[")[0] for i in order if code.graph.nodes[i].op == "input"
     }
@@ -193,17 +176,22 @@ def _statements(function: Function, code: MachineCode, dialect: _Dialect) -> lis
     lines[:0] = [f"(void){x.name};" for x in function.inputs if x.name not in read]
     for result in list(results):
         lines += written(result, names[result])
+    return [*lines, f"return {status_of(code, names)};"]
+
+
+def status_of(code: MachineCode, names: Mapping[int, str]) -> str:
+    """Return the expression of the status of a configuration, by the names of the values."""
     status = "0"
     for condition, bit in ((code.unusual, UNUSUAL), (code.invalid, MEANINGLESS)):
         if condition is not None:
             status = f"{names[condition]} ? {bit} : {status}"
-    return [*lines, f"return {status};"]
+    return status
 
 
-class _Writer:
+class Writer:
     """Writes the operations of graphs; the loops of a function are numbered."""
 
-    def __init__(self, dialect: _Dialect) -> None:
+    def __init__(self, dialect: Dialect) -> None:
         self._dialect, self._loops = dialect, 0
 
     def operations(
@@ -212,6 +200,8 @@ class _Writer:
         order: Sequence[int],
         read: Callable[[int], str],
         prefix: str,
+        *,
+        known: Mapping[int, str] | None = None,
         behind: Callable[[int, str], Sequence[str]] = lambda _node, _name: (),
     ) -> tuple[dict[int, str], list[str]]:
         """Write operations.
@@ -221,13 +211,14 @@ class _Writer:
             order: its nodes in use.
             read: returns where an input is read, by its number.
             prefix: of the names of the results.
+            known: names of results that are written already.
             behind: gives the statements behind that of an operation, by its node and the name of its result.
 
         Returns:
-            The names of the results by node, and the statements.
+            The names of the results by node, those known with them, and the statements.
         """
         dialect, lines = self._dialect, list[str]()
-        names: dict[int, str] = {}
+        names: dict[int, str] = dict(known or {})
         for i in order:
             op, operands, value = graph.nodes[i]
             if op in ("constant", "limit"):
@@ -317,7 +308,8 @@ def _array(declaration: str, elements: Iterable[str]) -> list[str]:
     return textwrap.wrap(f"{declaration} = {{{', '.join(elements)}}};", _LINE - 4, subsequent_indent="    ")
 
 
-def _comment_of(function: Function, code: MachineCode) -> str:
+def comment_of(function: Function, code: MachineCode) -> str:
+    """Return the comment above a function: what it computes, of how many operations."""
     total = sum(function.operations.values())
     counts = ", ".join(f"{number} {op}" for op, number in function.operations.items())
     numbers, truths = _stack(code.graph, code.order)
@@ -350,8 +342,7 @@ _CONTRACT = """\
 Each function computes one configuration and returns a status:
 {status}
 Units are SI, angles in radians. A matrix stands row by row, and what a function takes many of one after the other.
-All inputs are read before an output is written, so an array may be both. Nothing is allocated, no state is kept,
-and any thread may call at any time."""
+Nothing is allocated, no state is kept, and any thread may call at any time."""
 _STATUS = {
     0: "all is well.",
     MEANINGLESS: "the outputs mean nothing: an input is not finite or too large ({largest}), or the equation has no "
@@ -364,21 +355,20 @@ _LARGEST = {
     "Real": "an angle beyond 1e12, anything else beyond 1e100; in float beyond 1e15",
 }
 _C_RULES = """\
+All inputs are read before an output is written, so an array may be both.
 A multiplication and an addition are one instruction, rounded once, where the processor has one (ARMWRIGHT_FMA).
 Results have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, which
 -std=c99 implies for gcc, and no -ffast-math. Functions are not inlined by gcc, which would join some all the same."""
 _CPP_RULES = """\
+All inputs are read before an output is written, so an array may be both.
 A multiplication and an addition are one instruction, rounded once, where the processor has one. Results in double
 have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, and no -ffast-math.
 Sines, cosines and arc tangents of double are written out here; those of another type are found as sin(x) and so on,
 in the namespace of the type or in std."""
-_CUDA_RULES = """\
-Each kernel computes rows of arrays in C order, one row per thread, in blocks of 128 threads; status has one number
-per row and may be null. Results have the same bits as on the processor, if the compiler joins no multiplications and
-additions on its own: --fmad=false, and no --use_fast_math."""
 
 
-def _comment(rules: str, real: str) -> list[str]:
+def contract(rules: str, real: str) -> list[str]:
+    """Return the comment above a text: what its functions return, and the rules of its language."""
     status = [
         line
         for value, meaning in _STATUS.items()
@@ -393,12 +383,13 @@ def _block(lines: Sequence[str]) -> str:
     return "\n".join(["/*", *(f" * {line}".rstrip() for line in lines), " */", ""])
 
 
-def _guarded(contract: Sequence[str], helpers: str, bodies: Sequence[str]) -> str:
+def guarded(rules: Sequence[str], helpers: str, bodies: Sequence[str]) -> str:
+    """Return a text that may be included twice, below its hash and a comment."""
     text = "\n".join([helpers, *bodies])
     digest = _digest(text)
     guard = f"ARMWRIGHT_{digest[:16].upper()}_H"
     first = f"Written by armwright {__version__}. SHA-256 of the code: {digest}"
-    return f"{_block([first, '', *contract])}#ifndef {guard}\n#define {guard}\n\n{text}\n#endif\n"
+    return f"{_block([first, '', *rules])}#ifndef {guard}\n#define {guard}\n\n{text}\n#endif\n"
 
 
 def _digest(text: str) -> str:
@@ -436,17 +427,17 @@ def _real(value: float) -> str:
 
 # ---- languages ----
 
-_OF_MATH = {"absolute": "fabs({0})", "sqrt": "sqrt({0})", "number": "(double){0}"}
-_DOUBLE = _Dialect(
+OF_MATH = {"absolute": "fabs({0})", "sqrt": "sqrt({0})", "number": "(double){0}"}
+DOUBLE = Dialect(
     "double",
     "int",
     _double,
     _double,
     "double",
     _double,
-    {**_OF_MATH, "fma": "ARMWRIGHT_FMA({0}, {1}, {2})", "bit": "armwright_bit({0}, {1})"},
+    {**OF_MATH, "fma": "ARMWRIGHT_FMA({0}, {1}, {2})", "bit": "armwright_bit({0}, {1})"},
 )
-_FLOAT = _Dialect(
+_FLOAT = Dialect(
     "float",
     "int",
     _float,
@@ -464,18 +455,15 @@ _FLOAT = _Dialect(
         "round": "rintf({0})",
     },
 )
-_CUDA = _DOUBLE._replace(
-    in_parallel=False, calls={**_OF_MATH, "fma": "fma({0}, {1}, {2})", "bit": "armwright_bit({0}, {1})"}
-)
 
 
-def _cpp(space: str) -> _Dialect:
+def _cpp(space: str) -> Dialect:
     names = {"absolute": 1, "sqrt": 1, "fma": 3, "sin": 1, "cos": 1, "atan2": 2, "round": 1}
     operands = {op: ", ".join(f"{{{i}}}" for i in range(count)) for op, count in names.items()}
     calls = {op: f"{space}::{op}_of({operands[op]})" for op in names} | {"number": "Real({0} ? 1 : 0)"}
     limit = f"{space}::limit<Real>({{!r}})".format
     # Constants that the compiler knows: those of another type would be made when the function is first called.
-    return _Dialect("Real", "bool", _real, limit, "double", _double, calls)
+    return Dialect("Real", "bool", _real, limit, "double", _double, calls)
 
 
 def _has_fma(letter: str, of_arm: int) -> str:
@@ -503,7 +491,7 @@ def _of_gcc(name: str, kind: str, kind_of_gcc: str = "", attributes: str = "") -
 """
 
 
-_BIT = """\
+BIT = """\
 {kind} {name}(double x, int place)
 {{
     {whole} bits;
@@ -523,7 +511,7 @@ _C_HELPERS = {
 #else
 #define ARMWRIGHT_FMA(a, b, c) ((a) * (b) + (c))
 #endif
-{_BIT.format(kind="static inline int", name="armwright_bit", whole="uint64_t", memcpy="memcpy")}#endif
+{BIT.format(kind="static inline int", name="armwright_bit", whole="uint64_t", memcpy="memcpy")}#endif
 """,
     "float": f"""\
 #include <math.h>
@@ -537,9 +525,6 @@ _C_HELPERS = {
 #endif
 """,
 }
-_ON_DEVICE = "static __device__ __forceinline__ int"
-_CUDA_BIT = _BIT.format(kind=_ON_DEVICE, name="armwright_bit", whole="unsigned long long", memcpy="memcpy")
-_CUDA_HELPERS = f"#ifndef ARMWRIGHT_CUDA\n#define ARMWRIGHT_CUDA\n{_CUDA_BIT}#endif\n"
 _CPP_GENERAL = """\
 template <class Real>
 inline Real {op}_of(const Real& x)
@@ -589,8 +574,8 @@ inline float limit<float>(double value)
     return float(value < {_LIMIT_OF_FLOAT!r} ? value : {_LIMIT_OF_FLOAT!r});
 }}
 """
-    text += _BIT.format(kind="inline int", name="bit_of", whole="std::uint64_t", memcpy="std::memcpy")
-    dialect = _DOUBLE._replace(
+    text += BIT.format(kind="inline int", name="bit_of", whole="std::uint64_t", memcpy="std::memcpy")
+    dialect = DOUBLE._replace(
         truth="bool",
         calls={
             "absolute": "std::fabs({0})",
@@ -603,7 +588,7 @@ inline float limit<float>(double value)
     return text + "".join(_written_out(op, dialect) for op in ("sin", "cos", "atan2", "round"))
 
 
-def _written_out(op: str, dialect: _Dialect) -> str:
+def _written_out(op: str, dialect: Dialect) -> str:
     """Return an elementary function of double."""
     graph = Graph()
     operands = graph.inputs(2 if op == "atan2" else 1)
@@ -615,25 +600,3 @@ def _written_out(op: str, dialect: _Dialect) -> str:
     lines = [x.replace("[0]", "") for x in _statements(function, code._replace(outputs=[]), dialect)]
     body = "\n".join(f"    {line}" for line in [*lines[:-1], f"return v{result};"])
     return f"inline double {op}_of({', '.join(names)})\n{{\n{body}\n}}\n"
-
-
-def _cuda_kernel(function: Function) -> str:
-    """Return the kernel of which every thread does one row."""
-    arrays = [*function.inputs, *function.outputs]
-    parameters = [f"const double *{x.name}" for x in function.inputs]
-    parameters += [f"{'unsigned char' if x.flag else 'double'} *{x.name}" for x in function.outputs]
-    head = f"{function.name}({', '.join(parameters)}, int *status, long long rows)"
-    rows = ", ".join(f"{x.name} + row * {x.width}" for x in arrays)
-    return f"""\
-extern "C" __global__ void __launch_bounds__(128)
-{head}
-{{
-    const long long row = (long long)blockIdx.x * blockDim.x + threadIdx.x;
-    if (row < rows) {{
-        const int of_row = {function.name}_row({rows});
-        if (status) {{
-            status[row] = of_row;
-        }}
-    }}
-}}
-"""

@@ -19,7 +19,7 @@ _CPP = (
 # What the text itself uses, and macros of the headers that it includes.
 _OURS = (
     "Real armwright detail fma fabs fabsf sqrt sqrtf sinf cosf atan2f rintf memcpy uint64_t NAN INFINITY HUGE_VAL "
-    "HUGE_VALF EOF NULL stdin stdout stderr main linux unix std rows row status"
+    "HUGE_VALF EOF NULL stdin stdout stderr main linux unix std rows row status tile all"
 )
 _RESERVED = frozenset(f"{_C} {_CPP} {_OURS}".split())
 # What values are called in the text.

@@ -76,9 +76,7 @@ class Kernel:
             doc: its docstring.
             origin: makes an object that has the function as its method, where it is unpickled.
         """
-        inputs = self.emitted.inputs
-        by_name = [Parameter(one, Parameter.KEYWORD_ONLY, default=None) for one in ("threads", "out")]
-        signature = Signature([*(Parameter(one, Parameter.POSITIONAL_OR_KEYWORD) for one in inputs), *by_name])
+        inputs, signature = self.emitted.inputs, self.signature
 
         def careful(*arguments: Any, **named: Any) -> Any:
             given = signature.bind(*arguments, **named).arguments
@@ -87,6 +85,12 @@ class Kernel:
         careful.__name__, careful.__qualname__, careful.__doc__ = name, name, doc
         careful.__signature__ = signature  # type: ignore[attr-defined]
         return self._door.open(name, f"{name}{signature}\n--\n\n{doc}", careful, origin)
+
+    @cached_property
+    def signature(self) -> Signature:
+        """What the function takes."""
+        by_name = [Parameter(one, Parameter.KEYWORD_ONLY, default=None) for one in ("threads", "out")]
+        return Signature([*(Parameter(one, Parameter.POSITIONAL_OR_KEYWORD) for one in self.emitted.inputs), *by_name])
 
     @cached_property
     def _passed(self) -> tuple[list[Passed], list[Passed]]:
@@ -121,13 +125,34 @@ class Kernel:
 
     def _careful(self, inputs: Sequence[ArrayLike], threads: int | None, out: Any) -> Any:
         """Check everything, evaluate, and find out what is wrong where something is."""
+        arrays, lead, results = self.prepared(inputs, threads, out)
+        self.judge(arrays, self._run(arrays, lead, results, threads), 3)
+        return results[0] if len(results) == 1 else tuple(results)
+
+    def prepared(
+        self, inputs: Sequence[ArrayLike], threads: int | None, out: Any
+    ) -> tuple[list[Array], Shape, list[Array]]:
+        """Check what a call is given.
+
+        Returns:
+            The inputs as float64, their leading axes, and the arrays to fill.
+        """
         if threads is not None and not (_is_integer(threads) and threads > 0):
             raise InvalidValueError(f"threads: expected an integer above 0, or None for all cores, got {threads!r}")
         arrays, lead = self._checked(inputs)
         results = self._results(lead, out)
         if out is not None and any(np.may_share_memory(x, y) for x in arrays for y in results):
             arrays = [x.copy() for x in arrays]
-        status = self._run(arrays, lead, results, threads)
+        return arrays, lead, results
+
+    def judge(self, arrays: Sequence[Array], status: int, callers: int) -> None:
+        """Raise the error or issue the warning that belongs to the status of inputs, if any.
+
+        Args:
+            arrays: the inputs.
+            status: of all their rows.
+            callers: how many calls up from here the caller stands.
+        """
         if status & MEANINGLESS:
             for name, array in zip(self.emitted.inputs, arrays, strict=True):
                 floats(array, name, LARGEST_ANGLE if name in self.emitted.angles else LARGEST)
@@ -135,8 +160,7 @@ class Kernel:
             if self.raise_for_invalid is not None:
                 self.raise_for_invalid(*arrays)
         if status & UNUSUAL and self.remark is not None:
-            self.remark(arrays, 2)
-        return results[0] if len(results) == 1 else tuple(results)
+            self.remark(arrays, callers)
 
     def _checked(self, inputs: Sequence[ArrayLike]) -> tuple[list[Array], Shape]:
         """Return the inputs as float64, without a copy where they are already, and their leading axes."""
