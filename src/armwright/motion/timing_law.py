@@ -178,7 +178,7 @@ def _gridded(solver: Solver, path: Trajectory, caps: Array) -> _Grid:
     times = np.append(np.repeat(path.times[:-1], finer) + starts, path.times[-1])
     fine, caps = Trajectory(times=times, coefficients=coefficients), np.repeat(caps, finer)
     bounds, lengths = _bounds(solver, fine, caps), np.diff(times)
-    squares = largest_squares(bounds, lengths, (False, False))
+    squares = largest_squares(bounds, lengths, (False, False), solver.run)
     return _Grid(solver, fine, caps, bounds, squares, float(_steps(lengths, np.sqrt(squares)).sum()))
 
 
@@ -233,7 +233,8 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
         worst = np.ones(len(lengths))
         np.maximum.at(worst, runs[-1].intervals, runs[-1].uses.max(axis=1))
         tighter = tighter * worst[:, None] ** 2
-        x = largest_squares(bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter), lengths, (False, False))
+        tight = bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter)
+        x = largest_squares(tight, lengths, (False, False), grid.solver.run)
     return min(runs, key=lambda run: run.duration)
 
 

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from armwright.tracing.graph import is_traced, traced
+from armwright.tracing.graph import Traced, is_traced, traced
 
 # A float, an array of any shape with one value per configuration, or a ``Traced``. Equations use + - * / and the
 # functions below.
@@ -47,7 +47,7 @@ def round_half_even(x: Scalar) -> Scalar:
 
 def select(condition: Any, then: Scalar, otherwise: Scalar) -> Scalar:
     """Return ``then`` where ``condition`` holds and ``otherwise`` elsewhere; both are evaluated."""
-    if is_traced(condition, then, otherwise):
+    if isinstance(condition, Traced) or isinstance(then, Traced) or isinstance(otherwise, Traced):
         return traced("select", condition, then, otherwise)
     if isinstance(condition, np.ndarray):
         return np.where(condition, then, otherwise)

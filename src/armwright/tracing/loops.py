@@ -1,0 +1,214 @@
+"""Routines: loops over tables of numbers, written once and run by NumPy or compiled.
+
+An equation of one row needs nothing of other rows. Where each row needs what came of the one before it, or the largest
+of all, a routine says so with ``Loops``: a loop over indices whose steps stand for themselves, ``each`` and the largest
+and least, is a call of NumPy for all of them, and one number after the other in machine code. One whose steps follow
+each other, ``walk`` and ``until``, is a loop of Python over floats, and the same in machine code.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, Protocol, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.tracing.emit_loops import EmittedLoops
+from armwright.tracing.native import function_address
+from armwright.tracing.scalar import Scalar
+
+# A table has a ``shape``, and its elements are read and written by index, a tuple of them where it has two axes.
+Table: TypeAlias = Any
+# Takes loops, the tables to read, and the tables to write.
+Routine: TypeAlias = Callable[..., None]
+
+# Two axes of loops at most stand for themselves.
+_AXES = 2
+
+
+class Loops(Protocol):
+    """Loops over indices from 0. Scalars are compared and chosen between as in equations of rows."""
+
+    def each(self, sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]], count: int = 1) -> list[Table]:
+        """Return ``count`` new tables of what a body returns for each tuple of indices; not within a loop."""
+
+    def table(self, *sizes: Scalar) -> Table:
+        """Return a new table of so many numbers along each axis; not within a loop."""
+
+    def walk(
+        self, size: Scalar, carry: Sequence[Scalar], step: Callable[..., Sequence[Scalar]], *, reverse: bool = False
+    ) -> tuple[Scalar, ...]:
+        """Apply a step to one index after the other; it takes the index and what was carried, and returns the new."""
+
+    def until(
+        self, most: int, carry: Sequence[Scalar], step: Callable[..., tuple[Scalar, Sequence[Scalar]]]
+    ) -> tuple[Scalar, ...]:
+        """Apply a step until it is done; it takes what was carried, and returns whether it is and what is new."""
+
+    def when(
+        self, condition: Scalar, then: Callable[[], Sequence[Scalar]], otherwise: Callable[[], Sequence[Scalar]]
+    ) -> tuple[Scalar, ...]:
+        """Return what one of two functions returns; only that one runs. Within ``walk`` and ``until`` only."""
+
+    def largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Scalar:
+        """Return the largest of what a body returns for the indices; some there must be."""
+
+    def least(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Scalar:
+        """Return the least of what a body returns for the indices; some there must be."""
+
+    def first_largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
+        """Return the largest of what a body returns, and the first index for which it does."""
+
+    def first_least(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
+        """Return the least of what a body returns, and the first index for which it does."""
+
+
+class Runner(Protocol):
+    """What runs routines."""
+
+    def __call__(self, routine: Routine, inputs: Sequence[Array], shape: tuple[int, ...]) -> Array:
+        """Return the table of a shape that a routine writes, from the arrays that it reads."""
+
+
+def with_numpy(routine: Routine, inputs: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    """Run a routine with NumPy: see ``Runner``."""
+    result = _PlainTable(np.zeros(shape))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        routine(_PlainLoops(), *map(_PlainTable, inputs), result)
+    return result.array
+
+
+def compiled(routine: Routine, inputs: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    """Run a routine as machine code, which is compiled when it is first needed: see ``Runner``."""
+    result = np.empty(shape)
+    arrays = [*map(np.ascontiguousarray, inputs), result]
+    lengths = [length for x in arrays for length in x.shape]
+    function = _function(routine, *(x.ndim for x in arrays))
+    addresses = (ctypes.c_void_p * len(arrays))(*(x.ctypes.data for x in arrays))
+    function(addresses, (ctypes.c_int64 * len(lengths))(*lengths))
+    return result
+
+
+@cache
+def _function(routine: Routine, *axes: int) -> Callable[..., None]:
+    address = function_address(EmittedLoops().module(routine, axes), "routine")
+    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)
+
+
+@attrs.frozen
+class _Index:
+    """All indices of a loop at once, so many along an axis of arrays with so many axes."""
+
+    axis: int
+    size: int
+    axes: int
+
+
+class _PlainTable:
+    """A table as an array; as lists while elements and rows are read or written one by one."""
+
+    def __init__(self, array: Array) -> None:
+        self.shape = array.shape
+        self._array: Array | None = array
+        self._items: list[Any] | None = None
+
+    @property
+    def array(self) -> Array:
+        if self._array is None:
+            self._array = np.array(self._items)
+        return self._array
+
+    @property
+    def items(self) -> list[Any]:
+        """Numbers of a table of one axis, rows of one of two."""
+        if self._items is None:
+            self._items = self.array.tolist() if len(self.shape) == 1 else list(self.array)
+        return self._items
+
+    def __getitem__(self, key: Any) -> Scalar:
+        if type(key) is not tuple:
+            return self.items[key] if isinstance(key, int) else self._along(key)
+        i, k = key
+        if not isinstance(i, int):
+            return self._along(i, k)
+        return float(self.items[i][k]) if isinstance(k, int) else self.items[i]
+
+    def _along(self, *indices: _Index) -> Array:
+        lengths = [1] * indices[0].axes
+        for index in indices:
+            lengths[index.axis] = index.size
+        return self.array[tuple(slice(index.size) for index in indices)].reshape(lengths)
+
+    def __setitem__(self, key: int, value: float) -> None:
+        self.items[key], self._array = value, None
+
+
+class _PlainLoops:
+    """See ``Loops``: what stands for itself is an axis of arrays."""
+
+    def __init__(self) -> None:
+        self._axis = 0
+
+    def each(self, sizes: Sequence[int], body: Callable[..., Sequence[Scalar]], count: int = 1) -> list[_PlainTable]:
+        self._axis = len(sizes)
+        values = body(*(_Index(axis, size, _AXES) for axis, size in enumerate(sizes)))
+        self._axis = 0
+        lengths = (*sizes, *[1] * (_AXES - len(sizes)))
+        tables = [np.broadcast_to(x, lengths).reshape(sizes) for x in values]
+        return [_PlainTable(x) for x in tables[:count]]
+
+    def table(self, *sizes: int) -> _PlainTable:
+        return _PlainTable(np.zeros(sizes))
+
+    def walk(
+        self, size: int, carry: Sequence[Scalar], step: Callable[..., Sequence[Scalar]], *, reverse: bool = False
+    ) -> tuple[Scalar, ...]:
+        for i in reversed(range(size)) if reverse else range(size):
+            carry = step(i, *carry)
+        return tuple(carry)
+
+    def until(
+        self, most: int, carry: Sequence[Scalar], step: Callable[..., tuple[Scalar, Sequence[Scalar]]]
+    ) -> tuple[Scalar, ...]:
+        for _ in range(most):
+            done, carry = step(*carry)
+            if done:
+                break
+        return tuple(carry)
+
+    def when(
+        self, condition: Scalar, then: Callable[[], Sequence[Scalar]], otherwise: Callable[[], Sequence[Scalar]]
+    ) -> tuple[Scalar, ...]:
+        return tuple(then() if condition else otherwise())
+
+    def largest(self, size: int, body: Callable[[Any], Scalar]) -> Scalar:
+        return self._reduced(np.maximum.reduce, size, body)
+
+    def least(self, size: int, body: Callable[[Any], Scalar]) -> Scalar:
+        return self._reduced(np.minimum.reduce, size, body)
+
+    def first_largest(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
+        values = self._values(size, body)
+        at = int(values.argmax())
+        return float(values[at]), at
+
+    def first_least(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
+        values = self._values(size, body)
+        at = int(values.argmin())
+        return float(values[at]), at
+
+    def _reduced(self, reduce: Callable[..., Any], size: int, body: Callable[[Any], Scalar]) -> Scalar:
+        values = self._values(size, body)
+        return reduce(values, axis=self._axis, keepdims=True) if self._axis else float(reduce(values))
+
+    def _values(self, size: int, body: Callable[[Any], Scalar]) -> Array:
+        axis = self._axis
+        self._axis += 1
+        values = body(_Index(axis, size, _AXES if axis else 1))
+        self._axis = axis
+        return np.asarray(values)
