@@ -61,7 +61,9 @@ def _largest_squares(loops: Loops, a: Table, b: Table, c: Table, lengths: Table,
     reachable = loops.table(intervals + 1)
     reachable[intervals] = ends[1]
     (highs,) = loops.each([intervals], lambda i: [sides.least_upper(loops, i, top[i])])
-    (lows,) = loops.each([intervals], lambda i: [sides.greatest_lower(loops, i, top[i])])
+    (lows,) = loops.each(
+        [intervals], lambda i: [loops.largest(rows, lambda r: sides.lower[i, r] - sides.lean[i, r] * top[i])]
+    )
 
     def backward(i: Scalar, after: Scalar) -> tuple[Scalar, ...]:
         # Mostly the end is reached from the largest x of all.
@@ -79,9 +81,11 @@ def _largest_squares(loops: Loops, a: Table, b: Table, c: Table, lengths: Table,
     (most,) = loops.each([intervals], lambda i: [sides.least_upper(loops, i, reachable[i])])
 
     def forward(i: Scalar, here: Scalar) -> tuple[Scalar, ...]:
-        (u,) = loops.when(
-            here >= reachable[i], lambda: (most[i],), lambda: (sides.least_upper(loops, i, here),)
-        )
+        def sought() -> tuple[Scalar]:
+            upper, lean = sides.upper.row(i), sides.lean.row(i)
+            return (loops.least(rows, lambda r: upper[r] - lean[r] * here),)
+
+        (u,) = loops.when(here >= reachable[i], lambda: (most[i],), sought)
         x[i + 1] = after = larger(smaller(reachable[i + 1], here + 2 * lengths[i] * u), 0.0)
         return (after,)
 
@@ -102,10 +106,6 @@ class _Sides(NamedTuple):
     def least_upper(self, loops: Loops, i: Scalar, x: Scalar) -> Scalar:
         """Return the least upper bound of u on an interval at x."""
         return loops.least(self.upper.shape[1], lambda r: self.upper[i, r] - self.lean[i, r] * x)
-
-    def greatest_lower(self, loops: Loops, i: Scalar, x: Scalar) -> Scalar:
-        """Return the greatest lower bound of u on an interval at x."""
-        return loops.largest(self.upper.shape[1], lambda r: self.lower[i, r] - self.lean[i, r] * x)
 
 
 def _sides(loops: Loops, a: Table, b: Table, c: Table) -> _Sides:
@@ -132,24 +132,23 @@ def _largest(loops: Loops, sides: _Sides, i: Scalar, twice: Scalar, reachable: S
     The room for u, between its least upper and its greatest lower bound, is a concave function of x that is 0 or more
     at x = 0: Newton's steps from the right never pass its root.
     """
-    upper, lower, lean, top = sides
-    rows = upper.shape[1]
+    upper, lower, lean = (table.row(i) for table in (sides.upper, sides.lower, sides.lean))
+    rows, end, by_end = sides.upper.shape[1], reachable / twice, 1 / twice
 
-    def step(x: Scalar) -> tuple[Scalar, tuple[Scalar]]:
-        high, j = loops.first_least(rows, lambda r: upper[i, r] - lean[i, r] * x)
-        low, k = loops.first_largest(rows, lambda r: lower[i, r] - lean[i, r] * x)
+    def step(x: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+        high, j = loops.first_least(rows, lambda r: upper[r] - lean[r] * x)
+        low, k = loops.first_largest(rows, lambda r: lower[r] - lean[r] * x)
         # What comes after the interval bounds u as well.
-        by_end = 1 / twice * x
-        end_high, end_low = reachable / twice - by_end, -by_end
-        is_high, is_low = end_high <= high, end_low >= low
-        high, low = select(is_high, end_high, high), select(is_low, end_low, low)
-        base = select(is_high, reachable / twice, upper[i, j]) - select(is_low, 0.0, lower[i, k])
-        slope = select(is_high, 1 / twice, lean[i, j]) - select(is_low, 1 / twice, lean[i, k])
-        enough = high - low >= -_ROUNDING * (abs(high) + abs(low))
-        done = select(enough, True, slope <= 0)
-        return done, (select(done, x, smaller(x, larger(base / select(slope > 0, slope, 1.0), 0.0))),)
+        at_end = by_end * x
+        high, most, lean_j = loops.when(
+            end - at_end <= high, lambda: (end - at_end, end, by_end), lambda: (high, upper[j], lean[j])
+        )
+        low, least, lean_k = loops.when(-at_end >= low, lambda: (-at_end, 0.0, by_end), lambda: (low, lower[k], lean[k]))
+        slope = lean_j - lean_k
+        done = select(high - low >= -_ROUNDING * (abs(high) + abs(low)), True, slope <= 0)
+        return done, loops.when(done, lambda: (x,), lambda: (smaller(x, larger((most - least) / slope, 0.0)),))
 
-    (x,) = loops.until(_ROUNDS, (top[i],), step)
+    (x,) = loops.until(_ROUNDS, (sides.top[i],), step)
     return x
 
 

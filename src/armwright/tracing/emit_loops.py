@@ -300,6 +300,10 @@ class EmittedTable:
         """How long the axes are."""
         return tuple(self._loops._traced("i64", length) for length in self._lengths)  # noqa: SLF001 - of one module
 
+    def row(self, i: Scalar) -> EmittedTable:
+        """Return a row as a table of one axis less."""
+        return EmittedTable(self._loops, self._address((i, *[0] * (len(self._lengths) - 1))), self._lengths[1:])
+
     def __getitem__(self, key: Scalar) -> Scalar:
         """Return an element."""
         loops = self._loops

@@ -12,9 +12,8 @@ import ctypes
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
-import attrs
 import numpy as np
 
 from armwright.arrays import Array
@@ -22,13 +21,16 @@ from armwright.tracing.emit_loops import EmittedLoops
 from armwright.tracing.native import function_address
 from armwright.tracing.scalar import Scalar
 
-# A table has a ``shape``, and its elements are read and written by index, a tuple of them where it has two axes.
+# A table has a ``shape``, and its numbers are read and written by index, a tuple of them where it has two axes. Within
+# ``walk`` tables of two axes are read row by row, ``table.row(i)[k]``.
 Table: TypeAlias = Any
 # Takes loops, the tables to read, and the tables to write.
 Routine: TypeAlias = Callable[..., None]
 
 # Two axes of loops at most stand for themselves.
 _AXES = 2
+# All indices of a row.
+_ALL = slice(None)
 
 
 class Loops(Protocol):
@@ -62,10 +64,10 @@ class Loops(Protocol):
         """Return the least of what a body returns for the indices; some there must be."""
 
     def first_largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
-        """Return the largest of what a body returns, and the first index for which it does."""
+        """Return the largest of what a body returns, and the first index for which it does; within ``walk`` only."""
 
     def first_least(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
-        """Return the least of what a body returns, and the first index for which it does."""
+        """Return the least of what a body returns, and the first index for which it does; within ``walk`` only."""
 
 
 class Runner(Protocol):
@@ -100,17 +102,15 @@ def _function(routine: Routine, *axes: int) -> Callable[..., None]:
     return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)
 
 
-@attrs.frozen
-class _Index:
-    """All indices of a loop at once, so many along an axis of arrays with so many axes."""
+class _Index(NamedTuple):
+    """All indices of a loop at once, so many along an axis."""
 
     axis: int
     size: int
-    axes: int
 
 
 class _PlainTable:
-    """A table as an array; as lists while elements and rows are read or written one by one."""
+    """A table as an array; as a list while single numbers or rows are read or written."""
 
     def __init__(self, array: Array) -> None:
         self.shape = array.shape
@@ -123,29 +123,26 @@ class _PlainTable:
             self._array = np.array(self._items)
         return self._array
 
-    @property
-    def items(self) -> list[Any]:
-        """Numbers of a table of one axis, rows of one of two."""
+    def row(self, i: int) -> Array:
         if self._items is None:
-            self._items = self.array.tolist() if len(self.shape) == 1 else list(self.array)
-        return self._items
+            self._items = list(self.array)
+        return self._items[i]
 
     def __getitem__(self, key: Any) -> Scalar:
-        if type(key) is not tuple:
-            return self.items[key] if isinstance(key, int) else self._along(key)
-        i, k = key
-        if not isinstance(i, int):
-            return self._along(i, k)
-        return float(self.items[i][k]) if isinstance(k, int) else self.items[i]
-
-    def _along(self, *indices: _Index) -> Array:
-        lengths = [1] * indices[0].axes
+        if type(key) is int:
+            if self._items is None:
+                self._items = self.array.tolist()
+            return self._items[key]
+        indices = (key,) if type(key) is _Index else key
+        lengths = [1] * _AXES
         for index in indices:
             lengths[index.axis] = index.size
         return self.array[tuple(slice(index.size) for index in indices)].reshape(lengths)
 
     def __setitem__(self, key: int, value: float) -> None:
-        self.items[key], self._array = value, None
+        if self._items is None:
+            self._items = self.array.tolist()
+        self._items[key], self._array = value, None
 
 
 class _PlainLoops:
@@ -156,7 +153,7 @@ class _PlainLoops:
 
     def each(self, sizes: Sequence[int], body: Callable[..., Sequence[Scalar]], count: int = 1) -> list[_PlainTable]:
         self._axis = len(sizes)
-        values = body(*(_Index(axis, size, _AXES) for axis, size in enumerate(sizes)))
+        values = body(*map(_Index, range(len(sizes)), sizes))
         self._axis = 0
         lengths = (*sizes, *[1] * (_AXES - len(sizes)))
         tables = [np.broadcast_to(x, lengths).reshape(sizes) for x in values]
@@ -193,22 +190,20 @@ class _PlainLoops:
         return self._reduced(np.minimum.reduce, size, body)
 
     def first_largest(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
-        values = self._values(size, body)
-        at = int(values.argmax())
-        return float(values[at]), at
+        values = body(_ALL)
+        at = values.argmax()
+        return values.item(at), at
 
     def first_least(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
-        values = self._values(size, body)
-        at = int(values.argmin())
-        return float(values[at]), at
+        values = body(_ALL)
+        at = values.argmin()
+        return values.item(at), at
 
     def _reduced(self, reduce: Callable[..., Any], size: int, body: Callable[[Any], Scalar]) -> Scalar:
-        values = self._values(size, body)
-        return reduce(values, axis=self._axis, keepdims=True) if self._axis else float(reduce(values))
-
-    def _values(self, size: int, body: Callable[[Any], Scalar]) -> Array:
         axis = self._axis
+        if not axis:
+            return float(reduce(body(_ALL)))
         self._axis += 1
-        values = body(_Index(axis, size, _AXES if axis else 1))
+        values = body(_Index(axis, size))
         self._axis = axis
-        return np.asarray(values)
+        return reduce(values, axis=axis, keepdims=True)
