@@ -140,7 +140,7 @@ def tracking_error(
         hand: how the tool moves on them at most.
         allowed: the errors that matter; they decide how often the tool is sampled.
     """
-    h = np.diff(trajectory.times)
+    h = trajectory.lengths
     bounds = motion.bounds(trajectory.times, hand)
     needed = np.maximum(bounds.position / allowed.position, 2 * bounds.orientation / allowed.orientation)
     count = int(min(max(math.ceil(float((np.sqrt(needed / (8 * _ADDED)) * h).max())), _SAMPLES[0]), _SAMPLES[1]))
@@ -316,7 +316,7 @@ def farthest_from_legs(solver: Solver, trajectory: Trajectory, positions: Array,
         positions: (k, 3) the ends of the legs, one after the other [m].
         times: (k,) when the trajectory passes them [s].
     """
-    h = np.diff(trajectory.times)
+    h = trajectory.lengths
     bounds = hand_bounds(solver.arm, trajectory.coefficients, h, *cubic_peaks(trajectory.coefficients, h))
     middles_of_legs = (times[1:] + times[:-1]) / 2
     leg = np.searchsorted(middles_of_legs[1:-1], (trajectory.times[1:] + trajectory.times[:-1]) / 2)

@@ -68,7 +68,7 @@ class StraightPath:
     @property
     def shifts(self) -> Array:
         """From the start to the end of each segment, (k, 3) [m]."""
-        return np.asarray(np.diff(self.poses[:, :3, 3], axis=0))
+        return np.asarray(self.poses[1:, :3, 3] - self.poses[:-1, :3, 3])
 
     def __call__(self, t: Array) -> Array:
         """Return the poses (k, 4, 4) at times (k,)."""
@@ -124,7 +124,7 @@ class StraightPath:
             return error_of(samples, distance, half, orientation=orientation)
         # Of the position on the line: how fast it can change, from where it is seen, and how far beyond the ends it is.
         hurry = hand.pull / self._length
-        rate = np.abs(np.diff(along, axis=1)).max(axis=1) / samples.step + samples.step * hurry
+        rate = np.abs(along[:, 1:] - along[:, :-1]).max(axis=1) / samples.step + samples.step * hurry
         beyond = np.maximum(np.maximum(-along, along - 1).max(axis=1) + between * hurry, 0.0)
         bound = by_position + between * spin_bound(hand, angle * hurry, angle * rate) + angle * beyond / 2
         return error_of(
@@ -158,7 +158,7 @@ class StraightPath:
 
         Each lies within one cubic of the progress, whose second derivative is largest at an end of the interval.
         """
-        middles, h = (times[1:] + times[:-1]) / 2, np.diff(times)
+        middles, h = (times[1:] + times[:-1]) / 2, times[1:] - times[:-1]
         way = self._way(middles)
         piece = segments_at(self.progress.times, middles, len(self.progress.coefficients))
         local = middles - self.progress.times[piece]
@@ -301,5 +301,5 @@ def _backward(along: Array, between: Array) -> float:
     back = (farthest - along).max(axis=1)
     # Between two samples the tool is away from the chord by so much at most, before it reverses and after. Where the
     # chord rises by four times that, the tool never reverses.
-    rising = np.diff(along, axis=1).min(axis=1) > 4 * between
+    rising = (along[:, 1:] - along[:, :-1]).min(axis=1) > 4 * between
     return float(np.where(rising & (back <= 0), 0.0, back + 2 * between.max()).max())

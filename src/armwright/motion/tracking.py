@@ -210,7 +210,7 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
         if obstruction is not None:
             return obstruction
         trajectory = _spline(task, knots, q)
-        h = np.diff(knots)
+        h = knots[1:] - knots[:-1]
         speed, acceleration = cubic_peaks(trajectory.coefficients, h, task.solver.rows)
         hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
         error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)
@@ -243,8 +243,11 @@ def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
 
 
 def _rate(t: Array, q: Array) -> Array:
-    """Return the rate (n,) at the first of four knots or more: that of the cubic through them."""
-    return np.asarray(np.linalg.solve(np.vander(t[:4] - t[0], increasing=True), q[:4])[1])
+    """Return the rate (n,) at the first of four knots or more: that of the cubic through them, by Newton's formula."""
+    first = (q[1:4] - q[:3]) / (t[1:4] - t[:3])[:, None]
+    second = (first[1:] - first[:-1]) / (t[2:4] - t[:2])[:, None]
+    third = (second[1] - second[0]) / (t[3] - t[0])
+    return np.asarray(first[0] + (t[0] - t[1]) * (second[0] + (t[0] - t[2]) * third))
 
 
 def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Array:

@@ -131,8 +131,14 @@ class EmittedLoops:
     def each(self, sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]], count: int = 1) -> list[EmittedTable]:
         """Return new tables of what a body returns for each tuple of indices."""
         tables = [self.table(*sizes) for _ in range(count)]
-        self._fill(tables, list(sizes), (), body)
+        self.fill(tables, sizes, body)
         return tables
+
+    def fill(
+        self, tables: Sequence[EmittedTable], sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]]
+    ) -> None:
+        """Write into tables what a body returns for each tuple of indices."""
+        self._fill(tables, list(sizes), (), body)
 
     def _fill(
         self,

@@ -39,6 +39,9 @@ class Loops(Protocol):
     def each(self, sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]], count: int = 1) -> list[Table]:
         """Return ``count`` new tables of what a body returns for each tuple of indices; not within a loop."""
 
+    def fill(self, tables: Sequence[Table], sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]]) -> None:
+        """Write into tables what a body returns for each tuple of indices; not within a loop."""
+
     def table(self, *sizes: Scalar) -> Table:
         """Return a new table of so many numbers along each axis; not within a loop."""
 
@@ -133,11 +136,14 @@ class _PlainTable:
             if self._items is None:
                 self._items = self.array.tolist()
             return self._items[key]
+        # A whole number takes one of the last axis.
         indices = (key,) if type(key) is _Index else key
         lengths = [1] * _AXES
         for index in indices:
-            lengths[index.axis] = index.size
-        return self.array[tuple(slice(index.size) for index in indices)].reshape(lengths)
+            if type(index) is _Index:
+                lengths[index.axis] = index.size
+        places = tuple(slice(index.size) if type(index) is _Index else index for index in indices)
+        return self.array[places].reshape(lengths)
 
     def __setitem__(self, key: int, value: float) -> None:
         if self._items is None:
@@ -152,12 +158,17 @@ class _PlainLoops:
         self._axis = 0
 
     def each(self, sizes: Sequence[int], body: Callable[..., Sequence[Scalar]], count: int = 1) -> list[_PlainTable]:
+        tables = [_PlainTable(np.zeros(sizes)) for _ in range(count)]
+        self.fill(tables, sizes, body)
+        return tables
+
+    def fill(self, tables: Sequence[_PlainTable], sizes: Sequence[int], body: Callable[..., Sequence[Scalar]]) -> None:
         self._axis = len(sizes)
         values = body(*map(_Index, range(len(sizes)), sizes))
         self._axis = 0
-        lengths = (*sizes, *[1] * (_AXES - len(sizes)))
-        tables = [np.broadcast_to(x, lengths).reshape(sizes) for x in values]
-        return [_PlainTable(x) for x in tables[:count]]
+        for table, x in zip(tables, values, strict=True):
+            # Axes of reductions are left over.
+            table.array[...] = x if len(sizes) == _AXES else x[(..., *[0] * (_AXES - len(sizes)))]
 
     def table(self, *sizes: int) -> _PlainTable:
         return _PlainTable(np.zeros(sizes))
@@ -174,7 +185,7 @@ class _PlainLoops:
     ) -> tuple[Scalar, ...]:
         for _ in range(most):
             done, carry = step(*carry)
-            if done:
+            if done is True or np.all(done):
                 break
         return tuple(carry)
 
