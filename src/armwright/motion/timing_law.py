@@ -154,7 +154,7 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
     arm, grid = solver.arm, _gridded(solver, path, caps)
     run = _smooth(grid)
     trajectory = run.trajectory(solver)
-    speed, acceleration = rate_peaks(trajectory.coefficients, trajectory.lengths, solver.rows)
+    speed, acceleration = rate_peaks(trajectory.coefficients, trajectory.lengths, solver.rows, solver.run)
     over = max(
         float((speed / arm.limits.speed).max()),
         math.sqrt(float((acceleration / arm.limits.acceleration).max())),

@@ -183,9 +183,13 @@ class _PlainLoops:
     def until(
         self, most: int, carry: Sequence[Scalar], step: Callable[..., tuple[Scalar, Sequence[Scalar]]]
     ) -> tuple[Scalar, ...]:
+        finished: Any = False
         for _ in range(most):
-            done, carry = step(*carry)
-            if done is True or np.all(done):
+            done, new = step(*carry)
+            # Of many at once each stays as it was when it was done.
+            carry = new if finished is False else [np.where(finished, x, y) for x, y in zip(carry, new, strict=True)]
+            finished = np.logical_or(finished, done) if isinstance(done, np.ndarray) else done
+            if np.all(finished):
                 break
         return tuple(carry)
 
