@@ -53,8 +53,9 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool], ru
     return run(_largest_squares, [*bounds, lengths, ends], (len(lengths) + 1,))
 
 
-def _largest_squares(loops: Loops, a: Table, b: Table, c: Table, lengths: Table, ends: Table, x: Table) -> None:
-    """Write the largest x at the ends of the intervals (N + 1,), given the largest at both ends of all."""
+def _largest_squares(loops: Loops, *tables: Table) -> None:
+    """Write the largest x at the ends of the intervals, given bounds, lengths, and the largest at both ends of all."""
+    a, b, c, lengths, ends, x = tables
     intervals, rows = a.shape
     sides = _sides(loops, a, b, c)
     top = sides.top
@@ -143,7 +144,9 @@ def _largest(loops: Loops, sides: _Sides, i: Scalar, twice: Scalar, reachable: S
         high, most, lean_j = loops.when(
             end - at_end <= high, lambda: (end - at_end, end, by_end), lambda: (high, upper[j], lean[j])
         )
-        low, least, lean_k = loops.when(-at_end >= low, lambda: (-at_end, 0.0, by_end), lambda: (low, lower[k], lean[k]))
+        low, least, lean_k = loops.when(
+            -at_end >= low, lambda: (-at_end, 0.0, by_end), lambda: (low, lower[k], lean[k])
+        )
         slope = lean_j - lean_k
         done = select(high - low >= -_ROUNDING * (abs(high) + abs(low)), True, slope <= 0)
         return done, loops.when(done, lambda: (x,), lambda: (smaller(x, larger((most - least) / slope, 0.0)),))

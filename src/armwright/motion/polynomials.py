@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array
+from armwright.arrays import Array, Flags
 from armwright.motion.rows import Evaluator, on_arrays
 from armwright.tracing.loops import Loops, Runner, Table, with_numpy
 from armwright.tracing.scalar import Scalar, larger, select, smaller
@@ -115,7 +115,7 @@ def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
     most = at_ends.max(axis=0)
     segment, joint = np.nonzero(bound > most)
     if len(segment):
-        _rise_to_extremes(most, joint, terms[segment, :, joint][..., None], lengths[segment], rows, with_numpy)
+        _rise_to_extremes(most, joint, terms[segment, :, joint][..., None], lengths[segment], rows=rows, run=with_numpy)
     return np.asarray(most)
 
 
@@ -131,11 +131,13 @@ def rate_peaks(terms: Array, lengths: Array, rows: Evaluator, run: Runner) -> tu
         accelerations = np.zeros_like(speeds)
         accelerations[:, :-1] = derivative(speeds, 1)
         sought = np.where((index < joints)[:, None, None], speeds, accelerations)
-        _rise_to_extremes(most, index, sought, lengths[segment], rows, run)
+        _rise_to_extremes(most, index, sought, lengths[segment], rows=rows, run=run)
     return most[:joints], most[joints:]
 
 
-def _rise_to_extremes(most: Array, index: Indices, terms: Array, lengths: Array, rows: Evaluator, run: Runner) -> None:
+def _rise_to_extremes(
+    most: Array, index: Indices, terms: Array, lengths: Array, *, rows: Evaluator, run: Runner
+) -> None:
     """Raise the largest magnitudes of some polynomials to those between the ends of others (m, k, 1) of them."""
     lowest, highest = extremes(terms, lengths, rows, run)
     np.maximum.at(most, index, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
@@ -164,9 +166,7 @@ def _reach_of_rates(terms: list[Scalar], length: list[Scalar]) -> list[list[Scal
     return [[*_reach(first, length)[0], *_reach(second, length)[0]]]
 
 
-def turning_times(
-    terms: Array, lengths: Array, rows: Evaluator = on_arrays, run: Runner = with_numpy
-) -> Array:
+def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays, run: Runner = with_numpy) -> Array:
     """Return times (m, n, r) inside the segments among which are all at which a polynomial reverses.
 
     A polynomial whose slope has no two Bernstein coefficients of opposite signs rises or falls all along, and is not
@@ -186,17 +186,31 @@ def turning_times(
     parts = np.zeros((len(slopes), count - 2))
     scaled, below = slopes[turns] / np.abs(slopes[turns]).max(axis=1, keepdims=True), below[turns]
     # Where the signs of the Bernstein coefficients change once there is one root.
-    once = (below[:, 1:] != below[:, :-1]).sum(axis=1) == 1
+    changes = below[:, 1:] != below[:, :-1]
+    once = changes.sum(axis=1) == 1
     if count > _PARABOLA + 1 and once.any():
-        parts[turns[once], 0] = run(_crossing, [scaled[once], np.where(below[once, 0], 1.0, -1.0)], (int(once.sum()),))
+        signs = np.where(below[once, 0], 1.0, -1.0)
+        parts[turns[once], 0] = run(
+            _crossing, [scaled[once], signs, _of_polygon(control[turns[once]], changes[once])], signs.shape
+        )
         turns, scaled = turns[~once], scaled[~once]
     if len(turns):
         parts[turns] = _roots(scaled, rows)
     return np.asarray(parts.reshape(segments, joints, -1) * lengths[:, None, None])
 
 
-def _crossing(loops: Loops, terms: Table, signs: Table, roots: Table) -> None:
-    """Write the roots (r,) in [0, 1] of polynomials (r, k) that have one there, and signs (r,) of their slopes at it."""
+def _of_polygon(control: Array, changes: Flags) -> Array:
+    """Return where polygons of Bernstein coefficients (r, k) pass 0 on [0, 1], whose signs change as given."""
+    rows, before = np.arange(len(control)), changes.argmax(axis=1)
+    low, high = control[rows, before], control[rows, before + 1]
+    return np.asarray((before + low / (low - high)) / changes.shape[1])
+
+
+def _crossing(loops: Loops, terms: Table, signs: Table, starts: Table, roots: Table) -> None:
+    """Write the roots (r,) in [0, 1] of polynomials (r, k) that have one there.
+
+    Given are the signs (r,) of their slopes at it, and where to start.
+    """
     rows, count = terms.shape
 
     def of_row(i: Scalar) -> tuple[Scalar]:
@@ -214,8 +228,8 @@ def _crossing(loops: Loops, terms: Table, signs: Table, roots: Table) -> None:
             following = select(stays, ahead, (low + high) / 2)
             return abs(following - x) <= _NEAR, (low, high, following)
 
-        start = 0.0 * signs[i]
-        return (loops.until(_HALVINGS, (start, start + 1.0, start + 0.5), step)[2],)
+        low = 0.0 * signs[i]
+        return (loops.until(_HALVINGS, (low, low + 1.0, starts[i]), step)[2],)
 
     loops.fill([roots], [rows], of_row)
 

@@ -14,7 +14,7 @@ from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.certified_motion import CertifiedMotion, fastest, standstill
 from armwright.motion.obstruction import PathError
-from armwright.motion.path import NEGLIGIBLE, Path, check_reach, report_speed, report_step
+from armwright.motion.path import NEGLIGIBLE, check_reach, report_speed, report_step, segment_lengths
 from armwright.motion.quintic_polynomials import check_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight_path import StraightPath, line
@@ -149,7 +149,7 @@ def even_time(arm: Arm, A: Array, B: Array, speed: float) -> float | None:
         IncapableArmError: the arm has no reach or tool speed.
     """
     check_speed(speed)
-    length = float(Path(poses=np.stack([A, B])).lengths()[0])
+    length = float(segment_lengths(A, B))
     if length <= NEGLIGIBLE:
         return None
     check_reach(arm)

@@ -112,7 +112,7 @@ class StraightPath:
     def error(self, samples: HandSamples) -> TrackingError:
         """Return how far a sampled tool is from its segments."""
         way, rate, change = samples.bounds.progress
-        planned = self.progress(samples.times)[..., 0] - way[:, None]
+        planned = self._planned(samples.times) - way[:, None]
         count, each = planned.shape
         asked = np.concatenate([np.repeat(self._segments[way], each, axis=0), planned.reshape(-1, 1)], axis=1)
         seen = samples.rows(_seen, [], [samples.poses.reshape(-1, 16), asked])[0].reshape(count, each, 4)
@@ -134,6 +134,12 @@ class StraightPath:
             orientation=np.maximum(orientation, bound),
             backward=_backward(along * self._length, between * hand.pull),
         )
+
+    def _planned(self, times: Array) -> Array:
+        """Return the progress (m, k) at times (m, k), each row of which lies within one cubic of it."""
+        starts, terms = self.progress.times, self.progress.coefficients
+        piece = segments_at(starts, (times[:, 0] + times[:, -1]) / 2, len(terms))
+        return evaluate(terms[piece], times - starts[piece, None])
 
     @property
     def _segments(self) -> Array:

@@ -27,7 +27,7 @@ from armwright.motion.forward_backward import Bounds, largest_squares
 from armwright.motion.knots import segments_at
 from armwright.motion.polynomials import composed, evaluate, rate_peaks, shifted
 from armwright.motion.solver import Solver
-from armwright.motion.trajectory import Trajectory
+from armwright.motion.trajectory import Trajectory, run_slower
 from armwright.tracing.loops import Loops, Table
 from armwright.tracing.scalar import Scalar, larger, select
 
@@ -132,10 +132,9 @@ class _Run(NamedTuple):
     law: Array
     uses: Array
 
-    def trajectory(self, solver: Solver) -> Trajectory:
-        """Return that of the joints."""
-        terms = solver.rows(composed, [self.path.coefficients[self.intervals]], [self.law])[0]
-        return Trajectory(times=self.times, coefficients=terms)
+    def terms(self, solver: Solver) -> Array:
+        """Return the coefficients of the joint positions over time, (p, 10, n)."""
+        return solver.rows(composed, [self.path.coefficients[self.intervals]], [self.law])[0]
 
     @property
     def duration(self) -> float:
@@ -153,19 +152,19 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
     """
     arm, grid = solver.arm, _gridded(solver, path, caps)
     run = _smooth(grid)
-    trajectory = run.trajectory(solver)
-    speed, acceleration = rate_peaks(trajectory.coefficients, trajectory.lengths, solver.rows, solver.run)
+    terms = run.terms(solver)
+    speed, acceleration = rate_peaks(terms, run.times[1:] - run.times[:-1], solver.rows, solver.run)
     over = max(
         float((speed / arm.limits.speed).max()),
         math.sqrt(float((acceleration / arm.limits.acceleration).max())),
         float(run.uses[:, 0].max()),
-        grid.allowed / trajectory.duration,
+        grid.allowed / float(run.times[-1]),
     )
-    trajectory = trajectory.slowed(over)
+    trajectory = run_slower(run.times, terms, over)
     factor = trajectory.duration / _allowed(float((grid.lengths / grid.caps).sum()) + _RAMP)
     law = run.law.copy()
     law[:, 0] += run.path.times[run.intervals]
-    progress = Trajectory(times=run.times, coefficients=law[..., None]).slowed(over)
+    progress = run_slower(run.times, law[..., None], over)
     because = _binding(arm.n, run) if factor > 1 else None
     return TimedPath(trajectory, factor, because, progress, speed / over, acceleration / over**2)
 

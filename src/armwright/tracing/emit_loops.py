@@ -128,7 +128,9 @@ class EmittedLoops:
 
     # ---- loops ----
 
-    def each(self, sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]], count: int = 1) -> list[EmittedTable]:
+    def each(
+        self, sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]], count: int = 1
+    ) -> list[EmittedTable]:
         """Return new tables of what a body returns for each tuple of indices."""
         tables = [self.table(*sizes) for _ in range(count)]
         self.fill(tables, sizes, body)

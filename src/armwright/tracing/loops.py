@@ -9,7 +9,6 @@ each other, ``walk`` and ``until``, is a loop of Python over floats, and the sam
 from __future__ import annotations
 
 import ctypes
-import math
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -29,8 +28,6 @@ Routine: TypeAlias = Callable[..., None]
 
 # Two axes of loops at most stand for themselves.
 _AXES = 2
-# All indices of a row.
-_ALL = slice(None)
 
 
 class Loops(Protocol):
@@ -129,13 +126,16 @@ class _PlainTable:
     def row(self, i: int) -> Array:
         if self._items is None:
             self._items = list(self.array)
-        return self._items[i]
+        row: Array = self._items[i]
+        return row
 
     def __getitem__(self, key: Any) -> Scalar:
         if type(key) is int:
             if self._items is None:
                 self._items = self.array.tolist()
             return self._items[key]
+        if type(key) is slice:
+            return self.array[key]
         # A whole number takes one of the last axis.
         indices = (key,) if type(key) is _Index else key
         lengths = [1] * _AXES
@@ -205,19 +205,19 @@ class _PlainLoops:
         return self._reduced(np.minimum.reduce, size, body)
 
     def first_largest(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
-        values = body(_ALL)
+        values = body(slice(size))
         at = values.argmax()
         return values.item(at), at
 
     def first_least(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
-        values = body(_ALL)
+        values = body(slice(size))
         at = values.argmin()
         return values.item(at), at
 
     def _reduced(self, reduce: Callable[..., Any], size: int, body: Callable[[Any], Scalar]) -> Scalar:
         axis = self._axis
         if not axis:
-            return float(reduce(body(_ALL)))
+            return float(reduce(body(slice(size))))
         self._axis += 1
         values = body(_Index(axis, size))
         self._axis = axis
