@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TypeAlias
 
 import attrs
@@ -65,7 +66,7 @@ class StraightPath:
         """From start to end [s]."""
         return float(self.corners[-1])
 
-    @property
+    @cached_property
     def shifts(self) -> Array:
         """From the start to the end of each segment, (k, 3) [m]."""
         return np.asarray(self.poses[1:, :3, 3] - self.poses[:-1, :3, 3])
@@ -102,7 +103,7 @@ class StraightPath:
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
         """Return bounds of the error on the intervals between times: the distance from a straight segment is convex."""
         progress = way, rate, change = self._rates(times)
-        angle = np.linalg.norm(self.rotations[way], axis=-1)
+        angle = self._angles[way]
         spin = spin_bound(hand, angle * change, angle * rate)
         if self._by_position:
             # As an estimate the tool moves along the line as was planned; ``error`` does without.
@@ -117,7 +118,7 @@ class StraightPath:
         asked = np.concatenate([np.repeat(self._segments[way], each, axis=0), planned.reshape(-1, 1)], axis=1)
         seen = samples.rows(_seen, [], [samples.poses.reshape(-1, 16), asked])[0].reshape(count, each, 4)
         distance, along, (half, by_position) = seen[..., 0], seen[..., 1], seen[..., 2:].max(axis=1).T
-        angle = np.linalg.norm(self.rotations[way], axis=-1)
+        angle = self._angles[way]
         between, hand = samples.step**2 / 8, samples.hand
         orientation = half + between * spin_bound(hand, angle * change, angle * rate)
         if not self._by_position:
@@ -144,14 +145,19 @@ class StraightPath:
     @property
     def _segments(self) -> Array:
         """Return the segments as ``_seen`` takes them, (k, 20)."""
-        angles = np.linalg.norm(self.rotations, axis=-1, keepdims=True)
+        angles = self._angles[:, None]
         squares = np.einsum("ki,ki->k", self.shifts, self.shifts)[:, None]
         axes = self.rotations / np.where(angles > 0, angles, 1.0)
         R = self.poses[:-1, :3, :3].reshape(-1, 9)
         parts = [self.poses[:-1, :3, 3], R, self.shifts, np.where(squares > 0, squares, 1.0), axes, angles]
         return np.concatenate(parts, axis=1)
 
-    @property
+    @cached_property
+    def _angles(self) -> Array:
+        """Of the rotations on the segments, (k,) [rad]."""
+        return np.asarray(np.linalg.norm(self.rotations, axis=-1))
+
+    @cached_property
     def _length(self) -> float:
         return float(np.linalg.norm(self.shifts[0]))
 

@@ -243,11 +243,8 @@ def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
 
 
 def _rate(t: Array, q: Array) -> Array:
-    """Return the rate (n,) at the first of four knots or more: that of the cubic through them, by Newton's formula."""
-    first = (q[1:4] - q[:3]) / (t[1:4] - t[:3])[:, None]
-    second = (first[1:] - first[:-1]) / (t[2:4] - t[:2])[:, None]
-    third = (second[1] - second[0]) / (t[3] - t[0])
-    return np.asarray(first[0] + (t[0] - t[1]) * (second[0] + (t[0] - t[2]) * third))
+    """Return the rate (n,) at the first of four knots or more: that of the cubic through them."""
+    return np.asarray(np.linalg.solve(np.vander(t[:4] - t[0], increasing=True), q[:4])[1])
 
 
 def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Array:
