@@ -46,18 +46,13 @@ class Path:
 
     def lengths(self) -> Array:
         """Return the length of every segment (k-1,) [m]; a rotation counts with ``TURN_RADIUS``."""
-        return segment_lengths(self.poses[:-1], self.poses[1:])
+        shift = np.linalg.norm(np.diff(self.poses[:, :3, 3], axis=0), axis=-1)
+        angle = angle_between(self.poses[:-1, :3, :3], self.poses[1:, :3, :3])
+        return np.asarray(np.maximum(shift, TURN_RADIUS * angle))
 
     def at(self, segment: int, fraction: ArrayLike) -> Array:
         """Return poses (..., 4, 4) at fractions (...) of one segment."""
         return between(self.poses[segment], self.poses[segment + 1], fraction)
-
-
-def segment_lengths(A: Array, B: Array) -> Array:
-    """Return the lengths (...) of straight segments from poses (..., 4, 4) to others [m]: see ``Path.lengths``."""
-    shift = np.linalg.norm(B[..., :3, 3] - A[..., :3, 3], axis=-1)
-    angle = angle_between(A[..., :3, :3], B[..., :3, :3])
-    return np.asarray(np.maximum(shift, TURN_RADIUS * angle))
 
 
 class Knots(NamedTuple):

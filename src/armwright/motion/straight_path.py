@@ -229,12 +229,13 @@ def _half_sine(axis: list[Scalar], angle: Scalar, Q: list[list[Scalar]]) -> Scal
     return sqrt(dot(v, v)) / (4 * w)
 
 
-def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:
+def line(A: Array, B: Array, rotation: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:
     """Return the straight line of the tool from A to B.
 
     Args:
         A: (4, 4) pose at the start.
         B: (4, 4) pose at the end.
+        rotation: (3,) rotation vector from start to end, in the axes at the start [rad].
         even: how long it takes at full speed throughout [s].
         near: as for ``StraightPath``.
         ramp: part of the duration that gathers speed, and that loses it again; at full speed from end to end if 0.
@@ -243,7 +244,7 @@ def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> 
     even_progress = Trajectory(times=[0.0, duration], coefficients=[[[0.0], [1 / duration]]])
     return StraightPath(
         poses=np.stack([A, B]),
-        rotations=rotation_vector(A[:3, :3].T @ B[:3, :3])[None],
+        rotations=rotation[None],
         corners=np.array([0.0, duration]),
         progress=s_curve(duration, ramp) if ramp else even_progress,
         numbers=(0,),
