@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, Flags
 from armwright.tracing.emit_loops import EmittedLoops
 from armwright.tracing.native import function_address
 from armwright.tracing.scalar import Scalar
@@ -151,6 +151,10 @@ class _PlainTable:
         self._items[key], self._array = value, None
 
 
+def _where(condition: Flags, then: Sequence[Scalar], otherwise: Sequence[Scalar]) -> list[Scalar]:
+    return [np.where(condition, x, y) for x, y in zip(then, otherwise, strict=True)]
+
+
 class _PlainLoops:
     """See ``Loops``: what stands for itself is an axis of arrays."""
 
@@ -183,13 +187,17 @@ class _PlainLoops:
     def until(
         self, most: int, carry: Sequence[Scalar], step: Callable[..., tuple[Scalar, Sequence[Scalar]]]
     ) -> tuple[Scalar, ...]:
-        finished: Any = False
+        finished: Any = None
         for _ in range(most):
             done, new = step(*carry)
-            # Of many at once each stays as it was when it was done.
-            carry = new if finished is False else [np.where(finished, x, y) for x, y in zip(carry, new, strict=True)]
-            finished = np.logical_or(finished, done) if isinstance(done, np.ndarray) else done
-            if np.all(finished):
+            if isinstance(done, np.ndarray):
+                # Of many at once each stays as it was when it was done.
+                carry = new if finished is None else _where(finished, carry, new)
+                finished = done if finished is None else finished | done
+                done = finished.all()
+            else:
+                carry = new
+            if done:
                 break
         return tuple(carry)
 
