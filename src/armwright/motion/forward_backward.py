@@ -94,9 +94,9 @@ def _largest_squares(loops: Loops, *tables: Table) -> None:
 
 
 class _Sides(NamedTuple):
-    """Bounds lower - lean x <= u <= upper - lean x on N intervals, (N, rows) each, and x <= top, (N,).
+    """Bounds lower - lean x <= u <= upper - lean x on N intervals, (N, rows + 1) each, and x <= top, (N,).
 
-    A row that does not bound u is infinite.
+    A row that does not bound u is infinite. The last column is kept for what comes after an interval.
     """
 
     upper: Table
@@ -106,7 +106,7 @@ class _Sides(NamedTuple):
 
     def least_upper(self, loops: Loops, i: Scalar, x: Scalar) -> Scalar:
         """Return the least upper bound of u on an interval at x."""
-        return loops.least(self.upper.shape[1], lambda r: self.upper[i, r] - self.lean[i, r] * x)
+        return loops.least(self.upper.shape[1] - 1, lambda r: self.upper[i, r] - self.lean[i, r] * x)
 
 
 def _sides(loops: Loops, a: Table, b: Table, c: Table) -> _Sides:
@@ -122,7 +122,8 @@ def _sides(loops: Loops, a: Table, b: Table, c: Table) -> _Sides:
         lean = select(on_u, b[i, r] / by, 0.0)
         return [upper, lower, lean, select(on_u, UNBOUNDED, select(on_x, top, UNBOUNDED))]
 
-    upper, lower, lean, tops = loops.each([intervals, rows], of_row, 4)
+    upper, lower, lean, tops = (loops.table(intervals, rows + 1) for _ in range(4))
+    loops.fill([upper, lower, lean, tops], [intervals, rows], of_row)
     (top,) = loops.each([intervals], lambda i: [smaller(loops.least(rows, lambda r: tops[i, r]), UNBOUNDED)])
     return _Sides(upper, lower, lean, top)
 
@@ -134,22 +135,15 @@ def _largest(loops: Loops, sides: _Sides, i: Scalar, twice: Scalar, reachable: S
     at x = 0: Newton's steps from the right never pass its root.
     """
     upper, lower, lean = (table.row(i) for table in (sides.upper, sides.lower, sides.lean))
-    rows, end, by_end = sides.upper.shape[1], reachable / twice, 1 / twice
+    last = sides.upper.shape[1] - 1
+    upper[last], lower[last], lean[last] = reachable / twice, 0.0, 1 / twice
 
     def step(x: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
-        high, j = loops.first_least(rows, lambda r: upper[r] - lean[r] * x)
-        low, k = loops.first_largest(rows, lambda r: lower[r] - lean[r] * x)
-        # What comes after the interval bounds u as well.
-        at_end = by_end * x
-        high, most, lean_j = loops.when(
-            end - at_end <= high, lambda: (end - at_end, end, by_end), lambda: (high, upper[j], lean[j])
-        )
-        low, least, lean_k = loops.when(
-            -at_end >= low, lambda: (-at_end, 0.0, by_end), lambda: (low, lower[k], lean[k])
-        )
-        slope = lean_j - lean_k
+        high, j = loops.first_least(last + 1, lambda r: upper[r] - lean[r] * x)
+        low, k = loops.first_largest(last + 1, lambda r: lower[r] - lean[r] * x)
+        slope = lean[j] - lean[k]
         done = select(high - low >= -_ROUNDING * (abs(high) + abs(low)), True, slope <= 0)
-        return done, loops.when(done, lambda: (x,), lambda: (smaller(x, larger((most - least) / slope, 0.0)),))
+        return done, loops.when(done, lambda: (x,), lambda: (smaller(x, larger((upper[j] - lower[k]) / slope, 0.0)),))
 
     (x,) = loops.until(_ROUNDS, (sides.top[i],), step)
     return x

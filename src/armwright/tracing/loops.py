@@ -172,7 +172,7 @@ class _PlainLoops:
         self._axis = 0
         for table, x in zip(tables, values, strict=True):
             # Axes of reductions are left over.
-            table.array[...] = x if len(sizes) == _AXES else x[(..., *[0] * (_AXES - len(sizes)))]
+            table.array[tuple(map(slice, sizes))] = x if len(sizes) == _AXES else x[(..., *[0] * (_AXES - len(sizes)))]
 
     def table(self, *sizes: int) -> _PlainTable:
         return _PlainTable(np.zeros(sizes))

@@ -12,6 +12,9 @@ from armwright.tracing.graph import Traced, is_traced, traced
 # functions below.
 Scalar: TypeAlias = Any
 
+# The types of conditions that hold or do not.
+_DECIDED = frozenset({bool, np.bool_})
+
 
 def _evaluate(op: str, on_arrays: Callable[..., Any], on_floats: Callable[..., float], *operands: Scalar) -> Scalar:
     """Apply a function to scalars: as an operation of a graph, to arrays or to floats."""
@@ -47,6 +50,8 @@ def round_half_even(x: Scalar) -> Scalar:
 
 def select(condition: Any, then: Scalar, otherwise: Scalar) -> Scalar:
     """Return ``then`` where ``condition`` holds and ``otherwise`` elsewhere; both are evaluated."""
+    if type(condition) in _DECIDED:
+        return then if condition else otherwise
     if isinstance(condition, Traced) or isinstance(then, Traced) or isinstance(otherwise, Traced):
         return traced("select", condition, then, otherwise)
     if isinstance(condition, np.ndarray):
