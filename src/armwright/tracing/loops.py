@@ -88,7 +88,7 @@ def with_numpy(routine: Routine, inputs: Sequence[Array], shape: tuple[int, ...]
 def compiled(routine: Routine, inputs: Sequence[Array], shape: tuple[int, ...]) -> Array:
     """Run a routine as machine code, which is compiled when it is first needed: see ``Runner``."""
     result = np.empty(shape)
-    arrays = [*map(np.ascontiguousarray, inputs), result]
+    arrays = [*(np.ascontiguousarray(x, dtype=np.float64) for x in inputs), result]
     lengths = [length for x in arrays for length in x.shape]
     function = _function(routine, *(x.ndim for x in arrays))
     addresses = (ctypes.c_void_p * len(arrays))(*(x.ctypes.data for x in arrays))
