@@ -6,6 +6,7 @@ import pytest
 from armwright.arrays import Array
 from armwright.motion.polynomials import peaks, rate_peaks, shifted
 from armwright.motion.rows import Evaluator, by_kernels, on_arrays
+from armwright.tracing.loops import compiled, with_numpy
 from armwright.tracing.scalar import Scalar, larger, smaller
 
 
@@ -51,7 +52,8 @@ def test_peaks_against_a_dense_grid(evaluate: Evaluator, rng: np.random.Generato
     """No sample of a polynomial, of its slope or its second derivative is beyond the peak, and some come up to it."""
     for degree in (1, 2, 3, 5, 9):
         terms, lengths = rng.normal(size=(6, degree + 1, 3)), rng.uniform(0.1, 1.5, 6)
-        found = [peaks(terms, lengths, evaluate), *rate_peaks(terms, lengths, evaluate)]
+        run = compiled if evaluate is by_kernels else with_numpy
+        found = [peaks(terms, lengths, evaluate), *rate_peaks(terms, lengths, evaluate, run)]
         for order, peak in enumerate(found):
             sampled = np.max([_magnitudes(terms[k], lengths[k], order) for k in range(6)], axis=0)
             assert (sampled <= peak * (1 + 1e-12) + 1e-12).all()

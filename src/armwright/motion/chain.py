@@ -177,7 +177,7 @@ def _nearest_of(arm: Arm, candidates: Array, q: Array) -> Array:
 def _along_one_branch(solver: Solver, X: Array, branches: Array, singular: Array, q_start: Array) -> Array | None:
     """Return the branch (k, n) of the first configuration if it meets all poses (k, 4, 4) without a jump, else None."""
     branch = int(np.abs(branches[0] - q_start).max(axis=-1).argmin())
-    steps = np.diff(branches[:, branch], axis=0)
+    steps = branches[1:, branch] - branches[:-1, branch]
     steps -= np.where(solver.arm.revolute, 2 * np.pi * np.round(steps / (2 * np.pi)), 0.0)
     jumps = np.abs(branches[0, branch] - q_start).max() > _OTHER or np.abs(steps).max() > _JUMP
     if singular[:, branch].any() or jumps:

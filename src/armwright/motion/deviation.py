@@ -140,14 +140,20 @@ def tracking_error(
         hand: how the tool moves on them at most.
         allowed: the errors that matter; they decide how often the tool is sampled.
     """
-    h = np.diff(trajectory.times)
+    h = trajectory.lengths
     bounds = motion.bounds(trajectory.times, hand)
     needed = np.maximum(bounds.position / allowed.position, 2 * bounds.orientation / allowed.orientation)
     count = int(min(max(math.ceil(float((np.sqrt(needed / (8 * _ADDED)) * h).max())), _SAMPLES[0]), _SAMPLES[1]))
-    local = np.linspace(0.0, 1.0, count + 1) * h[:, None]
+    local = _even_parts(count) * h[:, None]
     q = evaluate(trajectory.coefficients[:, :, None], local[..., None])
     times = np.minimum(trajectory.times[:-1, None] + local, trajectory.duration)
     return motion.error(HandSamples(times, np.asarray(solver.forward(q)), h / count, hand, bounds, solver.rows))
+
+
+@cache
+def _even_parts(count: int) -> Array:
+    """Return the ends of so many equal parts of an interval, from 0 to 1."""
+    return np.linspace(0.0, 1.0, count + 1)
 
 
 def error_of(
@@ -282,7 +288,7 @@ def _turning_positions(c: list[Scalar], length: list[Scalar]) -> list[list[Scala
 
 def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:
     """Return the largest distance (n,) of the tool from the frame before each joint, slides as far out as they go."""
-    farthest = evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
+    farthest = np.zeros(arm.n) if arm.revolute.all() else evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
     parts = [joint.span(0.0 if joint.revolute else farthest[i]) for i, joint in enumerate(arm.joints)]
     tool = float(np.linalg.norm(arm.tool[:3, 3]))
     return np.asarray(np.cumsum([tool, *parts[::-1]])[:0:-1])
@@ -316,7 +322,7 @@ def farthest_from_legs(solver: Solver, trajectory: Trajectory, positions: Array,
         positions: (k, 3) the ends of the legs, one after the other [m].
         times: (k,) when the trajectory passes them [s].
     """
-    h = np.diff(trajectory.times)
+    h = trajectory.lengths
     bounds = hand_bounds(solver.arm, trajectory.coefficients, h, *cubic_peaks(trajectory.coefficients, h))
     middles_of_legs = (times[1:] + times[:-1]) / 2
     leg = np.searchsorted(middles_of_legs[1:-1], (trajectory.times[1:] + trajectory.times[:-1]) / 2)

@@ -16,6 +16,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.errors import ArmwrightError
 from armwright.extras import import_extra
+from armwright.tracing.loops import Loops, Runner, Table, with_numpy
+from armwright.tracing.scalar import Scalar, larger, select, smaller
 
 # The largest x there is, where nothing binds. The solver of toppra loses its path among numbers so far apart.
 UNBOUNDED = 1e12
@@ -35,85 +37,115 @@ class Bounds(NamedTuple):
     c: Array
 
 
-def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array:
+def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool], run: Runner = with_numpy) -> Array:
     """Return the largest x at the ends of the intervals (N + 1,).
 
     Args:
         bounds: on every interval.
         lengths: (N,) of the intervals.
         rests: whether x may be anything at the start and at the end; else it is 0.
+        run: runs the routine.
 
     Source:
         Pham & Pham, "A new approach to time-optimal path parameterization based on reachability analysis" (2018).
     """
-    sides, twice = _sides(bounds), (2 * lengths).tolist()
-    reachable = [0.0] * (len(twice) + 1)
-    reachable[-1] = UNBOUNDED if rests[1] else 0.0
-    top, top_highs, top_lows = sides.top.tolist(), *sides.room(sides.top)
-    for i in reversed(range(len(twice))):
+    ends = np.where(rests, UNBOUNDED, 0.0)
+    return run(_largest_squares, [*bounds, lengths, ends], (len(lengths) + 1,))
+
+
+def _largest_squares(loops: Loops, *tables: Table) -> None:
+    """Write the largest x at the ends of the intervals, given bounds, lengths, and the largest at both ends of all."""
+    a, b, c, lengths, ends, x = tables
+    intervals, rows = a.shape
+    sides = _sides(loops, a, b, c)
+    top = sides.top
+    reachable = loops.table(intervals + 1)
+    reachable[intervals] = ends[1]
+    (highs,) = loops.each([intervals], lambda i: [sides.least_upper(loops, i, top[i])])
+    (lows,) = loops.each(
+        [intervals], lambda i: [loops.largest(rows, lambda r: sides.lower[i, r] - sides.lean[i, r] * top[i])]
+    )
+
+    def backward(i: Scalar, after: Scalar) -> tuple[Scalar, ...]:
         # Mostly the end is reached from the largest x of all.
-        by_end = 1 / twice[i] * top[i]
-        high, low = min(top_highs[i], reachable[i + 1] / twice[i] - by_end), max(top_lows[i], -by_end)
-        if high - low >= -_ROUNDING * (abs(high) + abs(low)):
-            reachable[i] = top[i]
-        else:
-            reachable[i] = _largest(sides, i, twice[i], reachable[i + 1])
-    x = [reachable[0] if rests[0] else 0.0]
-    most, _ = sides.room(np.array(reachable[:-1]))
-    uppers, leans = list(sides.upper[:, 1:]), list(sides.lean[:, 1:])
-    for i in range(len(twice)):
-        u = most[i] if x[i] == reachable[i] else float(np.minimum.reduce(uppers[i] - leans[i] * x[i]))
-        x.append(max(0.0, min(reachable[i + 1], x[i] + twice[i] * u)))
-    return np.array(x)
+        twice = 2 * lengths[i]
+        by_end = 1 / twice * top[i]
+        high, low = smaller(highs[i], after / twice - by_end), larger(lows[i], -by_end)
+        there = high - low >= -_ROUNDING * (abs(high) + abs(low))
+        (reachable[i],) = found = loops.when(
+            there, lambda: (top[i],), lambda: (_largest(loops, sides, i, twice, after),)
+        )
+        return found
+
+    loops.walk(intervals, (ends[1],), backward, reverse=True)
+    x[0] = smaller(reachable[0], ends[0])
+    (most,) = loops.each([intervals], lambda i: [sides.least_upper(loops, i, reachable[i])])
+
+    def forward(i: Scalar, here: Scalar) -> tuple[Scalar, ...]:
+        def sought() -> tuple[Scalar]:
+            upper, lean = sides.upper.row(i), sides.lean.row(i)
+            return (loops.least(rows, lambda r: upper[r] - lean[r] * here),)
+
+        (u,) = loops.when(here >= reachable[i], lambda: (most[i],), sought)
+        x[i + 1] = after = larger(smaller(reachable[i + 1], here + 2 * lengths[i] * u), 0.0)
+        return (after,)
+
+    loops.walk(intervals, (x[0],), forward)
 
 
 class _Sides(NamedTuple):
     """Bounds lower - lean x <= u <= upper - lean x on N intervals, (N, rows + 1) each, and x <= top, (N,).
 
-    The first column is kept for what comes after an interval. A row that does not bound u is infinite.
+    A row that does not bound u is infinite. The last column is kept for what comes after an interval.
     """
 
-    upper: Array
-    lower: Array
-    lean: Array
-    top: Array
+    upper: Table
+    lower: Table
+    lean: Table
+    top: Table
 
-    def room(self, x: Array) -> tuple[list[float], list[float]]:
-        """Return the least upper and the greatest lower bounds of u on every interval at x (N,)."""
-        by_x = self.lean[:, 1:] * x[:, None]
-        return (self.upper[:, 1:] - by_x).min(axis=1).tolist(), (self.lower[:, 1:] - by_x).max(axis=1).tolist()
-
-
-def _sides(bounds: Bounds) -> _Sides:
-    blank = np.zeros((len(bounds.a), 1))
-    a, b, c = (np.concatenate([blank, each], axis=1) for each in bounds)
-    on_u = np.abs(a) > _NONE * np.abs(a).max(axis=1, keepdims=True)
-    side = np.sign(a)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        upper, lower = np.where(on_u, (side - c) / a, np.inf), np.where(on_u, (-side - c) / a, -np.inf)
-        tops = np.where(on_u | (b == 0), UNBOUNDED, (1 - np.sign(b) * c) / np.abs(b))
-        lean = np.where(on_u, b / a, 0.0)
-    return _Sides(upper, lower, lean, np.minimum(tops.min(axis=1), UNBOUNDED))
+    def least_upper(self, loops: Loops, i: Scalar, x: Scalar) -> Scalar:
+        """Return the least upper bound of u on an interval at x."""
+        return loops.least(self.upper.shape[1] - 1, lambda r: self.upper[i, r] - self.lean[i, r] * x)
 
 
-def _largest(sides: _Sides, i: int, twice: float, reachable: float) -> float:
+def _sides(loops: Loops, a: Table, b: Table, c: Table) -> _Sides:
+    intervals, rows = a.shape
+    (most,) = loops.each([intervals], lambda i: [loops.largest(rows, lambda r: abs(a[i, r]))])
+
+    def of_row(i: Scalar, r: Scalar) -> list[Scalar]:
+        on_u, on_x = abs(a[i, r]) > _NONE * most[i], abs(b[i, r]) > 0
+        side = select(a[i, r] < 0, -1.0, 1.0)
+        by = select(on_u, a[i, r], 1.0)
+        upper, lower = (select(on_u, (s * side - c[i, r]) / by, s * math.inf) for s in (1.0, -1.0))
+        top = (1 - select(b[i, r] < 0, -1.0, 1.0) * c[i, r]) / select(on_x, abs(b[i, r]), 1.0)
+        lean = select(on_u, b[i, r] / by, 0.0)
+        return [upper, lower, lean, select(on_u, UNBOUNDED, select(on_x, top, UNBOUNDED))]
+
+    upper, lower, lean, tops = (loops.table(intervals, rows + 1) for _ in range(4))
+    loops.fill([upper, lower, lean, tops], [intervals, rows], of_row)
+    (top,) = loops.each([intervals], lambda i: [smaller(loops.least(rows, lambda r: tops[i, r]), UNBOUNDED)])
+    return _Sides(upper, lower, lean, top)
+
+
+def _largest(loops: Loops, sides: _Sides, i: Scalar, twice: Scalar, reachable: Scalar) -> Scalar:
     """Return the largest x of an interval from which some u leads to an x between 0 and ``reachable`` at its end.
 
     The room for u, between its least upper and its greatest lower bound, is a concave function of x that is 0 or more
     at x = 0: Newton's steps from the right never pass its root.
     """
-    upper, lower, lean = sides.upper[i], sides.lower[i], sides.lean[i]
-    upper[0], lower[0], lean[0] = reachable / twice, 0.0, 1 / twice
-    x = float(sides.top[i])
-    for _ in range(_ROUNDS):
-        by_x = lean * x
-        highs, lows = upper - by_x, lower - by_x
-        j, k = int(highs.argmin()), int(lows.argmax())
-        room, size = float(highs[j] - lows[k]), float(abs(highs[j]) + abs(lows[k]))
-        slope = float(lean[j] - lean[k])
-        if room >= -_ROUNDING * size or slope <= 0:
-            break
-        x = min(x, max(0.0, float(upper[j] - lower[k]) / slope))
+    upper, lower, lean = (table.row(i) for table in (sides.upper, sides.lower, sides.lean))
+    last = sides.upper.shape[1] - 1
+    upper[last], lower[last], lean[last] = reachable / twice, 0.0, 1 / twice
+
+    def step(x: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+        high, j = loops.first_least(last + 1, lambda r: upper[r] - lean[r] * x)
+        low, k = loops.first_largest(last + 1, lambda r: lower[r] - lean[r] * x)
+        slope = lean[j] - lean[k]
+        done = select(high - low >= -_ROUNDING * (abs(high) + abs(low)), True, slope <= 0)
+        return done, loops.when(done, lambda: (x,), lambda: (smaller(x, larger((upper[j] - lower[k]) / slope, 0.0)),))
+
+    (x,) = loops.until(_ROUNDS, (sides.top[i],), step)
     return x
 
 

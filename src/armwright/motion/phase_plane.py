@@ -12,6 +12,7 @@ its end.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -93,7 +94,7 @@ def fastest(
         IncapableArmError: no run however slow keeps the efforts, or any run however fast.
         MissingExtraError: toppra is not installed.
     """
-    solve = by_toppra if method == "toppra" else largest_squares
+    solve = by_toppra if method == "toppra" else partial(largest_squares, run=solver.run)
     rows = _rows(solver, grid, locate, efforts=efforts)
     bounds = Bounds(rows.a, rows.b, rows.c)  # the root of x left out
     x = solve(bounds, grid.lengths, rests)

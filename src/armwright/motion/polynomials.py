@@ -12,8 +12,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array
+from armwright.arrays import Array, Flags
 from armwright.motion.rows import Evaluator, on_arrays
+from armwright.tracing.loops import Loops, Runner, Table, with_numpy
 from armwright.tracing.scalar import Scalar, larger, select, smaller
 
 Indices: TypeAlias = npt.NDArray[np.intp]
@@ -22,6 +23,10 @@ Indices: TypeAlias = npt.NDArray[np.intp]
 # whole polynomial, then puts them right.
 _FADED = 1e-12
 _POLISHES = 3
+# A parabola has so many coefficients; its roots need no search.
+_PARABOLA = 3
+# A single root is sought until a step is this small, behind which Newton's next one is lost in rounding.
+_HALVINGS, _NEAR = 60, 1e-9
 
 
 def evaluate(terms: Array, t: Array) -> Array:
@@ -79,16 +84,19 @@ def composed(outer: list[Scalar], inner: list[Scalar]) -> list[list[Scalar]]:
     return [terms]
 
 
-def extremes(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> tuple[Array, Array]:
+def extremes(
+    terms: Array, lengths: Array, rows: Evaluator = on_arrays, run: Runner = with_numpy
+) -> tuple[Array, Array]:
     """Return the smallest and the largest value (m, n) on each segment, by the roots of the derivative.
 
     Args:
         terms: (m, k, n) coefficients.
         lengths: (m,) of the segments.
         rows: evaluates equations of many rows.
+        run: runs routines.
     """
     ends = [terms[:, 0], evaluate(terms, lengths[:, None])]
-    between = evaluate(terms[..., None], turning_times(terms, lengths, rows))
+    between = evaluate(terms[..., None], turning_times(terms, lengths, rows, run))
     values = np.concatenate([np.stack(ends, axis=-1), between], axis=-1)
     return values.min(axis=-1), values.max(axis=-1)
 
@@ -107,11 +115,11 @@ def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
     most = at_ends.max(axis=0)
     segment, joint = np.nonzero(bound > most)
     if len(segment):
-        _rise_to_extremes(most, joint, terms[segment, :, joint][..., None], lengths[segment], rows)
+        _rise_to_extremes(most, joint, terms[segment, :, joint][..., None], lengths[segment], rows=rows, run=with_numpy)
     return np.asarray(most)
 
 
-def rate_peaks(terms: Array, lengths: Array, rows: Evaluator) -> tuple[Array, Array]:
+def rate_peaks(terms: Array, lengths: Array, rows: Evaluator, run: Runner) -> tuple[Array, Array]:
     """Return the largest speeds and accelerations (n,) of all segments: see ``peaks``."""
     reach = rows(_reach_of_rates, [terms], [lengths[:, None]])[0]
     # Both together, accelerations as polynomials with one power more.
@@ -123,13 +131,15 @@ def rate_peaks(terms: Array, lengths: Array, rows: Evaluator) -> tuple[Array, Ar
         accelerations = np.zeros_like(speeds)
         accelerations[:, :-1] = derivative(speeds, 1)
         sought = np.where((index < joints)[:, None, None], speeds, accelerations)
-        _rise_to_extremes(most, index, sought, lengths[segment], rows)
+        _rise_to_extremes(most, index, sought, lengths[segment], rows=rows, run=run)
     return most[:joints], most[joints:]
 
 
-def _rise_to_extremes(most: Array, index: Indices, terms: Array, lengths: Array, rows: Evaluator) -> None:
+def _rise_to_extremes(
+    most: Array, index: Indices, terms: Array, lengths: Array, *, rows: Evaluator, run: Runner
+) -> None:
     """Raise the largest magnitudes of some polynomials to those between the ends of others (m, k, 1) of them."""
-    lowest, highest = extremes(terms, lengths, rows)
+    lowest, highest = extremes(terms, lengths, rows, run)
     np.maximum.at(most, index, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
 
 
@@ -156,7 +166,7 @@ def _reach_of_rates(terms: list[Scalar], length: list[Scalar]) -> list[list[Scal
     return [[*_reach(first, length)[0], *_reach(second, length)[0]]]
 
 
-def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
+def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays, run: Runner = with_numpy) -> Array:
     """Return times (m, n, r) inside the segments among which are all at which a polynomial reverses.
 
     A polynomial whose slope has no two Bernstein coefficients of opposite signs rises or falls all along, and is not
@@ -169,12 +179,59 @@ def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> 
     slopes = terms[:, 1:] * (np.arange(1, count) * _powers(lengths, count)[:, 1:])[..., None]
     slopes = np.swapaxes(slopes, 1, 2).reshape(-1, count - 1)
     control = slopes @ _bernstein(count - 2)
-    turns = np.flatnonzero((control.min(axis=1) < 0) & (control.max(axis=1) > 0))
+    below = control < 0
+    turns = np.flatnonzero(below.any(axis=1) & (control > 0).any(axis=1))
     if not len(turns):
         return np.empty((segments, joints, 0))
     parts = np.zeros((len(slopes), count - 2))
-    parts[turns] = _roots(slopes[turns] / np.abs(slopes[turns]).max(axis=1, keepdims=True), rows)
+    scaled, below = slopes[turns] / np.abs(slopes[turns]).max(axis=1, keepdims=True), below[turns]
+    # Where the signs of the Bernstein coefficients change once there is one root.
+    changes = below[:, 1:] != below[:, :-1]
+    once = changes.sum(axis=1) == 1
+    if count > _PARABOLA + 1 and once.any():
+        signs = np.where(below[once, 0], 1.0, -1.0)
+        parts[turns[once], 0] = run(
+            _crossing, [scaled[once], signs, _of_polygon(control[turns[once]], changes[once])], signs.shape
+        )
+        turns, scaled = turns[~once], scaled[~once]
+    if len(turns):
+        parts[turns] = _roots(scaled, rows)
     return np.asarray(parts.reshape(segments, joints, -1) * lengths[:, None, None])
+
+
+def _of_polygon(control: Array, changes: Flags) -> Array:
+    """Return where polygons of Bernstein coefficients (r, k) pass 0 on [0, 1], whose signs change as given."""
+    rows, before = np.arange(len(control)), changes.argmax(axis=1)
+    low, high = control[rows, before], control[rows, before + 1]
+    return np.asarray((before + low / (low - high)) / changes.shape[1])
+
+
+def _crossing(loops: Loops, terms: Table, signs: Table, starts: Table, roots: Table) -> None:
+    """Write the roots (r,) in [0, 1] of polynomials (r, k) that have one there.
+
+    Given are the signs (r,) of their slopes at it, and where to start.
+    """
+    rows, count = terms.shape
+
+    def of_row(i: Scalar) -> tuple[Scalar]:
+        def step(low: Scalar, high: Scalar, x: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+            zero = 0.0 * x
+            value, rate = loops.walk(
+                count, (zero, zero), lambda p, value, rate: (value * x + terms[i, p], rate * x + value), reverse=True
+            )
+            before = value * signs[i] < 0
+            low, high = select(before, x, low), select(before, high, x)
+            # Newton's step where it stays between the bounds, else a halving.
+            rises = abs(rate) > 0
+            ahead = x - value / select(rises, rate, 1.0)
+            stays = select(rises, select(low <= ahead, ahead <= high, False), False)
+            following = select(stays, ahead, (low + high) / 2)
+            return abs(following - x) <= _NEAR, (low, high, following)
+
+        low = 0.0 * signs[i]
+        return (loops.until(_HALVINGS, (low, low + 1.0, starts[i]), step)[2],)
+
+    loops.fill([roots], [rows], of_row)
 
 
 def _powers(lengths: Array, count: int) -> Array:

@@ -17,6 +17,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import inverse_branches
 from armwright.motion.rows import Evaluator, by_kernels, on_arrays
+from armwright.tracing.loops import Runner, compiled, with_numpy
 
 AnyArm: TypeAlias = Arm | CompiledArm
 
@@ -30,6 +31,7 @@ class Solver(NamedTuple):
         inverse_dynamics: efforts (..., n) of q, qd, qdd (..., n).
         inverse_branches: the eight configurations of poses, see ``kinematics.inverse``; None without a closed form.
         rows: evaluates other equations of many rows.
+        run: runs routines.
     """
 
     arm: Arm
@@ -37,6 +39,7 @@ class Solver(NamedTuple):
     inverse_dynamics: Callable[..., Array]
     inverse_branches: Callable[..., Any] | None
     rows: Evaluator
+    run: Runner
 
 
 def solver_of(arm: AnyArm) -> Solver:
@@ -45,9 +48,9 @@ def solver_of(arm: AnyArm) -> Solver:
         forward_, dynamics = partial(_by_kernel, arm, "forward", 1), partial(_by_kernel, arm, "inverse_dynamics", 1)
         branches_ = partial(_by_kernel, arm, "inverse_branches", 2)
         closed = find_geometry(arm.arm) is not None
-        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels)
+        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels, compiled)
     branches = partial(inverse_branches, arm) if find_geometry(known_arm(arm)) is not None else None
-    return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches, on_arrays)
+    return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches, on_arrays, with_numpy)
 
 
 def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:

@@ -14,12 +14,13 @@ from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.certified_motion import CertifiedMotion, fastest, standstill
 from armwright.motion.obstruction import PathError
-from armwright.motion.path import NEGLIGIBLE, Path, check_reach, report_speed, report_step
+from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, check_reach, report_speed, report_step
 from armwright.motion.quintic_polynomials import check_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight_path import StraightPath, line
 from armwright.motion.tolerance import Tolerance, tolerance
 from armwright.motion.tracking import Task, check_velocities, track
+from armwright.spatial.rotations import rotation_vector
 
 # Part of the time in which the tool gathers speed, and again in which it loses it, by the speed that is asked for.
 _RAMP = 0.25
@@ -99,10 +100,11 @@ def certified_line(
         reason = str(violation)
         raise PathError("limits", 0, 0.0, f"at the start {reason}", joint=violation.joint, reason=reason)
     A = np.asarray(solver.forward(q))
-    even = even_time(solver.arm, A, B, speed)
+    rotation = rotation_vector(A[:3, :3].T @ B[:3, :3])
+    even = even_time(solver.arm, A, B, rotation, speed)
     if even is None:
         return standstill(solver, q, allowed)
-    motion = line(A, B, even, near=allowed.position)
+    motion = line(A, B, rotation, even, near=allowed.position)
     task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(_requested_time, even))
     tracked = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
     check_velocities(task, tracked)
@@ -137,19 +139,29 @@ def coarse_deviations(deviation: float) -> list[float]:
 
 def requested_line(arm: Arm, A: Array, B: Array, speed: float) -> StraightPath | None:
     """Return the line from A to B at the speed of the report's rule, whatever the joints; None for one of no length."""
-    even = even_time(arm, A, B, speed)
-    return None if even is None else line(A, B, even, near=0.0, ramp=_RAMP)
+    rotation = rotation_vector(A[:3, :3].T @ B[:3, :3])
+    even = even_time(arm, A, B, rotation, speed)
+    return None if even is None else line(A, B, rotation, even, near=0.0, ramp=_RAMP)
 
 
-def even_time(arm: Arm, A: Array, B: Array, speed: float) -> float | None:
+def even_time(arm: Arm, A: Array, B: Array, rotation: Array, speed: float) -> float | None:
     """Return how long a line takes at its full speed throughout [s]; None where it has no length.
+
+    Args:
+        arm: the arm.
+        A: (4, 4) pose at the start.
+        B: (4, 4) pose at the end.
+        rotation: (3,) rotation vector from start to end [rad].
+        speed: 1 to 120.
 
     Raises:
         InvalidValueError: the speed is out of range.
         IncapableArmError: the arm has no reach or tool speed.
     """
     check_speed(speed)
-    length = float(Path(poses=np.stack([A, B])).lengths()[0])
+    length = max(
+        float(np.linalg.norm(B[:3, 3] - A[:3, 3], axis=-1)), TURN_RADIUS * float(np.linalg.norm(rotation, axis=-1))
+    )
     if length <= NEGLIGIBLE:
         return None
     check_reach(arm)

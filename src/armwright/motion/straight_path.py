@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TypeAlias
 
 import attrs
@@ -65,10 +66,10 @@ class StraightPath:
         """From start to end [s]."""
         return float(self.corners[-1])
 
-    @property
+    @cached_property
     def shifts(self) -> Array:
         """From the start to the end of each segment, (k, 3) [m]."""
-        return np.asarray(np.diff(self.poses[:, :3, 3], axis=0))
+        return np.asarray(self.poses[1:, :3, 3] - self.poses[:-1, :3, 3])
 
     def __call__(self, t: Array) -> Array:
         """Return the poses (k, 4, 4) at times (k,)."""
@@ -102,7 +103,7 @@ class StraightPath:
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
         """Return bounds of the error on the intervals between times: the distance from a straight segment is convex."""
         progress = way, rate, change = self._rates(times)
-        angle = np.linalg.norm(self.rotations[way], axis=-1)
+        angle = self._angles[way]
         spin = spin_bound(hand, angle * change, angle * rate)
         if self._by_position:
             # As an estimate the tool moves along the line as was planned; ``error`` does without.
@@ -112,19 +113,19 @@ class StraightPath:
     def error(self, samples: HandSamples) -> TrackingError:
         """Return how far a sampled tool is from its segments."""
         way, rate, change = samples.bounds.progress
-        planned = self.progress(samples.times)[..., 0] - way[:, None]
+        planned = self._planned(samples.times) - way[:, None]
         count, each = planned.shape
         asked = np.concatenate([np.repeat(self._segments[way], each, axis=0), planned.reshape(-1, 1)], axis=1)
         seen = samples.rows(_seen, [], [samples.poses.reshape(-1, 16), asked])[0].reshape(count, each, 4)
         distance, along, (half, by_position) = seen[..., 0], seen[..., 1], seen[..., 2:].max(axis=1).T
-        angle = np.linalg.norm(self.rotations[way], axis=-1)
+        angle = self._angles[way]
         between, hand = samples.step**2 / 8, samples.hand
         orientation = half + between * spin_bound(hand, angle * change, angle * rate)
         if not self._by_position:
             return error_of(samples, distance, half, orientation=orientation)
         # Of the position on the line: how fast it can change, from where it is seen, and how far beyond the ends it is.
         hurry = hand.pull / self._length
-        rate = np.abs(np.diff(along, axis=1)).max(axis=1) / samples.step + samples.step * hurry
+        rate = np.abs(along[:, 1:] - along[:, :-1]).max(axis=1) / samples.step + samples.step * hurry
         beyond = np.maximum(np.maximum(-along, along - 1).max(axis=1) + between * hurry, 0.0)
         bound = by_position + between * spin_bound(hand, angle * hurry, angle * rate) + angle * beyond / 2
         return error_of(
@@ -135,17 +136,28 @@ class StraightPath:
             backward=_backward(along * self._length, between * hand.pull),
         )
 
+    def _planned(self, times: Array) -> Array:
+        """Return the progress (m, k) at times (m, k), each row of which lies within one cubic of it."""
+        starts, terms = self.progress.times, self.progress.coefficients
+        piece = segments_at(starts, (times[:, 0] + times[:, -1]) / 2, len(terms))
+        return evaluate(terms[piece], times - starts[piece, None])
+
     @property
     def _segments(self) -> Array:
         """Return the segments as ``_seen`` takes them, (k, 20)."""
-        angles = np.linalg.norm(self.rotations, axis=-1, keepdims=True)
+        angles = self._angles[:, None]
         squares = np.einsum("ki,ki->k", self.shifts, self.shifts)[:, None]
         axes = self.rotations / np.where(angles > 0, angles, 1.0)
         R = self.poses[:-1, :3, :3].reshape(-1, 9)
         parts = [self.poses[:-1, :3, 3], R, self.shifts, np.where(squares > 0, squares, 1.0), axes, angles]
         return np.concatenate(parts, axis=1)
 
-    @property
+    @cached_property
+    def _angles(self) -> Array:
+        """Of the rotations on the segments, (k,) [rad]."""
+        return np.asarray(np.linalg.norm(self.rotations, axis=-1))
+
+    @cached_property
     def _length(self) -> float:
         return float(np.linalg.norm(self.shifts[0]))
 
@@ -158,7 +170,7 @@ class StraightPath:
 
         Each lies within one cubic of the progress, whose second derivative is largest at an end of the interval.
         """
-        middles, h = (times[1:] + times[:-1]) / 2, np.diff(times)
+        middles, h = (times[1:] + times[:-1]) / 2, times[1:] - times[:-1]
         way = self._way(middles)
         piece = segments_at(self.progress.times, middles, len(self.progress.coefficients))
         local = middles - self.progress.times[piece]
@@ -217,12 +229,13 @@ def _half_sine(axis: list[Scalar], angle: Scalar, Q: list[list[Scalar]]) -> Scal
     return sqrt(dot(v, v)) / (4 * w)
 
 
-def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:
+def line(A: Array, B: Array, rotation: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:
     """Return the straight line of the tool from A to B.
 
     Args:
         A: (4, 4) pose at the start.
         B: (4, 4) pose at the end.
+        rotation: (3,) rotation vector from start to end, in the axes at the start [rad].
         even: how long it takes at full speed throughout [s].
         near: as for ``StraightPath``.
         ramp: part of the duration that gathers speed, and that loses it again; at full speed from end to end if 0.
@@ -231,7 +244,7 @@ def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> 
     even_progress = Trajectory(times=[0.0, duration], coefficients=[[[0.0], [1 / duration]]])
     return StraightPath(
         poses=np.stack([A, B]),
-        rotations=rotation_vector(A[:3, :3].T @ B[:3, :3])[None],
+        rotations=rotation[None],
         corners=np.array([0.0, duration]),
         progress=s_curve(duration, ramp) if ramp else even_progress,
         numbers=(0,),
@@ -301,5 +314,5 @@ def _backward(along: Array, between: Array) -> float:
     back = (farthest - along).max(axis=1)
     # Between two samples the tool is away from the chord by so much at most, before it reverses and after. Where the
     # chord rises by four times that, the tool never reverses.
-    rising = np.diff(along, axis=1).min(axis=1) > 4 * between
+    rising = (along[:, 1:] - along[:, :-1]).min(axis=1) > 4 * between
     return float(np.where(rising & (back <= 0), 0.0, back + 2 * between.max()).max())

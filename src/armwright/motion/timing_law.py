@@ -14,6 +14,8 @@ window happens to fit.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -23,10 +25,11 @@ from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
 from armwright.motion.forward_backward import Bounds, largest_squares
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import composed, derivative, evaluate, rate_peaks, shifted
+from armwright.motion.polynomials import composed, evaluate, rate_peaks, shifted
 from armwright.motion.solver import Solver
-from armwright.motion.trajectory import Trajectory
-from armwright.tracing.scalar import Scalar, larger
+from armwright.motion.trajectory import Trajectory, run_slower
+from armwright.tracing.loops import Loops, Table
+from armwright.tracing.scalar import Scalar, larger, select
 
 # From rest to the full speed of the path takes no less than this where a joint has no limit of acceleration [s].
 _RAMP = 0.05
@@ -75,8 +78,10 @@ class TimedPath(NamedTuple):
         """Return when the run is at ``s``, as a part of its duration."""
         starts = self.progress.coefficients[:, 0, 0]
         k = int(segments_at(starts, s, len(starts)))
-        t = np.linspace(self.progress.times[k], self.progress.times[k + 1], _LOOKED_UP)
-        return float(np.interp(s, self.progress(t)[:, 0], t)) / self.progress.duration
+        start, end = self.progress.times[k : k + 2]
+        t = np.linspace(start, end, _LOOKED_UP)
+        there = evaluate(self.progress.coefficients[k : k + 1], t[:, None] - start)[:, 0]
+        return float(np.interp(s, there, t)) / self.progress.duration
 
 
 class _Grid(NamedTuple):
@@ -106,7 +111,7 @@ class _Grid(NamedTuple):
     @property
     def lengths(self) -> Array:
         """Of the intervals in s, (m,)."""
-        return np.diff(self.path.times)
+        return self.path.lengths
 
 
 class _Run(NamedTuple):
@@ -127,10 +132,9 @@ class _Run(NamedTuple):
     law: Array
     uses: Array
 
-    def trajectory(self, solver: Solver) -> Trajectory:
-        """Return that of the joints."""
-        terms = solver.rows(composed, [self.path.coefficients[self.intervals]], [self.law])[0]
-        return Trajectory(times=self.times, coefficients=terms)
+    def terms(self, solver: Solver) -> Array:
+        """Return the coefficients of the joint positions over time, (p, 10, n)."""
+        return solver.rows(composed, [self.path.coefficients[self.intervals]], [self.law])[0]
 
     @property
     def duration(self) -> float:
@@ -148,19 +152,19 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
     """
     arm, grid = solver.arm, _gridded(solver, path, caps)
     run = _smooth(grid)
-    trajectory = run.trajectory(solver)
-    speed, acceleration = rate_peaks(trajectory.coefficients, np.diff(trajectory.times), solver.rows)
+    terms = run.terms(solver)
+    speed, acceleration = rate_peaks(terms, run.times[1:] - run.times[:-1], solver.rows, solver.run)
     over = max(
         float((speed / arm.limits.speed).max()),
         math.sqrt(float((acceleration / arm.limits.acceleration).max())),
         float(run.uses[:, 0].max()),
-        grid.allowed / trajectory.duration,
+        grid.allowed / float(run.times[-1]),
     )
-    trajectory = trajectory.slowed(over)
+    trajectory = run_slower(run.times, terms, over)
     factor = trajectory.duration / _allowed(float((grid.lengths / grid.caps).sum()) + _RAMP)
     law = run.law.copy()
     law[:, 0] += run.path.times[run.intervals]
-    progress = Trajectory(times=run.times, coefficients=law[..., None]).slowed(over)
+    progress = run_slower(run.times, law[..., None], over)
     because = _binding(arm.n, run) if factor > 1 else None
     return TimedPath(trajectory, factor, because, progress, speed / over, acceleration / over**2)
 
@@ -173,18 +177,18 @@ def _allowed(shortest: float) -> float:
 def _gridded(solver: Solver, path: Trajectory, caps: Array) -> _Grid:
     """Return a path with every segment cut into equal parts."""
     finer = min(max(math.ceil(_ENOUGH / len(caps)), 1), _FINER)
-    starts = (np.diff(path.times)[:, None] * (np.arange(finer) / finer)).ravel()
+    starts = (path.lengths[:, None] * (np.arange(finer) / finer)).ravel()
     coefficients = shifted(np.repeat(path.coefficients, finer, axis=0), starts, solver.rows)
     times = np.append(np.repeat(path.times[:-1], finer) + starts, path.times[-1])
     fine, caps = Trajectory(times=times, coefficients=coefficients), np.repeat(caps, finer)
-    bounds, lengths = _bounds(solver, fine, caps), np.diff(times)
-    squares = largest_squares(bounds, lengths, (False, False))
+    bounds, lengths = _bounds(solver, fine, caps), fine.lengths
+    squares = largest_squares(bounds, lengths, (False, False), solver.run)
     return _Grid(solver, fine, caps, bounds, squares, float(_steps(lengths, np.sqrt(squares)).sum()))
 
 
 def _bounds(solver: Solver, path: Trajectory, caps: Array) -> Bounds:
     """Return bounds on x = s'² at the start of every segment, and on u = s'', that hold all along it."""
-    lengths, limits = np.diff(path.times), solver.arm.limits
+    lengths, limits = path.lengths, solver.arm.limits
     count, _, joints = path.coefficients.shape
     slopes = solver.rows(_slopes, [path.coefficients], [lengths[:, None]])[0]
     rates, bends = slopes[:, : len(_PARTS)], slopes[:, len(_PARTS) :]
@@ -233,7 +237,8 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
         worst = np.ones(len(lengths))
         np.maximum.at(worst, runs[-1].intervals, runs[-1].uses.max(axis=1))
         tighter = tighter * worst[:, None] ** 2
-        x = largest_squares(bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter), lengths, (False, False))
+        tight = bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter)
+        x = largest_squares(tight, lengths, (False, False), grid.solver.run)
     return min(runs, key=lambda run: run.duration)
 
 
@@ -256,7 +261,7 @@ def _averaged(solver: Solver, lengths: Array, speeds: Array, window: float) -> t
     # The integral of s(t), on each interval, before the start and after the end.
     integral = np.zeros((len(lengths) + 2, 4))
     integral[1:-1, 1:3] = np.stack([np.cumsum(lengths) - lengths, speeds[:-1] / 2], axis=1)
-    integral[1:-1, 3] = np.diff(speeds) / steps / 6
+    integral[1:-1, 3] = (speeds[1:] - speeds[:-1]) / steps / 6
     grown = (((integral[1:-1, 3] * steps + integral[1:-1, 2]) * steps) + integral[1:-1, 1]) * steps
     integral[1:, 0] = np.concatenate([[0.0], np.cumsum(grown)])
     integral[-1, 1] = lengths.sum()
@@ -278,7 +283,8 @@ def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
     knots = path.times[1:-1]
     begins = np.maximum.accumulate(law[:, 0])
     piece = segments_at(begins, knots, len(law))
-    times = _apart(np.concatenate([breaks, breaks[piece] + _when(law[piece], np.diff(breaks)[piece], knots)]))
+    passed = breaks[piece] + _when(grid.solver, law[piece], (breaks[1:] - breaks[:-1])[piece], knots)
+    times = _apart(np.concatenate([breaks, passed]))
     middles = (times[1:] + times[:-1]) / 2
     piece = segments_at(breaks, middles, len(law))
     inner = shifted(law[piece][..., None], times[:-1] - breaks[piece], grid.solver.rows)
@@ -286,10 +292,9 @@ def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
     interval = segments_at(path.times, there, len(caps))
     inner[:, 0, 0] -= path.times[interval]
     # Where the run is at the samples of each piece, how fast along the path, and with which acceleration.
-    steps = np.diff(times)
-    at = [evaluate(derivative(inner, order), steps[:, None] * _SEEN) for order in range(3)]
-    along = np.maximum(at[1].max(axis=1, keepdims=True), 0.0)
-    used = grid.solver.rows(_used, [path.coefficients[interval]], [np.concatenate(at, axis=1)])[0]
+    run = np.concatenate([inner[..., 0], (times[1:] - times[:-1])[:, None]], axis=1)
+    (along,) = grid.solver.rows(_fastest, [], [run])
+    used = grid.solver.rows(_used, [path.coefficients[interval]], [run])[0]
     speed, acceleration = used[:, 0] / limits.speed, np.sqrt(used[:, 1] / limits.acceleration)
     uses = np.concatenate([along / caps[interval][:, None], speed, acceleration], axis=1)
     return _Run(path, times, interval, inner[..., 0], uses)
@@ -300,38 +305,60 @@ def _used(cubic: list[Scalar], run: list[Scalar]) -> list[list[Scalar]]:
 
     Args:
         cubic: (4,) its coefficients.
-        run: (3 k,) s at k samples, s' at them, and s''.
+        run: (5,) coefficients of s over time, and how long it takes.
     """
     _, c1, c2, c3 = cubic
     speed: Scalar = 0.0
     acceleration: Scalar = 0.0
-    count = len(run) // 3
-    for x, rate, bend in zip(run[:count], run[count : 2 * count], run[2 * count :], strict=True):
+    for x, rate, bend in _along(run):
         slope, curve = (3 * c3 * x + 2 * c2) * x + c1, 6 * c3 * x + 2 * c2
         speed = larger(abs(slope * rate), speed)
         acceleration = larger(abs(curve * rate * rate + slope * bend), acceleration)
     return [[speed, acceleration]]
 
 
-def _when(law: Array, steps: Array, knots: Array) -> Array:
+def _fastest(run: list[Scalar]) -> list[list[Scalar]]:
+    """Return the largest s' at samples of a run, 0 at least."""
+    return [[reduce(larger, (rate for _, rate, _ in _along(run)), 0.0 * run[0])]]
+
+
+def _along(run: list[Scalar]) -> Iterator[tuple[Scalar, Scalar, Scalar]]:
+    """Give s, s' and s'' at the samples of a run: see ``_used``."""
+    a, b, c, d, length = run
+    for part in _SEEN.tolist():
+        t = part * length
+        yield ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b, 6 * d * t + 2 * c
+
+
+def _when(solver: Solver, law: Array, steps: Array, knots: Array) -> Array:
     """Return when cubics s(t) (k, 4), which never fall, pass knots (k,), from 0 to ``steps`` (k,) [s]."""
-    slow, bend, jerk = law[:, 1], law[:, 2], law[:, 3]
-    low, high, t = np.zeros(len(knots)), steps, steps / 2
-    for _ in range(_HALVINGS):
-        residual = ((jerk * t + bend) * t + slow) * t + law[:, 0] - knots
-        low, high = np.where(residual < 0, t, low), np.where(residual < 0, high, t)
-        rate = (3 * jerk * t + 2 * bend) * t + slow
-        # Newton's step where it stays between the bounds, else a halving.
-        ahead = t - residual / np.where(rate > 0, rate, np.inf)
-        last, t = t, np.where((ahead >= low) & (ahead <= high) & (rate > 0), ahead, (low + high) / 2)
-        if (np.abs(t - last) <= _CONVERGED * steps).all():
-            break
-    return t
+    return solver.run(_passed, [law, steps, knots], knots.shape)
+
+
+def _passed(loops: Loops, law: Table, steps: Table, knots: Table, times: Table) -> None:
+    """Write when cubics pass knots: see ``_when``."""
+
+    def of_knot(i: Scalar) -> tuple[Scalar]:
+        start, slow, bend, jerk = (law[i, power] for power in range(4))
+
+        def step(low: Scalar, high: Scalar, last: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+            residual = ((jerk * last + bend) * last + slow) * last + start - knots[i]
+            low, high = select(residual < 0, last, low), select(residual < 0, high, last)
+            rate = (3 * jerk * last + 2 * bend) * last + slow
+            # Newton's step where it stays between the bounds, else a halving.
+            ahead = last - residual / select(rate > 0, rate, math.inf)
+            stays = select(ahead >= low, select(high >= ahead, rate > 0, False), False)
+            t = select(stays, ahead, (low + high) / 2)
+            return abs(t - last) <= _CONVERGED * steps[i], (low, high, t)
+
+        return (loops.until(_HALVINGS, (0.0 * steps[i], steps[i], steps[i] / 2), step)[2],)
+
+    loops.fill([times], [knots.shape[0]], of_knot)
 
 
 def _binding(joints: int, run: _Run) -> BindingLimit:
     """Return which limit of which joint binds for the longest time."""
-    steps, of_joints = np.diff(run.times), run.uses[:, 1:]
+    steps, of_joints = run.times[1:] - run.times[:-1], run.uses[:, 1:]
     fullest = of_joints.argmax(axis=1)
     near = of_joints.max(axis=1) >= _BINDS * of_joints.max()
     counts = np.bincount(fullest[near], weights=steps[near], minlength=2 * joints)
@@ -342,7 +369,7 @@ def _binding(joints: int, run: _Run) -> BindingLimit:
 def _apart(times: Array) -> Array:
     """Return times in order, without those that follow the one before at no distance; the last one stays."""
     times = np.sort(times)
-    distinct = np.diff(times) > _SAME * times[-1]
+    distinct = times[1:] - times[:-1] > _SAME * times[-1]
     inner = times[1:-1][distinct[:-1]]
     if len(inner) and times[-1] - inner[-1] <= _SAME * times[-1]:
         inner = inner[:-1]

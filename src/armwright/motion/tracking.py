@@ -210,7 +210,7 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
         if obstruction is not None:
             return obstruction
         trajectory = _spline(task, knots, q)
-        h = np.diff(knots)
+        h = knots[1:] - knots[:-1]
         speed, acceleration = cubic_peaks(trajectory.coefficients, h, task.solver.rows)
         hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
         error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)

@@ -86,6 +86,11 @@ class Trajectory:
         """Time from start to end [s]."""
         return float(self.times[-1])
 
+    @property
+    def lengths(self) -> Array:
+        """Times that the segments take, (m,) [s]."""
+        return np.asarray(self.times[1:] - self.times[:-1])
+
     def __call__(self, t: ArrayLike, order: int = 0) -> Array:
         """Return positions, or a derivative of them.
 
@@ -102,7 +107,7 @@ class Trajectory:
         """
         integer(order, "order", least=0)
         t = floats(t, "t")
-        inside = np.clip(t, 0.0, self.duration)
+        inside = np.minimum(np.maximum(t, 0.0), self.duration)
         segment = segments_at(self.times, inside, len(self.coefficients))
         local = (inside - self.times[segment])[..., None]
         terms = derivative(self.coefficients, order)[segment]
@@ -138,7 +143,7 @@ class Trajectory:
 
     def _segment_extremes(self, order: int) -> tuple[Array, Array]:
         integer(order, "order", least=0)
-        return extremes(derivative(self.coefficients, order), np.diff(self.times))
+        return extremes(derivative(self.coefficients, order), self.lengths)
 
     def peaks(self, order: int) -> Array:
         """Return the largest magnitude of a derivative for every joint, (n,), exactly and not by sampling.
@@ -148,7 +153,7 @@ class Trajectory:
             InvalidValueError: it is below 0.
         """
         integer(order, "order", least=0)
-        return peaks(derivative(self.coefficients, order), np.diff(self.times))
+        return peaks(derivative(self.coefficients, order), self.lengths)
 
     def slowed(self, factor: float) -> Trajectory:
         """Return the same path run ``factor`` times slower; faster below 1.
@@ -157,11 +162,7 @@ class Trajectory:
             KindError: the factor is no number.
             InvalidValueError: it is not above 0.
         """
-        factor = positive(factor, "factor")
-        with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
-            powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
-            coefficients = self.coefficients * powers[:, None]
-        return Trajectory(times=self.times * factor, coefficients=coefficients)
+        return run_slower(self.times, self.coefficients, positive(factor, "factor"))
 
     def retimed(self, duration: float) -> Trajectory:
         """Return the same path run in another time, which is met to the last bit.
@@ -183,7 +184,7 @@ class Trajectory:
     def reversed(self) -> Trajectory:
         """Return the reversed motion: at time t where this motion is at the time t before its end."""
         signs = (-1.0) ** np.arange(self.coefficients.shape[1])
-        back = shifted(self.coefficients, np.diff(self.times))[::-1] * signs[:, None]
+        back = shifted(self.coefficients, self.lengths)[::-1] * signs[:, None]
         return Trajectory(times=self.duration - self.times[::-1], coefficients=back)
 
     def until(self, t: float) -> Trajectory:
@@ -229,12 +230,20 @@ class Trajectory:
         return html_table(f"{self.duration:.6g} s in {len(self.coefficients)} segments (SI units)", columns, rows)
 
 
+def run_slower(times: Array, coefficients: Array, factor: float) -> Trajectory:
+    """Return a trajectory, given by its attributes, that is run ``factor`` times slower."""
+    with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
+        powers = factor ** -np.arange(coefficients.shape[1], dtype=np.float64)
+        slower = coefficients * powers[:, None]
+    return Trajectory(times=times * factor, coefficients=slower)
+
+
 def states(trajectory: Trajectory, t: Array, rows: Evaluator) -> tuple[Array, Array, Array]:
     """Return positions, speeds and accelerations (k, n) of a trajectory at times (k,) from its start to its end."""
     segment = segments_at(trajectory.times, t, len(trajectory.coefficients))
     local = t - trajectory.times[segment]
-    found = rows(_state, [trajectory.coefficients[segment]], [local[:, None]])[0]
-    return found[:, 0], found[:, 1], found[:, 2]
+    q, qd, qdd = rows(_state, [trajectory.coefficients[segment]], [local[:, None]])
+    return q[:, 0], qd[:, 0], qdd[:, 0]
 
 
 def _state(terms: list[Scalar], local: list[Scalar]) -> list[list[Scalar]]:
@@ -244,9 +253,9 @@ def _state(terms: list[Scalar], local: list[Scalar]) -> list[list[Scalar]]:
         value = terms[-1]
         for term in terms[-2::-1]:
             value = value * local[0] + term
-        found.append(value)
+        found.append([value])
         terms = slope(terms)
-    return [found]
+    return found
 
 
 def hold(q: ArrayLike, duration: float) -> Trajectory:

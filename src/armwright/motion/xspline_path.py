@@ -49,7 +49,7 @@ def usual_weight(steps: Pair, b: Scalar = 0.0) -> Scalar:
 
 def smooth_weight(times: Array) -> Array:
     """Return the b of every inner knot with which the acceleration is continuous, (k - 2,), for times (k,)."""
-    h = np.diff(times)
+    h = times[1:] - times[:-1]
     return np.asarray(h[:-1] / (2 * (h[:-1] + h[1:])))
 
 
@@ -113,7 +113,7 @@ def smooth_xspline(times: Array, knots: Array, start: Array, end: Array) -> Traj
 
     Its |a| + |b| is 1/2 at every knot; nothing is checked.
     """
-    h, b = np.diff(times), smooth_weight(times)
+    h, b = times[1:] - times[:-1], smooth_weight(times)
     return _through(times, knots, (start, end), usual_weight((h[:-1], h[1:]), b), b)
 
 
@@ -186,7 +186,7 @@ def _parameters(h: Array, a: ArrayLike | None, b: ArrayLike | None) -> tuple[Arr
 
 def _through(t: Array, q: Array, ends: tuple[Array, Array], a: Array, b: Array) -> Trajectory:
     """Return the spline through knots q (k, n) at times t (k,)."""
-    h = np.diff(t)
+    h = t[1:] - t[:-1]
     m = _rates(h, q, ends, a, b)
     return Trajectory(times=t, coefficients=np.stack(hermite(q[:-1], m[:-1], q[1:], m[1:], h[:, None]), axis=1))
 
@@ -197,7 +197,7 @@ def _rates(h: Array, q: Array, ends: tuple[Array, Array], a: Array, b: Array) ->
     m[0], m[-1] = ends
     if len(h) == 1:
         return m
-    slope, steps = np.diff(q, axis=0) / h[:, None], h[:, None]
+    slope, steps = (q[1:] - q[:-1]) / h[:, None], h[:, None]
     right = right_side((slope[:-1], slope[1:]), (steps[:-1], steps[1:]), a[:, None], b[:, None])
     right[0] -= a[0] * m[0]
     right[-1] -= b[-1] * m[-1]

@@ -11,6 +11,7 @@ from armwright.errors import InvalidValueError
 
 # Below this angle sin(angle)/angle is 1 to the last bit, so the axis needs no division by the angle.
 _TINY_ANGLE = 1e-12
+_UNIT = np.eye(3)
 
 
 def exact_cosine(angle: float) -> float:
@@ -49,7 +50,7 @@ def orthonormality_error(R: ArrayLike) -> Array:
         (...) the largest entry of |Rᵀ R - 1|; plus 2 where the determinant is negative (a mirror image).
     """
     R = of_shape(R, (3, 3), "rotation")
-    error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-2, -1))
+    error = np.abs(np.swapaxes(R, -1, -2) @ R - _UNIT).max(axis=(-2, -1))
     mirrored: Array = np.where(np.linalg.det(R) < 0, 2.0, 0.0)
     return np.asarray(error + mirrored)
 

@@ -6,11 +6,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from armwright.tracing.graph import is_traced, traced
+from armwright.tracing.graph import Traced, is_traced, traced
 
 # A float, an array of any shape with one value per configuration, or a ``Traced``. Equations use + - * / and the
 # functions below.
 Scalar: TypeAlias = Any
+
+# The types of conditions that hold or do not.
+_DECIDED = frozenset({bool, np.bool_})
 
 
 def _evaluate(op: str, on_arrays: Callable[..., Any], on_floats: Callable[..., float], *operands: Scalar) -> Scalar:
@@ -47,7 +50,9 @@ def round_half_even(x: Scalar) -> Scalar:
 
 def select(condition: Any, then: Scalar, otherwise: Scalar) -> Scalar:
     """Return ``then`` where ``condition`` holds and ``otherwise`` elsewhere; both are evaluated."""
-    if is_traced(condition, then, otherwise):
+    if type(condition) in _DECIDED:
+        return then if condition else otherwise
+    if isinstance(condition, Traced) or isinstance(then, Traced) or isinstance(otherwise, Traced):
         return traced("select", condition, then, otherwise)
     if isinstance(condition, np.ndarray):
         return np.where(condition, then, otherwise)

@@ -42,11 +42,11 @@ def exact_pose(X_BT: ArrayLike) -> Array:
         ShapeError: it is not (4, 4).
         InvalidValueError: it is no pose, not even one typed with two digits.
     """
-    X = typed_poses(X_BT)
+    X, error = _typed_poses(X_BT)
     if X.ndim != 2:
         raise ShapeError(f"pose: expected one pose, shape (4, 4), got {X.shape}; inverse_branches takes arrays of them")
     # A rotation that was computed is as exact as one can be; what is typed is off by far more.
-    if float(orthonormality_error(X[:3, :3])) < _COMPUTED:
+    if float(error) < _COMPUTED:
         return X
     return homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
 
@@ -60,6 +60,11 @@ def typed_poses(X_BT: ArrayLike) -> Array:
         InvalidValueError: a number is not finite, a last row is not 0 0 0 1, or a rotation none, not even one typed
             with two digits.
     """
+    return _typed_poses(X_BT)[0]
+
+
+def _typed_poses(X_BT: ArrayLike) -> tuple[Array, Array]:
+    """Return poses as ``typed_poses`` does, and how far their rotations (...) are from exact ones."""
     X = of_shape(X_BT, (4, 4), "pose", LARGEST)
     wrong = np.flatnonzero(np.abs(X[..., 3, :] - (0, 0, 0, 1)).max(axis=-1).ravel() > _LAST_ROW)
     if len(wrong):
@@ -75,7 +80,7 @@ def typed_poses(X_BT: ArrayLike) -> Array:
             f"pose: expected a rotation, orthonormal to {_TYPED_ROTATION}, got one with an error of {worst:.3g}: "
             f"{R.tolist()}{hint}"
         )
-    return X
+    return X, error
 
 
 def pose_errors(arm: Arm, q: Array, X: Array) -> tuple[Array, Array]:

@@ -1,0 +1,128 @@
+"""Routines do the same with NumPy and as machine code."""
+
+import numpy as np
+import pytest
+
+from armwright.motion.forward_backward import Bounds, largest_squares
+from armwright.tracing.emit_loops import EmittedLoops
+from armwright.tracing.loops import Loops, Runner, Table, compiled, with_numpy
+from armwright.tracing.scalar import Scalar, larger, select, sqrt
+
+
+@pytest.fixture(params=[with_numpy, compiled])
+def run(request: pytest.FixtureRequest) -> Runner:
+    """What runs a routine."""
+    runner: Runner = request.param
+    return runner
+
+
+def _sums(loops: Loops, x: Table, result: Table) -> None:
+    (total,) = loops.walk(x.shape[0], (0.0,), lambda i, total: (total + x[i],))
+
+    def step(i: Scalar, behind: Scalar) -> tuple[Scalar]:
+        result[i] = behind / total
+        return (behind + x[i],)
+
+    loops.walk(x.shape[0], (0.0,), step, reverse=True)
+
+
+def test_steps_follow_each_other(run: Runner, rng: np.random.Generator) -> None:
+    """What is carried comes from the step before, in either direction; a table of nothing takes no step."""
+    x = rng.uniform(1, 2, 17)
+
+    behind = np.cumsum(x[::-1])[::-1] - x
+    np.testing.assert_allclose(run(_sums, [x], x.shape), behind / x.sum(), rtol=1e-14, atol=1e-15)
+    assert run(_sums, [x[:0]], (0,)).shape == (0,)
+
+
+def _roots(loops: Loops, x: Table, result: Table) -> None:
+    def of_number(i: Scalar) -> tuple[Scalar]:
+        def step(y: Scalar) -> tuple[Scalar, tuple[Scalar]]:
+            better = (y + x[i] / y) / 2
+            return abs(better - y) <= 1e-9 * y, (better,)
+
+        return loops.until(100, (larger(x[i], 1.0),), step)
+
+    loops.fill([result], [x.shape[0]], of_number)
+
+
+def test_each_is_done_by_itself(run: Runner, rng: np.random.Generator) -> None:
+    """Numbers that take more steps than others do not change those, not by a bit."""
+    x = 10 ** rng.uniform(-6, 6, 50)
+
+    found = run(_roots, [x], x.shape)
+
+    np.testing.assert_allclose(found, np.sqrt(x), rtol=1e-15)
+    np.testing.assert_array_equal(found[:1], run(_roots, [x[:1]], (1,)))
+
+
+def _of_rows(loops: Loops, x: Table, result: Table) -> None:
+    rows, columns = x.shape
+    (most,) = loops.each([rows], lambda i: [loops.largest(columns, lambda k: x[i, k])])
+    (scaled,) = loops.each([rows, columns], lambda i, k: [x[i, k] - most[i]])
+    least = loops.least(rows, lambda i: most[i])
+    (under,) = loops.each([rows], lambda i: [loops.least(columns, lambda k: sqrt(scaled[i, k] * scaled[i, k]) + least)])
+    result[0] = least
+
+    def step(i: Scalar, total: Scalar) -> tuple[Scalar]:
+        row = scaled.row(i)
+        high, first = loops.first_largest(columns, lambda k: row[k])
+        low, last = loops.first_least(columns, lambda k: row[k])
+        (total,) = loops.when(
+            first < last, lambda: (total + row[last] - low + high + 1.0,), lambda: (total + row[first],)
+        )
+        result[i + 1] = total + under[i]
+        return (total,)
+
+    loops.walk(rows, (0.0,), step)
+
+
+def test_largest_and_least(run: Runner, rng: np.random.Generator) -> None:
+    """Of equal numbers the first one counts."""
+    x = rng.integers(0, 4, (40, 6)).astype(float)
+
+    scaled = x - x.max(axis=1, keepdims=True)
+    least = x.max(axis=1).min()
+    total = np.cumsum(x.argmax(axis=1) < x.argmin(axis=1))
+    np.testing.assert_array_equal(run(_of_rows, [x], (41,)), [least, *(total + np.abs(scaled).min(axis=1) + least)])
+
+
+def test_squares_have_the_same_bits(rng: np.random.Generator) -> None:
+    """The fastest run under random bounds is the same with NumPy and as machine code, and keeps the bounds."""
+    for _ in range(30):
+        count, rows = (int(x) for x in rng.integers(1, 30, 2))
+        a, b = rng.normal(size=(2, count, rows)) * (rng.uniform(size=(2, count, rows)) > 0.3)
+        bounds, lengths = Bounds(a, b, rng.uniform(-0.9, 0.9, (count, rows))), rng.uniform(0.01, 0.1, count)
+        rests = bool(rng.integers(2)), bool(rng.integers(2))
+
+        x = largest_squares(bounds, lengths, rests)
+
+        np.testing.assert_array_equal(x, largest_squares(bounds, lengths, rests, compiled))
+        u = (x[1:] - x[:-1]) / (2 * lengths)
+        use = np.abs(a * u[:, None] + b * x[:-1, None] + bounds.c)
+        rounding = 1e-9 * (1 + np.abs(a * u[:, None]) + np.abs(b * x[:-1, None]))
+        assert (use <= 1 + rounding).all()
+
+
+def test_no_table_within_a_loop() -> None:
+    """Memory is taken once."""
+
+    def routine(loops: Loops, x: Table) -> None:
+        def step(i: Scalar) -> tuple[()]:
+            loops.table(i)
+            return ()
+
+        loops.walk(x.shape[0], (), step)
+
+    with pytest.raises(TypeError, match="within a loop"):
+        EmittedLoops().module(routine, [1])
+
+
+def test_kinds_of_scalars() -> None:
+    """A number is no truth value."""
+
+    def routine(loops: Loops, x: Table) -> None:  # noqa: ARG001 - every routine takes them
+        x[0] = select(x[0], 1.0, 2.0)
+
+    with pytest.raises(TypeError, match="double where i1"):
+        EmittedLoops().module(routine, [1])
