@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 import armwright
-from armwright.arm.load import read_arm, read_load
+from armwright.arm.load import load_arm, read_arm, read_load
 from armwright.cell.reader import read_cell
 from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
 from armwright.clearance.ideal import close_pins, tip_position
 from armwright.clearance.reader import read_linkage
 from armwright.clearance.scenario import assembly_guess
+from armwright.compiled.quantities import emit_quantity, quantity_names
 from armwright.errors import FileFormatError
 from armwright.simulation.integrators import Adaptive
 from armwright.simulation.result import JointState, Status
@@ -405,3 +406,16 @@ def test_reference_has_every_module() -> None:
     modules = {".".join(path.relative_to(package).with_suffix("").parts) for path in package.rglob("*.py")}
     kept = {name for name in modules if not name.endswith("__init__") and name.partition(".")[0] not in made["NO_API"]}
     assert kept <= set(shown)
+
+
+def test_operations_of_compiled_equations() -> None:
+    """The page on compiled equations says of each quantity how many operations it takes."""
+    page = (DOCS / "physics" / "compiled-equations.md").read_text(encoding="utf-8")
+    head, _, *rows = re.search(r"\| operations per configuration.*?\n\n", page, re.DOTALL)[0].strip().splitlines()  # type: ignore[index]
+    names = re.findall(r"`(.+?)`", head)
+    printed = [re.findall(r"[\w-]+", row) for row in rows]
+
+    assert [row[0] for row in printed] == list(quantity_names())
+    for name, *counts in printed:
+        for arm, count in zip(names, counts, strict=True):
+            assert sum(emit_quantity(load_arm(arm), name).operations.values()) == int(count), (name, arm)
