@@ -255,7 +255,10 @@ class _Target:
     def _written_out(self, op: str, operands: Sequence[int]) -> int:
         """Return the node of an operation of numbers; elementary functions are written out, unless they are kept."""
         if op in _WRITTEN_OUT and op not in self._kept:
-            return _WRITTEN_OUT[op](*(Traced(self.graph, i) for i in operands)).node
+            written = _WRITTEN_OUT[op](*(Traced(self.graph, i) for i in operands)).node
+            if op == "atan2":
+                self._sizes[written] = math.pi
+            return written
         is_circle = op in ("sin", "cos") and op not in self._kept
         return self._circle(operands[0], op) if is_circle else self._op(op, *operands)
 
