@@ -12,6 +12,7 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.compiled.derivatives import derivative
+from armwright.compiled.quantities import emit_quantity
 from armwright.dynamics.derivatives import forward_dynamics_derivatives, inverse_dynamics_derivatives
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
@@ -111,6 +112,14 @@ def test_angles_that_have_no_sine() -> None:
     values, by_x = fast([4e7, 1e-8])
     assert np.isnan(values).tolist() == [True, True, False]
     assert np.isnan(by_x).any(axis=1).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize("quantity", ["inverse_branches", "inverse_dynamics"])
+def test_angles_of_an_arm_have_sines(quantity: str) -> None:
+    """The angles of an arm cannot be too large, and no operation asks whether they are."""
+    code = emit_quantity(load_arm("ur5"), quantity).code
+
+    assert not any(np.isnan(code.graph.nodes[i].value) for i in code.order)
 
 
 def test_shapes(rng: np.random.Generator) -> None:
