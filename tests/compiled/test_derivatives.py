@@ -12,6 +12,7 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.compiled.derivatives import derivative
+from armwright.compiled.quantities import emit_quantity
 from armwright.dynamics.derivatives import forward_dynamics_derivatives, inverse_dynamics_derivatives
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
@@ -59,7 +60,7 @@ def test_against_central_differences(rng: np.random.Generator) -> None:
 
 def test_hessian_against_central_differences(rng: np.random.Generator) -> None:
     """The Hessian is the central difference of the gradient, and symmetric to the bit."""
-    fast = derivative(potential, {"q": 3}, of="q", order=2)
+    fast = derivative(potential, {"q": np.int64(3)}, of="q", order=2)
     for q in rng.uniform(0.2, 1.0, size=(20, 3)) * ([1, 1, 1], [1, 1, -1])[int(rng.integers(2))]:
         value, gradient, hessian = fast(q)
 
@@ -81,6 +82,44 @@ def test_equations_of_an_arm(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(slope, expected, atol=ROUNDING * np.abs(expected).max())
     M = mass_matrix(arm, q, drives=False)
     np.testing.assert_allclose(curvature, M, atol=ROUNDING * np.abs(M).max())
+
+
+def test_equal_scalars() -> None:
+    """Two scalars are compared as numbers are: where they are equal the first branch is taken, elsewhere the second."""
+    fast = derivative(
+        lambda x: [select(x[0] == 0.0, 5.0 * x[1], x[1]), select(x[0] != x[1], 1.0 / (x[0] - x[1]), 7.0), x[0] == x[0]],
+        {"x": 2},
+        of="x",
+    )
+
+    for x, expected, slopes in (
+        ((0.0, 2.0), (10.0, -0.5, 1.0), ((0.0, 5.0), (-0.25, 0.25), (0.0, 0.0))),
+        ((2.0, 2.0), (2.0, 7.0, 1.0), ((0.0, 1.0), (0.0, 0.0), (0.0, 0.0))),
+        ((-0.0, 0.0), (0.0, 7.0, 1.0), ((0.0, 5.0), (0.0, 0.0), (0.0, 0.0))),
+    ):
+        values, by_x = fast(x)
+        np.testing.assert_array_equal(values, expected)
+        np.testing.assert_array_equal(by_x, slopes)
+
+
+def test_angles_that_have_no_sine() -> None:
+    """An angle that the equation makes too large has no sine, rather than one beyond 1; a smaller one has."""
+    fast = derivative(lambda x: [sin(x[0] * x[0]), cos(x[0] / x[1]), cos(x[0] - 3.0 * x[1])], {"x": 2}, of="x")
+
+    values, by_x = fast([3.1e7, 1.0])
+    assert np.abs(values).max() <= 1
+    assert np.isfinite(by_x).all()
+    values, by_x = fast([4e7, 1e-8])
+    assert np.isnan(values).tolist() == [True, True, False]
+    assert np.isnan(by_x).any(axis=1).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize("quantity", ["inverse_branches", "inverse_dynamics"])
+def test_angles_of_an_arm_have_sines(quantity: str) -> None:
+    """The angles of an arm cannot be too large, and no operation asks whether they are."""
+    code = emit_quantity(load_arm("ur5"), quantity).code
+
+    assert not any(np.isnan(code.graph.nodes[i].value) for i in code.order)
 
 
 def test_shapes(rng: np.random.Generator) -> None:
@@ -142,6 +181,8 @@ def test_numbers_that_are_none() -> None:
         ({"of": "q", "order": 3}, InvalidValueError, "order: expected 1 or 2, got 3"),
         ({"of": "q", "order": 2}, InvalidValueError, "the equation returns a list of 3 scalars"),
         ({"of": "q", "inputs": {"q": 0, "lengths": 2}}, ShapeError, "inputs: expected a size above 0"),
+        ({"of": "q", "inputs": {"q": True, "lengths": 2}}, ShapeError, "got True"),
+        ({"of": "q", "inputs": {"q": (2, 0.5), "lengths": 2}}, ShapeError, r"got \(2, 0.5\)"),
         ({"of": "q", "inputs": {"q": 2, "a b": 2}}, InvalidValueError, "got 'a b'"),
         ({"of": "q", "equation": "hand"}, KindError, "expected a function of scalars, got 'hand'"),
         ({"of": "q", "equation": lambda _q, _p: "x"}, KindError, "return a scalar or a list of scalars, got 'x'"),

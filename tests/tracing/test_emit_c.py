@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import arm_names, load_arm
-from armwright.arm.model import Arm
+from armwright.arm.model import Arm, Joint, Link
 from armwright.arm.positions import ranges
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
@@ -242,6 +242,23 @@ def test_whole_numbers_angles_and_flags(header: object, tmp_path: Path) -> None:
     assert subprocess.run([program], check=False).returncode == 0
 
 
+def test_another_multiply_add(tmp_path: Path) -> None:
+    """Where a program has its own instruction for a multiplication and an addition, the text compiles with it."""
+    text = source_text(load_arm("ur5"), ["forward"], "c")
+    own = "#include <math.h>\n#define ARMWRIGHT_FMA(a, b, c) (calls++, fma(a, b, c))\nstatic int calls;\n"
+    main = "int main(void) { double q[6] = {0}, X[16]; return !(ur5_forward(q, X) == 0 && calls > 0); }\n"
+
+    assert subprocess.run([build("gcc", own + text + main, tmp_path / "own")], check=False).returncode == 0
+
+
+def test_program_without_angles(tmp_path: Path) -> None:
+    """The test program of an arm that only slides has no function that nothing calls."""
+    slide = Arm(name="slide", joints=[Joint(kind="prismatic")], links=[Link(mass=1.0)])
+    text = check_text(slide, ["inverse_dynamics"], "c")
+
+    assert subprocess.run([build("clang", text, tmp_path / "slide", "-O2")], check=False).returncode == 0
+
+
 # A number and its derivative, as a library for automatic differentiation has it.
 DUAL = """
 struct Dual {
@@ -348,6 +365,23 @@ def test_registers_of_a_device(name: str) -> None:
     assert "0 bytes stack frame, 0 bytes spill stores, 0 bytes spill loads" in log
     (registers,) = re.findall(r"Used (\d+) registers", log)
     assert int(registers) <= 128
+
+
+def test_results_in_the_place_of_inputs(tmp_path: Path, rng: np.random.Generator) -> None:
+    """A result that is an input, as the height of a hand that slides, is that input, though others were written first.
+
+    A few numbers of a row take the place of its inputs in the memory that a block shares.
+    """
+    arm = Arm(name="crane", joints=[Joint(kind="revolute"), Joint(kind="prismatic")], links=[Link(mass=1.0)] * 2)
+    names = ["forward", "base_regressor"]
+    on_device = Compiled(arm, names, tmp_path, compiler="g++", language="cuda")
+    motion = rng.normal(size=(3, 130, 2))
+
+    for name, inputs in zip(names, (motion[:1], motion), strict=True):
+        (found,), _ = on_device(name, *inputs)
+        expected = getattr(compile_arm(arm), name)(*inputs)
+        assert any((expected.reshape(130, -1) == x[:, 1:]).all(axis=0).any() for x in inputs)
+        np.testing.assert_array_equal(found.reshape(expected.shape), expected)
 
 
 @pytest.mark.parametrize("barrier", range(3))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import accumulate
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, Literal
 
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, counted, shown
@@ -28,7 +28,8 @@ def derivative(
 
     The equation is run on scalars that write down what is done with them. It may use + - * /, abs, comparisons,
     and the functions of ``armwright.tracing``; instead of a branch on such a scalar it writes ``select``. The functions
-    of an arm over abstract scalars, such as ``dynamics.newton_euler.newton_euler``, are equations as well.
+    of an arm over abstract scalars, such as ``dynamics.newton_euler.newton_euler``, are equations as well. The sine of
+    an angle beyond 1e15, which the equation has computed, is NaN.
 
     Where there is no derivative, it is 0 for a comparison, for rounding, for ``abs`` and ``sqrt`` at 0, and for
     ``atan2`` of the point (0, 0); that of ``select`` is the derivative of the branch that is chosen.
@@ -99,8 +100,9 @@ _DOC = "Return the values of the equation, and their derivatives by {}: see ``ar
 
 
 def _shape(name: str, value: int | Shape) -> Shape:
-    shape = (value,) if isinstance(value, int) else tuple(value)
-    if not all(isinstance(size, int) and size > 0 for size in shape):
+    sizes = tuple(value) if isinstance(value, Iterable) else (value,)
+    shape = tuple(int(size) for size in sizes if isinstance(size, Integral) and not isinstance(size, bool) and size > 0)
+    if len(shape) < len(sizes):
         raise ShapeError(f"inputs: expected a size above 0, or a shape of such, for {name!r}, got {shown(value)}")
     return shape
 

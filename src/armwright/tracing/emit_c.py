@@ -107,11 +107,11 @@ def c_header(functions: Sequence[Function], real: Real = "double") -> str:
     """
     dialect = _FLOAT if real == "float" else DOUBLE
     bodies = [_function(each, _code(each, real), dialect, "ARMWRIGHT_FUNCTION int") for each in functions]
-    return guarded(
-        contract(_C_RULES, real),
-        _of_gcc("ARMWRIGHT_FUNCTION", "static inline", "static", "unused, ") + _C_HELPERS[real],
-        bodies,
-    )
+    helpers = _of_gcc("ARMWRIGHT_FUNCTION", "static inline", "static", "unused, ") + _C_HELPERS[real]
+    # clang warns of a function that nothing calls, where the text is no header but the program itself.
+    if any("armwright_bit(" in body for body in bodies):
+        helpers += _C_BIT
+    return guarded(contract(_C_RULES + (_C_LIBRARY if real == "float" else ""), real), helpers, bodies)
 
 
 def cpp_header(functions: Sequence[Function]) -> str:
@@ -358,7 +358,11 @@ _C_RULES = """\
 All inputs are read before an output is written, so an array may be both.
 A multiplication and an addition are one instruction, rounded once, where the processor has one (ARMWRIGHT_FMA).
 Results have the same bits whatever the compiler, if it joins no others on its own: -ffp-contract=off, which
--std=c99 implies for gcc, and no -ffast-math. Functions are not inlined by gcc, which would join some all the same."""
+-std=c99 implies for gcc, and no -ffast-math. Functions are not inlined by gcc, which would join some all the same.
+"""
+# What is different in float.
+_C_LIBRARY = """\
+Sines, cosines and arc tangents are those of the C library, and so are their last bits."""
 _CPP_RULES = """\
 All inputs are read before an output is written, so an array may be both.
 A multiplication and an addition are one instruction, rounded once, where the processor has one. Results in double
@@ -511,7 +515,7 @@ _C_HELPERS = {
 #else
 #define ARMWRIGHT_FMA(a, b, c) ((a) * (b) + (c))
 #endif
-{BIT.format(kind="static inline int", name="armwright_bit", whole="uint64_t", memcpy="memcpy")}#endif
+#endif
 """,
     "float": f"""\
 #include <math.h>
@@ -525,6 +529,12 @@ _C_HELPERS = {
 #endif
 """,
 }
+_C_BIT = f"""\
+
+#ifndef ARMWRIGHT_BIT
+#define ARMWRIGHT_BIT
+{BIT.format(kind="static inline int", name="armwright_bit", whole="uint64_t", memcpy="memcpy")}#endif
+"""
 _CPP_GENERAL = """\
 template <class Real>
 inline Real {op}_of(const Real& x)

@@ -153,6 +153,11 @@ def _body(function: Function) -> Iterator[str]:
 def _stored(piece: _Piece, start: int, values: Sequence[str]) -> Iterator[str]:
     """Write how a block stores a piece of its rows, which lie in shared memory from ``start`` on."""
     output, first, length = piece
+    if not start:
+        # They take the place of inputs: an input that is a result is read before the first of them is written.
+        read = {value: f"again_{k}" for k, value in enumerate(values) if value.startswith("again[")}
+        yield from (f"const double {name} = {value};" for value, name in read.items())
+        values = [read.get(value, value) for value in values]
     yield "__syncthreads();"
     for k, value in enumerate(values):
         yield f"tile[{start} + threadIdx.x * {_odd(length)} + {k}] = {value};"

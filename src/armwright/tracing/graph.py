@@ -182,6 +182,13 @@ class Traced:
     __lt__, __gt__ = _binary("less")
     __le__, __ge__ = _binary("less_equal")
 
+    def __eq__(self, other: object) -> "Traced":  # type: ignore[override]
+        # One number is equal to another where neither is less; nothing is equal to what is not a number.
+        return traced("multiply", traced("less_equal", self, other), traced("less_equal", other, self))
+
+    def __ne__(self, other: object) -> "Traced":  # type: ignore[override]
+        return traced("subtract", 1.0, self == other)
+
     def __neg__(self) -> "Traced":
         return traced("negate", self)
 

@@ -19,12 +19,14 @@ language has for each type. It has one more operation:
 - ``limit``: a constant that may be beyond the range of the type, which then has a limit of its own.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from armwright.arrays import LARGEST
 from armwright.tracing.elementary import arc_tangent, root, rounded, sine_cosine
 from armwright.tracing.graph import Graph, Loop, LoopStep, Node, Traced, reachable
+from armwright.tracing.scalar import select
 
 # The operations whose result is a truth value.
 TRUTHS = frozenset({"less", "less_equal", "bit", "both", "either", "differ", "not"})
@@ -35,6 +37,8 @@ _OF_A_LIBRARY = frozenset({"sin", "cos", "atan2", "round"})
 
 # No input whose sine is taken is larger: less than ten digits would be right.
 LARGEST_ANGLE = 1e12
+# No angle beyond has a sine: what an equation computes of its inputs may be one.
+_LARGEST_REDUCED = 1e15
 
 
 class Watched(NamedTuple):
@@ -199,6 +203,8 @@ class _Target:
         self._kept = _OF_A_LIBRARY if any_type else frozenset()
         self.joined = 0
         self._circles: dict[int, tuple[Traced, Traced]] = {}
+        # How large values can be, by their nodes, for inputs that are valid.
+        self._sizes: dict[int, float] = {}
 
     def translated(self, graph: Graph, inputs: Sequence[int], required: Sequence[int]) -> dict[int, int]:
         """Translate what inputs and required nodes of a traced graph need; return the new nodes by the old ones."""
@@ -249,15 +255,35 @@ class _Target:
     def _written_out(self, op: str, operands: Sequence[int]) -> int:
         """Return the node of an operation of numbers; elementary functions are written out, unless they are kept."""
         if op in _WRITTEN_OUT and op not in self._kept:
-            return _WRITTEN_OUT[op](*(Traced(self.graph, i) for i in operands)).node
+            written = _WRITTEN_OUT[op](*(Traced(self.graph, i) for i in operands)).node
+            if op == "atan2":
+                self._sizes[written] = math.pi
+            return written
         is_circle = op in ("sin", "cos") and op not in self._kept
         return self._circle(operands[0], op) if is_circle else self._op(op, *operands)
 
     def _circle(self, angle: int, op: str) -> int:
         """Return the sine or cosine of an angle, of which both are written out together."""
         if angle not in self._circles:
-            self._circles[angle] = sine_cosine(Traced(self.graph, angle))
+            x = Traced(self.graph, angle)
+            sine, cosine = sine_cosine(x)
+            if not self._size(angle) <= _LARGEST_REDUCED:
+                # Beyond, what is written out is not even between -1 and 1.
+                known = abs(x) <= _LARGEST_REDUCED
+                sine, cosine = select(known, sine, math.nan), select(known, cosine, math.nan)
+            self._circles[angle] = sine, cosine
+            self._sizes |= {sine.node: 1.0, cosine.node: 1.0}
         return self._circles[angle][op == "cos"].node
+
+    def _size(self, node: int) -> float:
+        """Return how large a value can be where all inputs are angles."""
+        for i in reachable(self.graph, [node]):
+            if i not in self._sizes:
+                op, operands, value = self.graph.nodes[i]
+                sizes = [self._sizes[k] for k in operands]
+                constant = abs(value) if op == "constant" else LARGEST_ANGLE
+                self._sizes[i] = _SIZES[op](*sizes) if op in _SIZES else constant if not operands else math.inf
+        return self._sizes[node]
 
     def number(self, node: int) -> int:
         """Return a node as a number."""
@@ -317,6 +343,21 @@ class _Target:
         return self.graph.record(Node(op, operands))
 
 
+# How large the result of an operation can be, of how large its operands can be; others, as quotients, know no bound.
+_SIZES: dict[str, Callable[..., float]] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a + b,
+    "multiply": lambda a, b: a * b,
+    "fma": lambda a, b, c: a * b + c,
+    "negate": lambda a: a,
+    "absolute": lambda a: a,
+    "sqrt": math.sqrt,
+    "select": lambda _, a, b: max(a, b),
+    "number": lambda _: 1.0,
+    # A number that comes out of a loop, or into a step of it, is an angle if its sine is taken.
+    "state": lambda _: LARGEST_ANGLE,
+    "each": lambda _: LARGEST_ANGLE,
+}
 _WRITTEN_OUT: dict[str, Callable[..., Traced]] = {"atan2": arc_tangent, "round": rounded, "sqrt": root}
 
 
