@@ -87,6 +87,7 @@ def test_truth_values_and_numbers() -> None:
 
     assert values(code, 1.0, 2.0) == [3.0, 6.0, 1.0, True]
     assert values(code, -0.0, -2.0) == [2.0, -2.0, -2.0, False]
+    assert values(code, -1.0, -2.0) == [2.0, -6.0, -2.0, True]
 
 
 # ---- which multiplication an addition takes in ----

@@ -114,3 +114,54 @@ def test_code_that_calls_a_library_is_left_to_llvm() -> None:
 
     assert ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(1) == 7
     assert keeper is not None
+
+
+@pytest.mark.skipif(not CAN_BE_LINKED, reason="LLVM loads objects of other forms")
+def test_code_that_looks_up_an_address_is_left_to_llvm() -> None:
+    """An object that refers to itself by a table of addresses, which an image has not, is none."""
+    looking_up = "define i64 @g() { ret i64 1 }\ndefine i64 @f() { %a = ptrtoint ptr @g to i64 ret i64 %a }"
+
+    assert linked(native._compile(looking_up), "f") is None
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists() or not CAN_BE_LINKED, reason="memory is looked up in /proc")
+def test_code_in_memory_cannot_be_written() -> None:
+    """The memory of an image can be executed, and not written."""
+    image = linked(native._compile("define i64 @f(i64 %x) { ret i64 7 }"), "f")
+    assert image is not None
+    address, _keeper = placed(image)
+
+    regions = [line.split()[:2] for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()]
+    (rights,) = [
+        rights for region, rights in regions if int(region.split("-")[0], 16) <= address < int(region.split("-")[1], 16)
+    ]
+    assert rights == "r-xp"
+
+
+def test_memory_that_cannot_be_executed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Where the system refuses, LLVM loads the code, when it is made and when it is found again."""
+
+    def refused(_image: bytes) -> tuple[int, object]:
+        raise OSError
+
+    monkeypatch.setenv("ARMWRIGHT_CACHE", str(tmp_path))
+    monkeypatch.setattr(native, "placed", refused)
+    for _ in range(2):
+        monkeypatch.setattr(native, "_LOADED", {})
+        monkeypatch.setattr(native, "_REFERRED", {})
+        emitted = emit("sum", lambda x: [[x[0] + 1.75]], {"x": 1}, shapes=[(1,)], origin="a refused sum")
+        assert Kernel(emitted=emitted)([2.0]) == 3.75
+
+
+def test_another_processor_has_other_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What one processor has compiled is not found by another, by its name, its abilities or what the system says."""
+    processor = native.processor()
+    keys = {native._key("some IR", "f")}
+    for other in (processor._replace(name="another"), processor._replace(features="+another")):
+        monkeypatch.setattr(native, "processor", lambda other=other: other)
+        keys.add(native._key("some IR", "f"))
+    assert len(keys) == 3
+
+    before = surroundings.surroundings.__wrapped__()
+    monkeypatch.setattr(surroundings, "_host", lambda: "another")
+    assert surroundings.surroundings.__wrapped__() not in ("", before)
