@@ -26,9 +26,10 @@ def derivative(
 ) -> Callable[..., Any]:
     """Return a compiled function of the values of an equation and of their derivatives, which are exact.
 
-    The equation is run on scalars that write down what is done with them. It may use + - * /, abs, comparisons,
-    and the functions of ``armwright.tracing``; instead of a branch on such a scalar it writes ``select``. The functions
-    of an arm over abstract scalars, such as ``dynamics.newton_euler.newton_euler``, are equations as well.
+    The equation is run on scalars that write down what is done with them. It may use + - * /, the power 2, abs,
+    < <= > >=, and the functions of ``armwright.tracing``; instead of a branch on such a scalar it writes ``select``.
+    The functions of an arm over abstract scalars, such as ``dynamics.newton_euler.newton_euler``, are equations as
+    well.
 
     Where there is no derivative, it is 0 for a comparison, for rounding, for ``abs`` and ``sqrt`` at 0, and for
     ``atan2`` of the point (0, 0); that of ``select`` is the derivative of the branch that is chosen.
@@ -46,7 +47,7 @@ def derivative(
         (..., k, k), by all k numbers of these inputs together, one input behind the other.
 
     Raises:
-        KindError: ``equation`` is no function, or returns something else than scalars.
+        KindError: ``equation`` is no function, or returns something else than scalars, or ``inputs`` is no mapping.
         ShapeError: an input or a list of values has no numbers.
         UnknownNameError: ``of`` names no input.
         InvalidValueError: ``order`` is neither 1 nor 2, or 2 for more than a scalar; or the name of an input is no
@@ -55,7 +56,7 @@ def derivative(
     Source:
         Griewank & Walther (2008), Evaluating Derivatives, chapters 3 and 5.
     """
-    shapes = {name: _shape(name, value) for name, value in inputs.items()}
+    shapes = _shapes(inputs)
     names = [of] if isinstance(of, str) else list(of)
     for name in names:
         if name not in shapes:
@@ -98,9 +99,15 @@ def derivative(
 _DOC = "Return the values of the equation, and their derivatives by {}: see ``armwright.compiled.derivative``."
 
 
+def _shapes(inputs: Mapping[str, int | Shape]) -> dict[str, Shape]:
+    if not isinstance(inputs, Mapping):
+        raise KindError(f"inputs: expected names with sizes, such as {{'q': 6}}, got {shown(inputs)}")
+    return {name: _shape(name, value) for name, value in inputs.items()}
+
+
 def _shape(name: str, value: int | Shape) -> Shape:
-    shape = (value,) if isinstance(value, int) else tuple(value)
-    if not all(isinstance(size, int) and size > 0 for size in shape):
+    shape = tuple(value) if isinstance(value, list | tuple) else (value,)
+    if not all(isinstance(size, int) and not isinstance(size, bool) and size > 0 for size in shape):
         raise ShapeError(f"inputs: expected a size above 0, or a shape of such, for {name!r}, got {shown(value)}")
     return shape
 

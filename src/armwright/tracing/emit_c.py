@@ -507,7 +507,11 @@ _C_HELPERS = {
 
 #ifndef ARMWRIGHT_FMA
 {_has_fma("", 8)}
+#ifdef __GNUC__
+#define ARMWRIGHT_FMA(a, b, c) __builtin_fma(a, b, c)
+#else
 #define ARMWRIGHT_FMA(a, b, c) fma(a, b, c)
+#endif
 #else
 #define ARMWRIGHT_FMA(a, b, c) ((a) * (b) + (c))
 #endif
@@ -518,7 +522,11 @@ _C_HELPERS = {
 
 #ifndef ARMWRIGHT_FMAF
 {_has_fma("F", 4)}
+#ifdef __GNUC__
+#define ARMWRIGHT_FMAF(a, b, c) __builtin_fmaf(a, b, c)
+#else
 #define ARMWRIGHT_FMAF(a, b, c) fmaf(a, b, c)
+#endif
 #else
 #define ARMWRIGHT_FMAF(a, b, c) ((a) * (b) + (c))
 #endif
