@@ -218,3 +218,12 @@ def test_inputs_that_are_none() -> None:
     for size in (True, 2.0, "2", None):
         with pytest.raises(ShapeError, match="inputs: expected a size"):
             derivative(potential, {"q": size}, of="q")  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize("equation", [lambda q: np.sin(q[0]), np.sin, lambda q: math.exp(q[0])])
+def test_functions_of_others(equation: Callable[[Sequence[Scalar]], Scalar]) -> None:
+    """A function of another library that takes no traced scalars is an error that says where there are such."""
+    with pytest.raises(TypeError) as found:
+        derivative(equation, {"q": 2}, of="q")
+
+    assert "functions from armwright.tracing" in found.value.__notes__[0]

@@ -69,9 +69,7 @@ def derivative(
         raise KindError(f"equation: expected a function of scalars, got {shown(equation)}")
     name_of_equation = getattr(equation, "__name__", "")
     title = name_of_equation if name_of_equation.isidentifier() else "equation"
-    # What the equation returns is known once it has run.
-    trial = Graph()
-    values, value_shape = _values(equation(*(trial.inputs(math.prod(shape)) for shape in shapes.values())))
+    values, value_shape = _tried(equation, shapes)
     if order == 2 and value_shape:
         raise InvalidValueError(
             f"order: expected 1, for the equation returns a list of {counted(len(values), 'scalar')}"
@@ -110,6 +108,17 @@ def _shape(name: str, value: int | Shape) -> Shape:
     if not all(isinstance(size, int) and not isinstance(size, bool) and size > 0 for size in shape):
         raise ShapeError(f"inputs: expected a size above 0, or a shape of such, for {name!r}, got {shown(value)}")
     return shape
+
+
+def _tried(equation: Callable[..., Any], shapes: Mapping[str, Shape]) -> tuple[list[Scalar], Shape]:
+    """Return what an equation returns, which is known once it has run, as a list of scalars, and its shape."""
+    trial = Graph()
+    try:
+        result = equation(*(trial.inputs(math.prod(shape)) for shape in shapes.values()))
+    except TypeError as error:
+        error.add_note("An equation takes its functions from armwright.tracing; those of math and NumPy take numbers.")
+        raise
+    return _values(result)
 
 
 def _values(result: Any) -> tuple[list[Scalar], Shape]:
