@@ -349,6 +349,19 @@ def test_cortex_m7(tmp_path: Path) -> None:
         assert of_data == [0, 0]
 
 
+@pytest.mark.parametrize(("compiler", "language"), [("gcc", "c"), ("g++", "cpp")])
+def test_strict_projects(compiler: str, language: Language, tmp_path: Path) -> None:
+    """The text keeps more rules than all our other tests ask for, as projects that include it do."""
+    text = source_text(load_arm("ur5"), ["inverse_dynamics", "inverse_branches"], language)
+    of_language = {"c": ["-Wundef", "-Wbad-function-cast"], "cpp": ["-std=c++17", "-Wold-style-cast", "-Wuseless-cast"]}
+    call = {"c": "int f(void);\nint f(void)", "cpp": "int f();\nint f()"}[language]
+    scope = {"c": "", "cpp": "armwright::"}[language]
+    body = f"{{ double a[48] = {{0.0}}; return {scope}ur5_inverse_dynamics(a, a, a, a); }}\n"
+    rules = ["-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wdouble-promotion", "-Wcast-qual", "-Wcast-align"]
+
+    assert build(compiler, f"{text}{call} {body}", tmp_path / "strict.o", *rules, *of_language[language]).exists()
+
+
 @pytest.mark.parametrize("real", ["double", "float"])
 def test_cortex_m7_without_a_library(real: Real, tmp_path: Path) -> None:
     """A joined multiplication is an instruction for a microcontroller without an operating system, too: no call."""

@@ -162,7 +162,7 @@ def _statements(function: Function, code: MachineCode, dialect: Dialect) -> list
 
     def written(node: int, name: str) -> list[str]:
         """Write the outputs that a node is."""
-        return [f"{x.name}[{i}] = {'(unsigned char)' * x.flag}{name};" for x, i in results.pop(node, [])]
+        return [f"{x.name}[{i}] = {name}{' ? 1 : 0' * x.flag};" for x, i in results.pop(node, [])]
 
     if not code.graph.loops:
         order = scheduled(code.graph, order)
@@ -496,7 +496,7 @@ BIT = """\
 {{
     {whole} bits;
     {memcpy}(&bits, &x, sizeof bits);
-    return (int)(bits >> place & 1);
+    return (bits >> place & 1) != 0 ? 1 : 0;
 }}
 """
 _C_HELPERS = {
