@@ -57,6 +57,7 @@ def test_llvm_to_a_file(tmp_path: Path) -> None:
         (("forward", "--real", "float"), 2, "expected double for llvm, got float; --language c and cpp have float"),
         (("forward", "--language", "cuda", "--real", "float"), 2, "expected double for cuda, got float"),
         (("forward", "--language", "cpp", "--real", "float"), 2, "expected --test with float"),
+        (("forward,jacobian",), 2, "expected one with --language llvm; c, cpp and cuda have several in one text"),
         (("forward", "--test"), 2, "expected --language c or cpp, got llvm"),
         (("forward", "--language", "cuda", "--test"), 2, "expected --language c or cpp, got cuda"),
         (("forward", "--language", "c", "--single"), 2, "expected --language llvm, got c"),

@@ -1,7 +1,8 @@
 """Equations of the user's, compiled with their derivatives."""
 
 import inspect
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -230,3 +231,38 @@ def test_catalogue_arm_by_the_class(rng: np.random.Generator) -> None:
     assert fast.inverse_dynamics_derivatives(q, qd, qdd, out=out)[2] is out[2]
 
     np.testing.assert_allclose(out[2], fast.mass_matrix(q), atol=ROUNDING * np.abs(out[2]).max())
+
+
+@pytest.mark.parametrize(
+    ("equation", "message"),
+    [
+        (lambda q: 1.0 if q[0] in [1.0, 2.0] else q[1], "no truth value yet"),
+        (lambda q: q[0] if q[0] > 0.0 else q[1], "write select"),
+        (lambda q: math.sin(q[0]), "sin, cos and others of armwright.tracing"),
+        (lambda q: float(q[0]), "sin, cos and others of armwright.tracing"),
+        (lambda q: q[0] ** 3, "no power but 2"),
+        (lambda q: q[0] ** q[1], "no power but 2"),
+    ],
+)
+def test_what_scalars_cannot_do(equation: Callable[[Sequence[Scalar]], Scalar], message: str) -> None:
+    """What needs the value of a scalar that has none yet is an error that names the way out, equality too."""
+    with pytest.raises(TypeError, match=message):
+        derivative(equation, {"q": 2}, of="q")
+
+
+def test_inputs_that_are_none() -> None:
+    """Inputs are a mapping of names to sizes; a truth value is no size."""
+    with pytest.raises(KindError, match="inputs: expected names with sizes"):
+        derivative(potential, ["q"], of="q")  # type: ignore[arg-type]
+    for size in (True, 2.0, "2", None):
+        with pytest.raises(ShapeError, match="inputs: expected a size"):
+            derivative(potential, {"q": size}, of="q")  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize("equation", [lambda q: np.sin(q[0]), np.sin, lambda q: math.exp(q[0])])
+def test_functions_of_others(equation: Callable[[Sequence[Scalar]], Scalar]) -> None:
+    """A function of another library that takes no traced scalars is an error that says where there are such."""
+    with pytest.raises(TypeError) as found:
+        derivative(equation, {"q": 2}, of="q")
+
+    assert "functions from armwright.tracing" in found.value.__notes__[0]

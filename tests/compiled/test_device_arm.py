@@ -139,6 +139,8 @@ def test_names_of_devices() -> None:
     assert [device_arm.device_number(x) for x in ("cuda", "cuda:3")] == [0, 3]
     with pytest.raises(InvalidValueError, match="device: expected cuda or a number such as cuda:1, got 'gpu'"):
         compile_arm(load_arm("ur5"), device="gpu")
+    with pytest.raises(InvalidValueError, match="device: expected cuda or a number such as cuda:1, got 0"):
+        compile_arm(load_arm("ur5"), device=0)  # type: ignore[arg-type]
 
 
 def test_no_device() -> None:

@@ -112,6 +112,13 @@ def sizes_on_cortex_m7(text: str, folder: Path) -> tuple[int, int, int]:
     return text_size, data, bss
 
 
+def called_on_cortex_m7(text: str, folder: Path) -> set[str]:
+    """Return the functions of libraries that a text calls where the compiler may not assume that there are any."""
+    build("clang", text, folder / "m7.o", *_CORTEX_M7, "-O2", "-ffreestanding")
+    done = subprocess.run(["nm", "-u", str(folder / "m7.o")], capture_output=True, text=True, check=True)
+    return {line.split()[-1] for line in done.stdout.splitlines()}
+
+
 class Compiled:
     """Quantities of an arm in another language, called for rows of arrays."""
 

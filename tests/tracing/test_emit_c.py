@@ -27,7 +27,16 @@ from armwright.tracing.identifiers import identifier
 from armwright.tracing.scalar import Scalar, atan2, round_half_even, sqrt
 from oracles import compilers
 from oracles.arms import of_all_kinds, random_arm
-from oracles.compilers import COMPILERS, FMA, SANITIZED, Compiled, build, compiled_for_device, sizes_on_cortex_m7
+from oracles.compilers import (
+    COMPILERS,
+    FMA,
+    SANITIZED,
+    Compiled,
+    build,
+    called_on_cortex_m7,
+    compiled_for_device,
+    sizes_on_cortex_m7,
+)
 from samples import Sample
 from test_data_is_no_code import HOSTILE, random_name
 
@@ -355,6 +364,31 @@ def test_cortex_m7(tmp_path: Path) -> None:
         size, *of_data = sizes_on_cortex_m7(text + call, tmp_path)
         assert 1000 < size <= largest
         assert of_data == [0, 0]
+
+
+@pytest.mark.parametrize(("compiler", "language"), [("gcc", "c"), ("g++", "cpp")])
+def test_strict_projects(compiler: str, language: Language, tmp_path: Path) -> None:
+    """The text keeps more rules than all our other tests ask for, as projects that include it do."""
+    text = source_text(load_arm("ur5"), ["inverse_dynamics", "inverse_branches"], language)
+    of_language = {"c": ["-Wundef", "-Wbad-function-cast"], "cpp": ["-std=c++17", "-Wold-style-cast", "-Wuseless-cast"]}
+    call = {"c": "int f(void);\nint f(void)", "cpp": "int f();\nint f()"}[language]
+    scope = {"c": "", "cpp": "armwright::"}[language]
+    body = f"{{ double a[48] = {{0.0}}; return {scope}ur5_inverse_dynamics(a, a, a, a); }}\n"
+    rules = ["-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wdouble-promotion", "-Wcast-qual", "-Wcast-align"]
+
+    assert build(compiler, f"{text}{call} {body}", tmp_path / "strict.o", *rules, *of_language[language]).exists()
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_cortex_m7_without_a_library(real: Real, tmp_path: Path) -> None:
+    """A joined multiplication is an instruction for a microcontroller without an operating system, too: no call."""
+    text = source_text(load_arm("puma560"), ["inverse_dynamics"], "c", real)
+    call = f"int f({real} *x);\nint f({real} *x) {{ return puma560_inverse_dynamics(x, x + 6, x + 12, x); }}\n"
+
+    called = called_on_cortex_m7(text + call, tmp_path)
+
+    assert called & {"fabs", "fabsf"}  # the compiler assumes nothing of the library
+    assert not called & {"fma", "fmaf"}
 
 
 @pytest.mark.parametrize("name", SIX_JOINTS)

@@ -55,6 +55,8 @@ def kernel(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.files.output import write_file
 
     _check_options(language, real, single=single, test=test)
+    if language == "llvm" and "," in quantity:
+        raise usage_error("QUANTITY", "expected one with --language llvm; c, cpp and cuda have several in one text")
     names = [quantity] if language == "llvm" else quantity.split(",")
     model = load_arm(arm)
     emitted = [emit_quantity(model, name) for name in names]

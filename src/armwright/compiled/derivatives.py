@@ -26,10 +26,10 @@ def derivative(
 ) -> Callable[..., Any]:
     """Return a compiled function of the values of an equation and of their derivatives, which are exact.
 
-    The equation is run on scalars that write down what is done with them. It may use + - * /, abs, comparisons,
-    and the functions of ``armwright.tracing``; instead of a branch on such a scalar it writes ``select``. The functions
-    of an arm over abstract scalars, such as ``dynamics.newton_euler.newton_euler``, are equations as well. The sine of
-    an angle beyond 1e15, which the equation has computed, is NaN.
+    The equation is run on scalars that write down what is done with them. It may use + - * /, the power 2, abs,
+    comparisons, and the functions of ``armwright.tracing``; instead of a branch on such a scalar it writes ``select``.
+    The functions of an arm over abstract scalars, such as ``dynamics.newton_euler.newton_euler``, are equations as
+    well. The sine of an angle beyond 1e15, which the equation has computed, is NaN.
 
     Where there is no derivative, it is 0 for a comparison, for rounding, for ``abs`` and ``sqrt`` at 0, and for
     ``atan2`` of the point (0, 0); that of ``select`` is the derivative of the branch that is chosen.
@@ -47,7 +47,7 @@ def derivative(
         (..., k, k), by all k numbers of these inputs together, one input behind the other.
 
     Raises:
-        KindError: ``equation`` is no function, or returns something else than scalars.
+        KindError: ``equation`` is no function, or returns something else than scalars, or ``inputs`` is no mapping.
         ShapeError: an input or a list of values has no numbers.
         UnknownNameError: ``of`` names no input.
         InvalidValueError: ``order`` is neither 1 nor 2, or 2 for more than a scalar; or the name of an input is no
@@ -56,7 +56,7 @@ def derivative(
     Source:
         Griewank & Walther (2008), Evaluating Derivatives, chapters 3 and 5.
     """
-    shapes = {name: _shape(name, value) for name, value in inputs.items()}
+    shapes = _shapes(inputs)
     names = [of] if isinstance(of, str) else list(of)
     for name in names:
         if name not in shapes:
@@ -69,9 +69,7 @@ def derivative(
         raise KindError(f"equation: expected a function of scalars, got {shown(equation)}")
     name_of_equation = getattr(equation, "__name__", "")
     title = name_of_equation if name_of_equation.isidentifier() else "equation"
-    # What the equation returns is known once it has run.
-    trial = Graph()
-    values, value_shape = _values(equation(*(trial.inputs(math.prod(shape)) for shape in shapes.values())))
+    values, value_shape = _tried(equation, shapes)
     if order == 2 and value_shape:
         raise InvalidValueError(
             f"order: expected 1, for the equation returns a list of {counted(len(values), 'scalar')}"
@@ -99,12 +97,29 @@ def derivative(
 _DOC = "Return the values of the equation, and their derivatives by {}: see ``armwright.compiled.derivative``."
 
 
+def _shapes(inputs: Mapping[str, int | Shape]) -> dict[str, Shape]:
+    if not isinstance(inputs, Mapping):
+        raise KindError(f"inputs: expected names with sizes, such as {{'q': 6}}, got {shown(inputs)}")
+    return {name: _shape(name, value) for name, value in inputs.items()}
+
+
 def _shape(name: str, value: int | Shape) -> Shape:
     sizes = tuple(value) if isinstance(value, Iterable) else (value,)
     shape = tuple(int(size) for size in sizes if isinstance(size, Integral) and not isinstance(size, bool) and size > 0)
     if len(shape) < len(sizes):
         raise ShapeError(f"inputs: expected a size above 0, or a shape of such, for {name!r}, got {shown(value)}")
     return shape
+
+
+def _tried(equation: Callable[..., Any], shapes: Mapping[str, Shape]) -> tuple[list[Scalar], Shape]:
+    """Return what an equation returns, which is known once it has run, as a list of scalars, and its shape."""
+    trial = Graph()
+    try:
+        result = equation(*(trial.inputs(math.prod(shape)) for shape in shapes.values()))
+    except TypeError as error:
+        error.add_note("An equation takes its functions from armwright.tracing; those of math and NumPy take numbers.")
+        raise
+    return _values(result)
 
 
 def _values(result: Any) -> tuple[list[Scalar], Shape]:

@@ -15,7 +15,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm
 from armwright.compiled.source_text import arm_functions, text_of
-from armwright.errors import InvalidValueError, KindError, ShapeError
+from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.tracing.cuda_device import CudaDevice, is_on_device
 from armwright.tracing.kernel import Kernel
 
@@ -176,7 +176,7 @@ def device_number(device: str) -> int:
     Raises:
         InvalidValueError: it is called otherwise.
     """
-    match = re.fullmatch(r"cuda(?::(\d{1,3}))?", device)
+    match = re.fullmatch(r"cuda(?::(\d{1,3}))?", device) if isinstance(device, str) else None
     if match is None:
-        raise InvalidValueError(f"device: expected cuda or a number such as cuda:1, got {device!r}")
+        raise InvalidValueError(f"device: expected cuda or a number such as cuda:1, got {shown(device)}")
     return int(match[1] or 0)

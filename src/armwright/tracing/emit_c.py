@@ -162,7 +162,7 @@ def _statements(function: Function, code: MachineCode, dialect: Dialect) -> list
 
     def written(node: int, name: str) -> list[str]:
         """Write the outputs that a node is."""
-        return [f"{x.name}[{i}] = {'(unsigned char)' * x.flag}{name};" for x, i in results.pop(node, [])]
+        return [f"{x.name}[{i}] = {name}{' ? 1 : 0' * x.flag};" for x, i in results.pop(node, [])]
 
     if not code.graph.loops:
         order = scheduled(code.graph, order)
@@ -500,7 +500,7 @@ BIT = """\
 {{
     {whole} bits;
     {memcpy}(&bits, &x, sizeof bits);
-    return (int)(bits >> place & 1);
+    return (bits >> place & 1) != 0 ? 1 : 0;
 }}
 """
 _C_HELPERS = {
@@ -511,7 +511,11 @@ _C_HELPERS = {
 
 #ifndef ARMWRIGHT_FMA
 {_has_fma("", 8)}
+#ifdef __GNUC__
+#define ARMWRIGHT_FMA(a, b, c) __builtin_fma(a, b, c)
+#else
 #define ARMWRIGHT_FMA(a, b, c) fma(a, b, c)
+#endif
 #else
 #define ARMWRIGHT_FMA(a, b, c) ((a) * (b) + (c))
 #endif
@@ -522,7 +526,11 @@ _C_HELPERS = {
 
 #ifndef ARMWRIGHT_FMAF
 {_has_fma("F", 4)}
+#ifdef __GNUC__
+#define ARMWRIGHT_FMAF(a, b, c) __builtin_fmaf(a, b, c)
+#else
 #define ARMWRIGHT_FMAF(a, b, c) fmaf(a, b, c)
+#endif
 #else
 #define ARMWRIGHT_FMAF(a, b, c) ((a) * (b) + (c))
 #endif

@@ -196,10 +196,18 @@ class Traced:
         return traced("absolute", self)
 
     def __pow__(self, power: int) -> "Traced":
-        return self * self if power == 2 else NotImplemented
+        if isinstance(power, Traced) or power != 2:
+            raise TypeError("a traced scalar has no power but 2: write products, quotients and sqrt")
+        return self * self
 
     def __bool__(self) -> bool:
         raise TypeError("a traced scalar has no truth value yet: write select(condition, then, otherwise)")
+
+    def __float__(self) -> float:
+        raise TypeError("a traced scalar has no value yet: of functions take sin, cos and others of armwright.tracing")
+
+    def __repr__(self) -> str:
+        return "<traced scalar>"
 
 
 def traced(op: str, *operands: Any) -> Traced:
