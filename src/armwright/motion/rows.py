@@ -68,7 +68,8 @@ def _kernel(equation: RowEquation, *widths: int) -> Callable[..., Any]:
     name = equation.__name__.strip("_")
     inputs = {f"x{i}": width for i, width in enumerate(widths)}
     emitted = emit(name, equation, inputs, origin=_origin(equation, widths))
-    return Kernel(emitted=emitted).function(name)
+    # Motions have few rows: compiling with more effort takes longer than it saves.
+    return Kernel(emitted=emitted, quickly=True).function(name)
 
 
 def _origin(equation: RowEquation, widths: Sequence[int]) -> str:

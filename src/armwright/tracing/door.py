@@ -121,7 +121,7 @@ class Door:
             lengths = [*shape, *[0] * (_AXES_MAX - len(shape))]
             words += [len(shape), *lengths, math.prod(shape) * kind.itemsize, id(kind), id(shape)]
         numbers = len(self._inputs), len(self._outputs)
-        address = function_address(lambda: _ir(*numbers), "call", f"{__name__} {numbers}")
+        address = function_address(lambda: _ir(*numbers), "call", f"{__name__} {numbers}", quickly=True)
         texts = name.encode(), doc.encode()
         definition = [_address_of(texts[0]), address, _METH_FASTCALL | _METH_KEYWORDS, _address_of(texts[1])]
         table = _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())

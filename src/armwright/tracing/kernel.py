@@ -43,11 +43,13 @@ class Kernel:
         emitted: its code, and the shapes of its inputs and outputs.
         raise_for_invalid: raises the error that belongs to inputs for which the conditions of the equation do not hold.
         remark: called with inputs that are unusual, and with how many calls up from it the caller stands.
+        quickly: whether it is compiled with the least effort: see ``native.function_address``.
     """
 
     emitted: Emitted
     raise_for_invalid: Callable[..., object] | None = None
     remark: Callable[[Sequence[Array], int], object] | None = None
+    quickly: bool = False
 
     @cached_property
     def single(self) -> Callable[..., int]:
@@ -107,7 +109,7 @@ class Kernel:
         """Return the address of a function, which is compiled when it is first asked for."""
         emitted = self.emitted
         ir = emitted.single_ir if part == "single" else emitted.rows_ir
-        address = function_address(lambda: ir(processor().target), part, emitted.origin)
+        address = function_address(lambda: ir(processor().target), part, emitted.origin, quickly=self.quickly)
         self._door.connect(part, address)
         return address
 

@@ -57,7 +57,7 @@ def processor() -> Processor:
     return Processor(llvm.get_host_cpu_name(), has.flatten(), Target(lanes, has_fma=bool(has.get("fma", arm))))
 
 
-def function_address(ir: str | Callable[[], str], name: str, origin: str = "") -> int:
+def function_address(ir: str | Callable[[], str], name: str, origin: str = "", *, quickly: bool = False) -> int:
     """Return the address of a function of some IR, which is compiled unless it was before.
 
     Args:
@@ -65,18 +65,20 @@ def function_address(ir: str | Callable[[], str], name: str, origin: str = "") -
         name: of the function.
         origin: what the IR follows from, in surroundings that are the same: a process that finds the code by it does
             not ask for the IR. Empty where that cannot be said.
+        quickly: whether it is compiled with the least effort, in a third of the time: for code that runs so seldom
+            that its speed does not matter. The bits of its results are the same.
     """
-    reference = _reference(name, origin)
+    reference = _reference(name, origin and f"{origin} {quickly}")
     if reference and (known := _REFERRED.get(reference)):
         return known
     key = _referred(reference) if reference else None
     address = None if key is None else _loaded(key)
     if address is None:
         text = ir if isinstance(ir, str) else ir()
-        key = _key(text, name)
+        key = _key(text, name, quickly)
         address = _loaded(key)
         if address is None:
-            address = _made(key, text, name)
+            address = _made(key, text, name, quickly)
         if reference and sources_are_unchanged():
             user_store("compiled").put(reference, _REFERENCE + key.encode())
     if reference:
@@ -114,13 +116,13 @@ def _loaded(key: str) -> int | None:
     return _LOADED[key][0] if key in _LOADED else None
 
 
-def _made(key: str, ir: str, name: str) -> int:
+def _made(key: str, ir: str, name: str, quickly: bool) -> int:  # noqa: FBT001
     store = user_store("compiled")
     # Others are waited for without the lock of this process, so that a fork does not wait for them.
     with store.locked(key):
         address = _loaded(key)  # another process may have made it meanwhile
         if address is None:
-            code = _compile(ir)
+            code = _compile(ir, quickly)
             image = linked(code, name)
             store.put(key, _OBJECT + name.encode() + b"\n" + code if image is None else _IMAGE + image)
             _LOADED[key] = _engine(code, name) if image is None else _placed(image, code, name)
@@ -135,13 +137,15 @@ def _placed(image: bytes, code: bytes, name: str) -> tuple[int, Any]:
         return _engine(code, name)
 
 
-def _compile(ir: str) -> bytes:
+def _compile(ir: str, quickly: bool = False) -> bytes:  # noqa: FBT001, FBT002
     import llvmlite.binding as llvm  # noqa: PLC0415
 
     lines, quotients = ir.count("\n"), ir.count(" fdiv ") + ir.count("@llvm.sqrt")
     with _COMPILING:
         module = llvm.parse_assembly(ir)
         module.verify()
+        if quickly:
+            return bytes(_machine(effort=0).emit_object(module))
         if lines <= _LONG or quotients > _MANY_QUOTIENTS * lines:
             return bytes(_machine().emit_object(module))
         # The setting is that of the process, where Numba compiles, too.
@@ -163,7 +167,7 @@ def _engine(code: bytes, name: str) -> tuple[int, Any]:
         return int(engine.get_function_address(name)), engine
 
 
-def _machine(effort: Literal[1, 2] = 2) -> Any:
+def _machine(effort: Literal[0, 1, 2] = 2) -> Any:
     """Return a code generator for this machine; an engine takes the one that it is given."""
     import llvmlite.binding as llvm  # noqa: PLC0415
 
@@ -178,9 +182,9 @@ def _machine(effort: Literal[1, 2] = 2) -> Any:
     )
 
 
-def _key(ir: str, name: str) -> str:
+def _key(ir: str, name: str, quickly: bool) -> str:  # noqa: FBT001
     """Name IR by itself, what compiles it, and the processor it is compiled for."""
     import llvmlite  # noqa: PLC0415
 
-    parts = [ir, name, sys.platform, llvmlite.__version__, *map(str, processor())]
+    parts = [ir, name, str(quickly), sys.platform, llvmlite.__version__, *map(str, processor())]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
