@@ -1,11 +1,14 @@
 """Routines do the same with NumPy and as machine code."""
 
+from ctypes import CFUNCTYPE, addressof, c_int64, c_void_p, cast, create_string_buffer
+
 import numpy as np
 import pytest
 
 from armwright.motion.forward_backward import Bounds, largest_squares
 from armwright.tracing.emit_loops import EmittedLoops
 from armwright.tracing.loops import Loops, Runner, Table, compiled, with_numpy
+from armwright.tracing.native import function_address
 from armwright.tracing.scalar import Scalar, larger, select, sqrt
 
 
@@ -31,8 +34,8 @@ def test_steps_follow_each_other(run: Runner, rng: np.random.Generator) -> None:
     x = rng.uniform(1, 2, 17)
 
     behind = np.cumsum(x[::-1])[::-1] - x
-    np.testing.assert_allclose(run(_sums, [x], x.shape), behind / x.sum(), rtol=1e-14, atol=1e-15)
-    assert run(_sums, [x[:0]], (0,)).shape == (0,)
+    np.testing.assert_allclose(run(_sums, [x], x.shape)[0], behind / x.sum(), rtol=1e-14, atol=1e-15)
+    assert run(_sums, [x[:0]], (0,))[0].shape == (0,)
 
 
 def _roots(loops: Loops, x: Table, result: Table) -> None:
@@ -50,10 +53,10 @@ def test_each_is_done_by_itself(run: Runner, rng: np.random.Generator) -> None:
     """Numbers that take more steps than others do not change those, not by a bit."""
     x = 10 ** rng.uniform(-6, 6, 50)
 
-    found = run(_roots, [x], x.shape)
+    found = run(_roots, [x], x.shape)[0]
 
     np.testing.assert_allclose(found, np.sqrt(x), rtol=1e-15)
-    np.testing.assert_array_equal(found[:1], run(_roots, [x[:1]], (1,)))
+    np.testing.assert_array_equal(found[:1], run(_roots, [x[:1]], (1,))[0])
 
 
 def _of_rows(loops: Loops, x: Table, result: Table) -> None:
@@ -84,7 +87,7 @@ def test_largest_and_least(run: Runner, rng: np.random.Generator) -> None:
     scaled = x - x.max(axis=1, keepdims=True)
     least = x.max(axis=1).min()
     total = np.cumsum(x.argmax(axis=1) < x.argmin(axis=1))
-    np.testing.assert_array_equal(run(_of_rows, [x], (41,)), [least, *(total + np.abs(scaled).min(axis=1) + least)])
+    np.testing.assert_array_equal(run(_of_rows, [x], (41,))[0], [least, *(total + np.abs(scaled).min(axis=1) + least)])
 
 
 def test_squares_have_the_same_bits(rng: np.random.Generator) -> None:
@@ -102,6 +105,57 @@ def test_squares_have_the_same_bits(rng: np.random.Generator) -> None:
         use = np.abs(a * u[:, None] + b * x[:-1, None] + bounds.c)
         rounding = 1e-9 * (1 + np.abs(a * u[:, None]) + np.abs(b * x[:-1, None]))
         assert (use <= 1 + rounding).all()
+
+
+def _two(loops: Loops, x: Table, y: Table, doubled: Table, total: Table) -> None:
+    (sums,) = loops.each(x.shape, lambda i, k: [x[i, k] + y[k]])
+    loops.fill([doubled], x.shape, lambda i, k: [sums[i, k] * 2.0])
+    total[0] = loops.largest(x.shape[1], lambda k: y[k])
+
+
+def test_arrays_as_they_come(run: Runner, rng: np.random.Generator) -> None:
+    """Arrays of other orders and kinds are converted; several tables are written."""
+    x, y = rng.normal(size=(5, 4)), rng.integers(0, 9, 5)
+
+    for each in (x.T, np.ascontiguousarray(x.T)):
+        doubled, total = run(_two, [each, y], (4, 5), (1,))
+        np.testing.assert_array_equal(doubled, (x.T + y) * 2)
+        assert total == [y.max()]
+
+
+def test_other_axes_are_refused() -> None:
+    """An array has as many axes as the one before it at the same place."""
+    compiled(_two, [np.ones((2, 3)), np.ones(3)], (2, 3), (1,))
+
+    with pytest.raises(TypeError, match="axes"):
+        compiled(_two, [np.ones(3), np.ones(3)], (2, 3), (1,))
+
+
+@pytest.mark.parametrize("tables", [0, 1])
+def test_memory_is_given_back(tables: int) -> None:
+    """Where memory is short a routine says so, and frees what it has taken."""
+    routine = CFUNCTYPE(c_int64, *[c_void_p] * 4)(
+        function_address(EmittedLoops().module(_two, [2, 1, 2, 1]), "routine")
+    )
+    taken, freed = list[int](), list[int]()
+
+    def allocate(size: int) -> int | None:
+        if len(taken) == tables:
+            return None
+        buffer = create_string_buffer(size)
+        keep.append(buffer)
+        taken.append(addressof(buffer))
+        return taken[-1]
+
+    keep: list[object] = []
+    functions = CFUNCTYPE(c_void_p, c_int64)(allocate), CFUNCTYPE(None, c_void_p)(freed.append)
+    arrays = [np.ones((2, 3)), np.ones(3), np.empty((2, 3)), np.empty(1)]
+    pointers = (c_void_p * 4)(*(x.ctypes.data for x in arrays))
+    lengths = (c_int64 * 6)(2, 3, 3, 2, 3, 1)
+
+    assert routine(pointers, lengths, *(cast(f, c_void_p) for f in functions)) == 1 - tables
+    assert freed == taken
+    assert len(taken) == tables
 
 
 def test_no_table_within_a_loop() -> None:

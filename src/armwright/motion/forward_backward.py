@@ -50,7 +50,7 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool], ru
         Pham & Pham, "A new approach to time-optimal path parameterization based on reachability analysis" (2018).
     """
     ends = np.where(rests, UNBOUNDED, 0.0)
-    return run(_largest_squares, [*bounds, lengths, ends], (len(lengths) + 1,))
+    return run(_largest_squares, [*bounds, lengths, ends], (len(lengths) + 1,))[0]
 
 
 def _largest_squares(loops: Loops, *tables: Table) -> None:

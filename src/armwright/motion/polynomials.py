@@ -192,7 +192,7 @@ def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays, run
         signs = np.where(below[once, 0], 1.0, -1.0)
         parts[turns[once], 0] = run(
             _crossing, [scaled[once], signs, _of_polygon(control[turns[once]], changes[once])], signs.shape
-        )
+        )[0]
         turns, scaled = turns[~once], scaled[~once]
     if len(turns):
         parts[turns] = _roots(scaled, rows)

@@ -332,7 +332,7 @@ def _along(run: list[Scalar]) -> Iterator[tuple[Scalar, Scalar, Scalar]]:
 
 def _when(solver: Solver, law: Array, steps: Array, knots: Array) -> Array:
     """Return when cubics s(t) (k, 4), which never fall, pass knots (k,), from 0 to ``steps`` (k,) [s]."""
-    return solver.run(_passed, [law, steps, knots], knots.shape)
+    return solver.run(_passed, [law, steps, knots], knots.shape)[0]
 
 
 def _passed(loops: Loops, law: Table, steps: Table, knots: Table, times: Table) -> None:

@@ -36,8 +36,6 @@ _TRUTHS = frozenset({"less", "less_equal"})
 _DECLARED = (
     "declare double @llvm.fabs.f64(double)",
     "declare double @llvm.sqrt.f64(double)",
-    "declare noalias ptr @malloc(i64)",
-    "declare void @free(ptr)",
 )
 
 
@@ -168,7 +166,11 @@ class EmittedLoops:
         lengths = [self._text(size, "i64") for size in sizes]
         for length in lengths:
             count = self._name(f"mul i64 {count}, {length}")
-        pointer = self._name(f"call noalias ptr @malloc(i64 {self._name(f'mul i64 {count}, 8')})")
+        # Memory of no bytes may have no address.
+        bytes_ = self._name(f"add i64 {self._name(f'mul i64 {count}, 8')}, 8")
+        pointer = self._name(f"call noalias ptr %allocate(i64 {bytes_})")
+        none, label = self._name(f"icmp eq ptr {pointer}, null"), f"table{self._count}"
+        self._jump(f"br i1 {none}, label %short{len(self._tables)}, label %{label}", label)
         self._tables.append(pointer)
         return EmittedTable(self, pointer, lengths)
 
@@ -278,7 +280,7 @@ class EmittedLoops:
     # ---- the function ----
 
     def module(self, routine: Callable[..., None], axes: Sequence[int]) -> str:
-        """Return the IR of ``routine(tables, lengths)``.
+        """Return the IR of ``routine(tables, lengths, allocate, free)``, which returns 0, or 1 where memory is short.
 
         Args:
             routine: takes loops, and a table for each array.
@@ -291,9 +293,17 @@ class EmittedLoops:
             tables.append(EmittedTable(self, pointer, [self._name(f"load i64, ptr {one}") for one in places]))
             place += count
         routine(self, *tables)
-        self._lines += [f"  call void @free(ptr {table})" for table in self._tables]
-        head = "define void @routine(ptr noalias %tables, ptr noalias %lengths) {"
-        return "\n".join([*_DECLARED, head, "entry:", *self._lines, "  ret void", "}", ""])
+        # What was taken is given back, the last one first, also where memory was too short for another.
+        end = [f"  br label %short{len(self._tables)}_end"]
+        for k in reversed(range(len(self._tables) + 1)):
+            before = f"[0, %{self._block}]" if k == len(self._tables) else f"[%status{k + 1}, %short{k + 1}_end]"
+            end += [] if k == len(self._tables) else [f"short{k}:", f"  br label %short{k}_end"]
+            end += [f"short{k}_end:", f"  %status{k} = phi i64 {before}"]
+            end[-1] += "" if k == len(self._tables) else f", [1, %short{k}]"
+            if k:
+                end += [f"  call void %free(ptr {self._tables[k - 1]})", f"  br label %short{k - 1}_end"]
+        head = "define i64 @routine(ptr noalias %tables, ptr noalias %lengths, ptr %allocate, ptr %free) nounwind {"
+        return "\n".join([*_DECLARED, head, "entry:", *self._lines, *end, "  ret i64 %status0", "}", ""])
 
 
 class EmittedTable:

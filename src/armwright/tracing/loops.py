@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import partial
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
 from armwright.arrays import Array, Flags
+from armwright.tracing.door import RoutineDoor, layout_is_known
 from armwright.tracing.emit_loops import EmittedLoops
 from armwright.tracing.native import function_address
 from armwright.tracing.scalar import Scalar
@@ -73,33 +74,73 @@ class Loops(Protocol):
 class Runner(Protocol):
     """What runs routines."""
 
-    def __call__(self, routine: Routine, inputs: Sequence[Array], shape: tuple[int, ...]) -> Array:
-        """Return the table of a shape that a routine writes, from the arrays that it reads."""
+    def __call__(self, routine: Routine, inputs: Sequence[Array], *shapes: tuple[int, ...]) -> list[Array]:
+        """Return the tables of some shapes that a routine writes, from the arrays that it reads.
+
+        A routine is a function of a module, which all arrays of one place have the same number of axes for.
+        """
 
 
-def with_numpy(routine: Routine, inputs: Sequence[Array], shape: tuple[int, ...]) -> Array:
+def with_numpy(routine: Routine, inputs: Sequence[Array], *shapes: tuple[int, ...]) -> list[Array]:
     """Run a routine with NumPy: see ``Runner``."""
-    result = _PlainTable(np.zeros(shape))
+    results = [_PlainTable(np.zeros(shape)) for shape in shapes]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        routine(_PlainLoops(), *map(_PlainTable, inputs), result)
-    return result.array
+        routine(_PlainLoops(), *map(_PlainTable, inputs), *results)
+    return [x.array for x in results]
 
 
-def compiled(routine: Routine, inputs: Sequence[Array], shape: tuple[int, ...]) -> Array:
-    """Run a routine as machine code, which is compiled when it is first needed: see ``Runner``."""
-    result = np.empty(shape)
-    arrays = [*(np.ascontiguousarray(x, dtype=np.float64) for x in inputs), result]
-    lengths = [length for x in arrays for length in x.shape]
-    function = _function(routine, *(x.ndim for x in arrays))
-    addresses = (ctypes.c_void_p * len(arrays))(*(x.ctypes.data for x in arrays))
-    function(addresses, (ctypes.c_int64 * len(lengths))(*lengths))
-    return result
+def compiled(routine: Routine, inputs: Sequence[Array], *shapes: tuple[int, ...]) -> list[Array]:
+    """Run a routine as machine code, which is compiled when it is first needed: see ``Runner``.
+
+    Raises:
+        MemoryError: there is not enough for the tables of the routine.
+    """
+    results = list(map(np.empty, shapes))
+    function = _FUNCTIONS.get(routine)
+    if function is None:
+        axes = tuple(np.ndim(x) for x in (*inputs, *results))
+        function = _FUNCTIONS[routine] = _function(routine, axes)
+    function(*inputs, *results)
+    return results
 
 
-@cache
-def _function(routine: Routine, *axes: int) -> Callable[..., None]:
-    address = function_address(EmittedLoops().module(routine, axes), "routine")
-    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)
+_FUNCTIONS: dict[Routine, Callable[..., None]] = {}
+
+
+def _function(routine: Routine, axes: tuple[int, ...]) -> Callable[..., None]:
+    """Return the compiled function of a routine, of arrays that have so many axes each."""
+    door = RoutineDoor(axes)
+    module, name = routine.__module__, routine.__qualname__
+    known = name.isidentifier() and module.startswith("armwright.")
+    origin = f"routine {module} {name} {axes}" if known else ""
+
+    def ir() -> str:
+        return EmittedLoops().module(routine, axes) + door.ir()
+
+    if not layout_is_known():
+        return partial(_by_addresses, function_address(ir, "routine", origin))
+
+    def careful(*arrays: Array) -> None:
+        converted = [np.ascontiguousarray(x, dtype=np.float64) for x in arrays]
+        if tuple(x.ndim for x in converted) != axes:
+            raise TypeError(f"{name}: expected arrays with {axes} axes")
+        if all(x is y for x, y in zip(arrays, converted, strict=True)):
+            raise MemoryError(f"{name}: not enough memory")
+        function(*converted)
+
+    function = door.open(name, function_address(ir, "call", origin), careful)
+    return function
+
+
+def _by_addresses(address: int, *arrays: Array) -> None:
+    """Call a routine where it is not known how objects lie in memory."""
+    plain = [np.ascontiguousarray(x, dtype=np.float64) for x in arrays]
+    lengths = [length for x in plain for length in x.shape]
+    function = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 4)(address)
+    addresses = (ctypes.c_void_p * len(plain))(*(x.ctypes.data for x in plain))
+    memory = (ctypes.cast(getattr(ctypes.pythonapi, x), ctypes.c_void_p) for x in ("PyMem_RawMalloc", "PyMem_RawFree"))
+    if function(addresses, (ctypes.c_int64 * len(lengths))(*lengths), *memory):
+        raise MemoryError("not enough memory for a routine")
 
 
 class _Index(NamedTuple):
