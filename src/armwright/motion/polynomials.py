@@ -54,10 +54,10 @@ def slope(terms: list[Scalar]) -> list[Scalar]:
 
 def shifted(terms: Array, shift: Array, rows: Evaluator = on_arrays) -> Array:
     """Return the coefficients of the same polynomials around positions ``shift`` (m,)."""
-    return rows(_shifted, [terms], [shift[:, None]])[0]
+    return rows(shifted_terms, [terms], [shift[:, None]])[0]
 
 
-def _shifted(terms: list[Scalar], shift: list[Scalar]) -> list[list[Scalar]]:
+def shifted_terms(terms: list[Scalar], shift: list[Scalar]) -> list[list[Scalar]]:
     """Return the coefficients of a polynomial around another position."""
     moved = []
     for power in range(len(terms)):

@@ -25,11 +25,11 @@ from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
 from armwright.motion.forward_backward import Bounds, largest_squares
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import composed, evaluate, rate_peaks, shifted
+from armwright.motion.polynomials import shifted_terms, composed, evaluate, rate_peaks, shifted
 from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory, run_slower
 from armwright.tracing.loops import Loops, Table
-from armwright.tracing.scalar import Scalar, larger, select
+from armwright.tracing.scalar import Scalar, larger, select, sqrt
 
 # From rest to the full speed of the path takes no less than this where a joint has no limit of acceleration [s].
 _RAMP = 0.05
@@ -122,15 +122,18 @@ class _Run(NamedTuple):
         times: (p + 1,) when its p pieces begin, and the last one ends [s].
         intervals: (p,) on which interval of the path each is.
         law: (p, 4) coefficients of the path on that interval by the time since the piece began.
-        uses: (p, 1 + 2 n) the largest part of its limits that each piece uses: the speed on the path, the speeds and
-            the roots of the accelerations of the joints.
+        along: (p,) the largest part that each piece uses of the speed on the path.
+        of_joints: (p, 2 n) the same of the speeds and of the roots of the accelerations of the joints.
+        most: the largest part of all.
     """
 
     path: Trajectory
     times: Array
     intervals: npt.NDArray[np.intp]
     law: Array
-    uses: Array
+    along: Array
+    of_joints: Array
+    most: float
 
     def terms(self, solver: Solver) -> Array:
         """Return the coefficients of the joint positions over time, (p, 10, n)."""
@@ -139,7 +142,7 @@ class _Run(NamedTuple):
     @property
     def duration(self) -> float:
         """How long it takes, slowed to keep the limits where they were sampled [s]."""
-        return float(self.times[-1]) * max(1.0, float(self.uses.max()))
+        return float(self.times[-1]) * max(1.0, self.most)
 
 
 def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
@@ -157,7 +160,7 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
     over = max(
         float((speed / arm.limits.speed).max()),
         math.sqrt(float((acceleration / arm.limits.acceleration).max())),
-        float(run.uses[:, 0].max()),
+        float(run.along.max()),
         grid.allowed / float(run.times[-1]),
     )
     trajectory = run_slower(run.times, terms, over)
@@ -231,11 +234,12 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
     bounds, lengths = grid.bounds, grid.lengths
     tighter, runs, x = np.ones((len(lengths), 1)), [], grid.squares
     for _ in range(_ROUNDS):
-        runs.append(_checked(grid, *_averaged(grid.solver, lengths, np.sqrt(x), window)))
+        runs.append(_averaged(grid, x, window))
         if runs[-1].duration <= (1 + _HAIR) * grid.allowed:
             break
         worst = np.ones(len(lengths))
-        np.maximum.at(worst, runs[-1].intervals, runs[-1].uses.max(axis=1))
+        uses = np.maximum(runs[-1].along, runs[-1].of_joints.max(axis=1))
+        np.maximum.at(worst, runs[-1].intervals, uses)
         tighter = tighter * worst[:, None] ** 2
         tight = bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter)
         x = largest_squares(tight, lengths, (False, False), grid.solver.run)
@@ -247,57 +251,128 @@ def _steps(lengths: Array, speeds: Array) -> Array:
     return 2 * lengths / (speeds[1:] + speeds[:-1])
 
 
-def _averaged(solver: Solver, lengths: Array, speeds: Array, window: float) -> tuple[Array, Array]:
+def _averaged(grid: _Grid, squares: Array, window: float) -> _Run:
+    """Return a run averaged over a moving window of time, and what it uses of the limits.
+
+    Args:
+        grid: the path.
+        squares: (m + 1,) s'² at the ends of its intervals; s'' is constant on each.
+        window: [s].
+    """
+    path, limits = grid.path, grid.solver.arm.limits
+    m, _, n = path.coefficients.shape
+    inputs = [path.times, path.coefficients, grid.caps, limits.speed, limits.acceleration, squares, np.array([window])]
+    # As many pieces as there may be: each interval begins and ends in the window, and begins once more.
+    p = 3 * m + 1
+    times, law, intervals, along, of_joints, facts = grid.solver.run(
+        _averaged_run, inputs, (p + 1,), (p, 4), (p,), (p,), (p, 2, n), (2,)
+    )
+    count, most = int(facts[0]), float(facts[1])
+    return _Run(
+        path,
+        times[: count + 1],
+        intervals[:count].astype(np.intp),
+        law[:count],
+        along[:count],
+        of_joints[:count].reshape(count, -1),
+        most,
+    )
+
+
+def _averaged_run(loops: Loops, *tables: Table) -> None:
+    """Write the pieces of an averaged run: see ``_averaged``.
+
+    What is written are the attributes of a ``_Run`` in their order, and how many pieces there are and ``most``.
+    """
+    starts, cubics, caps, speed, acceleration, squares, window, times, laws, intervals, along, of_joints, facts = tables
+    breaks, law = _moving_average(loops, starts, squares, window[0])
+    parts, count = _cut(loops, starts, breaks, law)
+    m, _, n = cubics.shape
+    last = law.shape[0]
+
+    def of_piece(k: Scalar) -> list[Scalar]:
+        begin, middle = parts[k], (parts[k + 1] + parts[k]) / 2
+        piece = loops.segment(breaks, middle, last)
+        start, *higher = shifted_terms([law[piece, power] for power in range(4)], [begin - breaks[piece]])[0]
+        t = middle - begin
+        at = loops.segment(starts, ((higher[2] * t + higher[1]) * t + higher[0]) * t + start, m)
+        return [begin, start - starts[at], *higher, loops.number(at)]
+
+    columns = [laws.part(1, power) for power in range(4)]
+    loops.fill([times, *columns, intervals], [count], of_piece)
+    (lengths,) = loops.each([count], lambda k: [parts[k + 1] - parts[k]])
+
+    def run(k: Scalar) -> list[Scalar]:
+        return [*(laws[k, power] for power in range(4)), lengths[k]]
+
+    def of_path(k: Scalar) -> list[Scalar]:
+        return [_fastest(run(k))[0][0] / caps[loops.whole(intervals[k])]]
+
+    def of_joint(k: Scalar, j: Scalar) -> list[Scalar]:
+        at = loops.whole(intervals[k])
+        fastest, hardest = _used([cubics[at, power, j] for power in range(4)], run(k))[0]
+        return [fastest / speed[j], sqrt(hardest / acceleration[j])]
+
+    loops.fill([along], [count], of_path)
+    loops.fill([of_joints.part(1, 0), of_joints.part(1, 1)], [count, n], of_joint)
+    times[count], facts[0] = parts[count], count
+    (uses,) = loops.each(
+        [count],
+        lambda k: [larger(loops.largest(n, lambda j: larger(of_joints[k, 0, j], of_joints[k, 1, j])), along[k])],
+    )
+    facts[1] = loops.largest(count, lambda k: uses[k])
+
+
+def _moving_average(loops: Loops, starts: Table, squares: Table, window: Scalar) -> tuple[Table, Table]:
     """Return s(t) averaged over a moving window of time: its breaks (k + 1,) and cubics (k, 4).
 
     Args:
-        solver: of the arm, to evaluate equations.
-        lengths: (m,) of the intervals in s.
-        speeds: (m + 1,) s' at their ends; s'' is constant on each.
+        loops: the loops.
+        starts: (m + 1,) where the intervals in s begin, and the last one ends.
+        squares: (m + 1,) s'² there; s'' is constant on each.
         window: [s].
     """
-    steps = _steps(lengths, speeds)
-    t = np.concatenate([[0.0], np.cumsum(steps)])
-    # The integral of s(t), on each interval, before the start and after the end.
-    integral = np.zeros((len(lengths) + 2, 4))
-    integral[1:-1, 1:3] = np.stack([np.cumsum(lengths) - lengths, speeds[:-1] / 2], axis=1)
-    integral[1:-1, 3] = (speeds[1:] - speeds[:-1]) / steps / 6
-    grown = (((integral[1:-1, 3] * steps + integral[1:-1, 2]) * steps) + integral[1:-1, 1]) * steps
-    integral[1:, 0] = np.concatenate([[0.0], np.cumsum(grown)])
-    integral[-1, 1] = lengths.sum()
-    begins = np.concatenate([[-window], t])
-    breaks = _apart(np.concatenate([t, t + window]))
-    middles = (breaks[1:] + breaks[:-1]) / 2
+    m = starts.shape[0] - 1
+    (speeds,) = loops.each([m + 1], lambda i: [sqrt(squares[i])])
+    (steps,) = loops.each([m], lambda i: [2 * (starts[i + 1] - starts[i]) / (speeds[i + 1] + speeds[i])])
+    t = loops.sums(m, lambda i: steps[i])
+    # The integral of s(t): on each interval and, with the last coefficients, after the end. Before the start it is 0.
+    bends = loops.table(m + 1)
+    loops.fill([bends], [m], lambda i: [(speeds[i + 1] - speeds[i]) / steps[i] / 6])
+    bends[m] = 0.0
+    grown = loops.sums(m, lambda i: ((bends[i] * steps[i] + speeds[i] / 2) * steps[i] + starts[i]) * steps[i])
+    (later,) = loops.each([m + 1], lambda i: [t[i] + window])
+    breaks, count = _apart(loops, t, later)
 
-    def around(length: Array, within: Array) -> Array:
-        piece = segments_at(begins, within, len(integral))
-        return shifted(integral[piece][..., None], length - begins[piece], solver.rows)[..., 0]
+    def around(begin: Scalar, within: Scalar) -> list[Scalar]:
+        piece = loops.segment(t, within, m + 1)
+        terms = [grown[piece], starts[piece], speeds[piece] / 2, bends[piece]]
+        started = within >= 0.0
+        return [select(started, x, 0.0) for x in shifted_terms(terms, [begin - t[piece]])[0]]
 
-    ahead, behind = around(breaks[:-1], middles), around(breaks[:-1] - window, middles - window)
-    return breaks, (ahead - behind) / window
+    def of_piece(k: Scalar) -> list[Scalar]:
+        begin, middle = breaks[k], (breaks[k + 1] + breaks[k]) / 2
+        ahead, behind = around(begin, middle), around(begin - window, middle - window)
+        return [(x - y) / window for x, y in zip(ahead, behind, strict=True)]
+
+    law = loops.table(count, 4)
+    loops.fill([law.part(1, power) for power in range(4)], [count], of_piece)
+    return breaks, law
 
 
-def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
-    """Return q(s(t)), cut where s(t) passes a knot of the path, and what it uses of the limits."""
-    limits, path, caps = grid.solver.arm.limits, grid.path, grid.caps
-    knots = path.times[1:-1]
-    begins = np.maximum.accumulate(law[:, 0])
-    piece = segments_at(begins, knots, len(law))
-    passed = breaks[piece] + _when(grid.solver, law[piece], (breaks[1:] - breaks[:-1])[piece], knots)
-    times = _apart(np.concatenate([breaks, passed]))
-    middles = (times[1:] + times[:-1]) / 2
-    piece = segments_at(breaks, middles, len(law))
-    inner = shifted(law[piece][..., None], times[:-1] - breaks[piece], grid.solver.rows)
-    there = evaluate(inner, (middles - times[:-1])[:, None])[:, 0]
-    interval = segments_at(path.times, there, len(caps))
-    inner[:, 0, 0] -= path.times[interval]
-    # Where the run is at the samples of each piece, how fast along the path, and with which acceleration.
-    run = np.concatenate([inner[..., 0], (times[1:] - times[:-1])[:, None]], axis=1)
-    (along,) = grid.solver.rows(_fastest, [], [run])
-    used = grid.solver.rows(_used, [path.coefficients[interval]], [run])[0]
-    speed, acceleration = used[:, 0] / limits.speed, np.sqrt(used[:, 1] / limits.acceleration)
-    uses = np.concatenate([along / caps[interval][:, None], speed, acceleration], axis=1)
-    return _Run(path, times, interval, inner[..., 0], uses)
+def _cut(loops: Loops, starts: Table, breaks: Table, law: Table) -> tuple[Table, Scalar]:
+    """Return the times (p + 1,) at which cubics s(t) begin, and at which they pass an inner start; and p."""
+    count, knots = law.shape[0], starts.shape[0] - 2
+    begins = loops.highest(count, lambda k: law[k, 0])
+
+    def of_knot(i: Scalar) -> list[Scalar]:
+        knot = starts[i + 1]
+        piece = loops.segment(begins, knot, count)
+        length = breaks[piece + 1] - breaks[piece]
+        return [breaks[piece] + _passed(loops, [law[piece, power] for power in range(4)], length, knot)]
+
+    (passed,) = loops.each([knots], of_knot)
+    return _apart(loops, breaks, passed)
 
 
 def _used(cubic: list[Scalar], run: list[Scalar]) -> list[list[Scalar]]:
@@ -330,35 +405,26 @@ def _along(run: list[Scalar]) -> Iterator[tuple[Scalar, Scalar, Scalar]]:
         yield ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b, 6 * d * t + 2 * c
 
 
-def _when(solver: Solver, law: Array, steps: Array, knots: Array) -> Array:
-    """Return when cubics s(t) (k, 4), which never fall, pass knots (k,), from 0 to ``steps`` (k,) [s]."""
-    return solver.run(_passed, [law, steps, knots], knots.shape)[0]
+def _passed(loops: Loops, law: list[Scalar], length: Scalar, knot: Scalar) -> Scalar:
+    """Return when a cubic s(t), which never falls, passes a knot, from 0 to ``length`` [s]."""
+    start, slow, bend, jerk = law
 
+    def step(low: Scalar, high: Scalar, last: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+        residual = ((jerk * last + bend) * last + slow) * last + start - knot
+        low, high = select(residual < 0, last, low), select(residual < 0, high, last)
+        rate = (3 * jerk * last + 2 * bend) * last + slow
+        # Newton's step where it stays between the bounds, else a halving.
+        ahead = last - residual / select(rate > 0, rate, math.inf)
+        stays = select(ahead >= low, select(high >= ahead, rate > 0, False), False)
+        t = select(stays, ahead, (low + high) / 2)
+        return abs(t - last) <= _CONVERGED * length, (low, high, t)
 
-def _passed(loops: Loops, law: Table, steps: Table, knots: Table, times: Table) -> None:
-    """Write when cubics pass knots: see ``_when``."""
-
-    def of_knot(i: Scalar) -> tuple[Scalar]:
-        start, slow, bend, jerk = (law[i, power] for power in range(4))
-
-        def step(low: Scalar, high: Scalar, last: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
-            residual = ((jerk * last + bend) * last + slow) * last + start - knots[i]
-            low, high = select(residual < 0, last, low), select(residual < 0, high, last)
-            rate = (3 * jerk * last + 2 * bend) * last + slow
-            # Newton's step where it stays between the bounds, else a halving.
-            ahead = last - residual / select(rate > 0, rate, math.inf)
-            stays = select(ahead >= low, select(high >= ahead, rate > 0, False), False)
-            t = select(stays, ahead, (low + high) / 2)
-            return abs(t - last) <= _CONVERGED * steps[i], (low, high, t)
-
-        return (loops.until(_HALVINGS, (0.0 * steps[i], steps[i], steps[i] / 2), step)[2],)
-
-    loops.fill([times], [knots.shape[0]], of_knot)
+    return loops.until(_HALVINGS, (0.0 * length, length, length / 2), step)[2]
 
 
 def _binding(joints: int, run: _Run) -> BindingLimit:
     """Return which limit of which joint binds for the longest time."""
-    steps, of_joints = run.times[1:] - run.times[:-1], run.uses[:, 1:]
+    steps, of_joints = run.times[1:] - run.times[:-1], run.of_joints
     fullest = of_joints.argmax(axis=1)
     near = of_joints.max(axis=1) >= _BINDS * of_joints.max()
     counts = np.bincount(fullest[near], weights=steps[near], minlength=2 * joints)
@@ -366,11 +432,19 @@ def _binding(joints: int, run: _Run) -> BindingLimit:
     return ("acceleration" if name else "speed"), joint
 
 
-def _apart(times: Array) -> Array:
-    """Return times in order, without those that follow the one before at no distance; the last one stays."""
-    times = np.sort(times)
-    distinct = times[1:] - times[:-1] > _SAME * times[-1]
-    inner = times[1:-1][distinct[:-1]]
-    if len(inner) and times[-1] - inner[-1] <= _SAME * times[-1]:
-        inner = inner[:-1]
-    return np.concatenate([times[:1], inner, times[-1:]])
+def _apart(loops: Loops, first: Table, second: Table) -> tuple[Table, Scalar]:
+    """Return times of two tables in order, and how many there are but the first.
+
+    Those that follow the one before at no distance are left out; the last one stays.
+    """
+    times = loops.merged(first, second)
+    last = times.shape[0] - 1
+    end = times[last]
+    near = _SAME * end
+    places, count = loops.kept(
+        last - 1, lambda i: select(times[i + 1] - times[i] > near, end - times[i + 1] > near, False)
+    )
+    apart = loops.table(count + 2)
+    loops.fill([apart.behind(1)], [count], lambda i: [times[loops.whole(places[i]) + 1]])
+    apart[0], apart[count + 1] = times[0], end
+    return apart, count + 1

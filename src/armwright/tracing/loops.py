@@ -21,14 +21,15 @@ from armwright.tracing.emit_loops import EmittedLoops
 from armwright.tracing.native import function_address
 from armwright.tracing.scalar import Scalar
 
-# A table has a ``shape``, and its numbers are read and written by index, a tuple of them where it has two axes. Within
-# ``walk`` tables of two axes are read row by row, ``table.row(i)[k]``.
+# A table has a ``shape``, and its numbers are read and written by index, a tuple of them where it has several axes.
+# ``table.part(axis, k)`` is the table without an axis, at its place k, and ``table.behind(k)`` that of the rows from k.
+# Within ``walk`` tables of two axes are read row by row, ``table.row(i)[k]``.
 Table: TypeAlias = Any
 # Takes loops, the tables to read, and the tables to write.
 Routine: TypeAlias = Callable[..., None]
 
-# Two axes of loops at most stand for themselves.
-_AXES = 2
+# Three axes of loops at most stand for themselves.
+_AXES = 3
 
 
 class Loops(Protocol):
@@ -42,6 +43,27 @@ class Loops(Protocol):
 
     def table(self, *sizes: Scalar) -> Table:
         """Return a new table of so many numbers along each axis; not within a loop."""
+
+    def sums(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Table:
+        """Return a new table of the sums of what a body returns for the indices before each, from 0 to all of them."""
+
+    def highest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Table:
+        """Return a new table of the largest of what a body returns for the indices up to each."""
+
+    def merged(self, first: Table, second: Table) -> Table:
+        """Return a new table of the numbers of two tables in order; both are so but for rounding."""
+
+    def kept(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Table, Scalar]:
+        """Return a new table of the indices for which a condition holds, as numbers, and how many there are."""
+
+    def whole(self, x: Scalar) -> Scalar:
+        """Return a number without a fraction as an index."""
+
+    def number(self, i: Scalar) -> Scalar:
+        """Return an index as a number."""
+
+    def segment(self, starts: Table, x: Scalar, count: Scalar) -> Scalar:
+        """Return which of ``count`` segments, by their starts, a number is in; at a start the next."""
 
     def walk(
         self, size: Scalar, carry: Sequence[Scalar], step: Callable[..., Sequence[Scalar]], *, reverse: bool = False
@@ -144,10 +166,29 @@ def _by_addresses(address: int, *arrays: Array) -> None:
 
 
 class _Index(NamedTuple):
-    """All indices of a loop at once, so many along an axis."""
+    """All indices of a loop at once, so many along an axis, from some number on."""
 
     axis: int
     size: int
+    start: int = 0
+
+    def __add__(self, by: Any) -> Any:
+        return self._replace(start=self.start + by)
+
+    __radd__ = __add__  # type: ignore[assignment]
+
+    def __sub__(self, by: int) -> _Index:
+        return self._replace(start=self.start - by)
+
+    @property
+    def places(self) -> slice:
+        return slice(self.start, self.start + self.size)
+
+    @property
+    def numbers(self) -> Any:
+        lengths = [1] * _AXES
+        lengths[self.axis] = self.size
+        return np.arange(self.start, self.start + self.size).reshape(lengths)
 
 
 class _PlainTable:
@@ -155,13 +196,15 @@ class _PlainTable:
 
     def __init__(self, array: Array) -> None:
         self.shape = array.shape
-        self._array: Array | None = array
+        self._array = array
         self._items: list[Any] | None = None
+        self._changed = False
 
     @property
     def array(self) -> Array:
-        if self._array is None:
-            self._array = np.array(self._items)
+        if self._changed:
+            self._array[...] = self._items
+            self._items, self._changed = None, False
         return self._array
 
     def row(self, i: int) -> Array:
@@ -170,6 +213,16 @@ class _PlainTable:
         row: Array = self._items[i]
         return row
 
+    def part(self, axis: int, k: int) -> _PlainTable:
+        return _PlainTable(self.array[(*[slice(None)] * axis, k)])
+
+    def behind(self, k: int) -> _PlainTable:
+        return _PlainTable(self.array[k:])
+
+    def forget(self) -> None:
+        """Take note that the array has been written to."""
+        self._items = None
+
     def __getitem__(self, key: Any) -> Scalar:
         if type(key) is int:
             if self._items is None:
@@ -177,19 +230,20 @@ class _PlainTable:
             return self._items[key]
         if type(key) is slice:
             return self.array[key]
-        # A whole number takes one of the last axis.
-        indices = (key,) if type(key) is _Index else key
+        indices = (key,) if type(key) is not tuple else key
+        if any(type(index) is np.ndarray for index in indices):
+            return self.array[tuple(index.numbers if type(index) is _Index else index for index in indices)]
         lengths = [1] * _AXES
         for index in indices:
             if type(index) is _Index:
                 lengths[index.axis] = index.size
-        places = tuple(slice(index.size) if type(index) is _Index else index for index in indices)
+        places = tuple(index.places if type(index) is _Index else index for index in indices)
         return self.array[places].reshape(lengths)
 
     def __setitem__(self, key: int, value: float) -> None:
         if self._items is None:
             self._items = self.array.tolist()
-        self._items[key], self._array = value, None
+        self._items[key], self._changed = value, True
 
 
 def _where(condition: Flags, then: Sequence[Scalar], otherwise: Sequence[Scalar]) -> list[Scalar]:
@@ -213,10 +267,40 @@ class _PlainLoops:
         self._axis = 0
         for table, x in zip(tables, values, strict=True):
             # Axes of reductions are left over.
-            table.array[tuple(map(slice, sizes))] = x if len(sizes) == _AXES else x[(..., *[0] * (_AXES - len(sizes)))]
+            there = np.ndim(x) and len(sizes) < _AXES
+            table.array[tuple(map(slice, sizes))] = x[(..., *[0] * (_AXES - len(sizes)))] if there else x
+            table.forget()
 
     def table(self, *sizes: int) -> _PlainTable:
         return _PlainTable(np.zeros(sizes))
+
+    def sums(self, size: int, body: Callable[[Any], Scalar]) -> _PlainTable:
+        sums = np.zeros(size + 1)
+        np.cumsum(self._of_all(size, body), out=sums[1:])
+        return _PlainTable(sums)
+
+    def highest(self, size: int, body: Callable[[Any], Scalar]) -> _PlainTable:
+        return _PlainTable(np.maximum.accumulate(self._of_all(size, body)))
+
+    def merged(self, first: _PlainTable, second: _PlainTable) -> _PlainTable:
+        return _PlainTable(np.sort(np.concatenate([first.array, second.array])))
+
+    def kept(self, size: int, body: Callable[[Any], Scalar]) -> tuple[_PlainTable, int]:
+        kept = self._of_all(size, body).nonzero()[0]
+        return _PlainTable(kept), len(kept)
+
+    def whole(self, x: Scalar) -> Scalar:
+        return x.astype(np.intp) if isinstance(x, np.ndarray) else int(x)
+
+    def number(self, i: Any) -> Scalar:
+        return i.numbers if type(i) is _Index else i
+
+    def segment(self, starts: _PlainTable, x: Scalar, count: int) -> Scalar:
+        place = starts.array.searchsorted(x, side="right") - 1
+        return np.minimum(np.maximum(place, 0), count - 1)
+
+    def _of_all(self, size: int, body: Callable[[Any], Scalar]) -> Any:
+        return np.broadcast_to(body(_Index(0, size)), (size, *[1] * (_AXES - 1))).reshape(size)
 
     def walk(
         self, size: int, carry: Sequence[Scalar], step: Callable[..., Sequence[Scalar]], *, reverse: bool = False
