@@ -14,7 +14,7 @@ window happens to fit.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable
 from functools import reduce
 from typing import NamedTuple
 
@@ -43,7 +43,7 @@ _ROUNDS = 4
 # more, the fewer knots there are, so that there are some so many in all.
 _FINER, _ENOUGH = 4, 400
 # Parts of an interval where its bounds are kept, and parts of a piece where the limits are sampled.
-_PARTS, _SEEN = np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+_PARTS, _SEEN = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
 # Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed,
 # to this part of the piece.
 _SAME, _HALVINGS, _CONVERGED = 1e-10, 60, 1e-12
@@ -198,7 +198,7 @@ def _bounds(solver: Solver, path: Trajectory, caps: Array) -> Bounds:
     ramp = 0.0 if np.isfinite(limits.acceleration).all() else _RAMP
     squares, bends = (rates / limits.speed) ** 2, bends / limits.acceleration
     # At a part of the segment x has grown by 2 u times the path.
-    grown = 2 * lengths[:, None] * _PARTS
+    grown = 2 * lengths[:, None] * np.array(_PARTS)
     on_x = np.zeros((count, 1 + len(_PARTS), 1 + 2 * joints))
     on_x[:, 1:, 0], on_x[:, 1:, 1 : 1 + joints], on_x[:, 1:, 1 + joints :] = 1 / caps[:, None] ** 2, squares, bends
     on_u = np.zeros_like(on_x)
@@ -212,7 +212,7 @@ def _bounds(solver: Solver, path: Trajectory, caps: Array) -> Bounds:
 def _slopes(cubic: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
     """Return the slopes of a cubic, and its second derivatives, at parts of its length."""
     _, c1, c2, c3 = cubic
-    at = [part * length[0] for part in _PARTS.tolist()]
+    at = [part * length[0] for part in _PARTS]
     return [[*((3 * c3 * s + 2 * c2) * s + c1 for s in at), *(6 * c3 * s + 2 * c2 for s in at)]]
 
 
@@ -300,17 +300,20 @@ def _averaged_run(loops: Loops, *tables: Table) -> None:
 
     columns = [laws.part(1, power) for power in range(4)]
     loops.fill([times, *columns, intervals], [count], of_piece)
-    (lengths,) = loops.each([count], lambda k: [parts[k + 1] - parts[k]])
 
-    def run(k: Scalar) -> list[Scalar]:
-        return [*(laws[k, power] for power in range(4)), lengths[k]]
+    def samples(k: Scalar) -> list[Scalar]:
+        length = parts[k + 1] - parts[k]
+        return [x for part in _SEEN for x in _along([laws[k, power] for power in range(4)], part * length)]
+
+    seen = loops.each([count], samples, 3 * len(_SEEN))
 
     def of_path(k: Scalar) -> list[Scalar]:
-        return [_fastest(run(k))[0][0] / caps[loops.whole(intervals[k])]]
+        return [reduce(larger, (rates[k] for rates in seen[1::3]), 0.0) / caps[loops.whole(intervals[k])]]
 
     def of_joint(k: Scalar, j: Scalar) -> list[Scalar]:
         at = loops.whole(intervals[k])
-        fastest, hardest = _used([cubics[at, power, j] for power in range(4)], run(k))[0]
+        cubic = [cubics[at, power, j] for power in range(4)]
+        fastest, hardest = _used(cubic, zip(*(iter([table[k] for table in seen]),) * 3, strict=True))
         return [fastest / speed[j], sqrt(hardest / acceleration[j])]
 
     loops.fill([along], [count], of_path)
@@ -375,34 +378,22 @@ def _cut(loops: Loops, starts: Table, breaks: Table, law: Table) -> tuple[Table,
     return _apart(loops, breaks, passed)
 
 
-def _used(cubic: list[Scalar], run: list[Scalar]) -> list[list[Scalar]]:
-    """Return the largest speed and the largest acceleration of a joint at samples of a run along a cubic q(s).
-
-    Args:
-        cubic: (4,) its coefficients.
-        run: (5,) coefficients of s over time, and how long it takes.
-    """
+def _used(cubic: list[Scalar], seen: Iterable[tuple[Scalar, ...]]) -> tuple[Scalar, Scalar]:
+    """Return the largest speed and the largest acceleration of a joint on a cubic q(s), where s, s' and s'' are seen."""
     _, c1, c2, c3 = cubic
     speed: Scalar = 0.0
     acceleration: Scalar = 0.0
-    for x, rate, bend in _along(run):
+    for x, rate, bend in seen:
         slope, curve = (3 * c3 * x + 2 * c2) * x + c1, 6 * c3 * x + 2 * c2
         speed = larger(abs(slope * rate), speed)
         acceleration = larger(abs(curve * rate * rate + slope * bend), acceleration)
-    return [[speed, acceleration]]
+    return speed, acceleration
 
 
-def _fastest(run: list[Scalar]) -> list[list[Scalar]]:
-    """Return the largest s' at samples of a run, 0 at least."""
-    return [[reduce(larger, (rate for _, rate, _ in _along(run)), 0.0 * run[0])]]
-
-
-def _along(run: list[Scalar]) -> Iterator[tuple[Scalar, Scalar, Scalar]]:
-    """Give s, s' and s'' at the samples of a run: see ``_used``."""
-    a, b, c, d, length = run
-    for part in _SEEN.tolist():
-        t = part * length
-        yield ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b, 6 * d * t + 2 * c
+def _along(law: list[Scalar], t: Scalar) -> tuple[Scalar, ...]:
+    """Return s, s' and s'' of a cubic s(t)."""
+    a, b, c, d = law
+    return ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b, 6 * d * t + 2 * c
 
 
 def _passed(loops: Loops, law: list[Scalar], length: Scalar, knot: Scalar) -> Scalar:
