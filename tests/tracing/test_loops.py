@@ -113,6 +113,19 @@ def _two(loops: Loops, x: Table, y: Table, doubled: Table, total: Table) -> None
     total[0] = loops.largest(x.shape[1], lambda k: y[k])
 
 
+def _of_columns(loops: Loops, x: Table, most: Table) -> None:
+    rows, columns = x.shape
+    loops.fill([most], [columns], lambda k: [loops.largest(rows, lambda i: x[i, k])])
+
+
+def test_largest_of_columns(run: Runner, rng: np.random.Generator) -> None:
+    """An inner loop may run over the first axis; of no rows the largest is minus infinity."""
+    x = rng.normal(size=(4, 3))
+
+    np.testing.assert_array_equal(run(_of_columns, [x], (3,))[0], x.max(axis=0))
+    np.testing.assert_array_equal(run(_of_columns, [x[:0]], (3,))[0], -np.inf)
+
+
 def test_arrays_as_they_come(run: Runner, rng: np.random.Generator) -> None:
     """Arrays of other orders and kinds are converted; several tables are written."""
     x, y = rng.normal(size=(5, 4)), rng.integers(0, 9, 5)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import math
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,9 +32,9 @@ _ROUNDS = 100
 class Bounds(NamedTuple):
     """Bounds |a u + b x + c| <= 1 on each of N intervals, x at its start; (N, rows) each, with |c| < 1."""
 
-    a: Array
-    b: Array
-    c: Array
+    a: Any
+    b: Any
+    c: Any
 
 
 def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool], run: Runner = with_numpy) -> Array:
@@ -56,6 +56,28 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool], ru
 def _largest_squares(loops: Loops, *tables: Table) -> None:
     """Write the largest x at the ends of the intervals, given bounds, lengths, and the largest at both ends of all."""
     a, b, c, lengths, ends, x = tables
+    write_largest_squares(loops, Bounds(a, b, c), lengths, (ends[0], ends[1]), x)
+
+
+class Nothing:
+    """A table of zeros."""
+
+    def __getitem__(self, key: Scalar) -> float:
+        """Return 0."""
+        return 0.0
+
+
+def write_largest_squares(loops: Loops, bounds: Bounds, lengths: Table, ends: tuple[Scalar, Scalar], x: Table) -> None:
+    """Write the largest x (N + 1,) as ``largest_squares`` returns them.
+
+    Args:
+        loops: the loops of a routine.
+        bounds: tables of the bounds.
+        lengths: table of the lengths of the intervals.
+        ends: the largest x that there may be at the start and at the end.
+        x: the table to write.
+    """
+    a, b, c = bounds
     intervals, rows = a.shape
     sides = _sides(loops, a, b, c)
     top = sides.top

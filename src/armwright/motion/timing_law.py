@@ -23,9 +23,9 @@ import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
-from armwright.motion.forward_backward import Bounds, largest_squares
+from armwright.motion.forward_backward import Bounds, Nothing, largest_squares, write_largest_squares
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import shifted_terms, composed, evaluate, rate_peaks, shifted
+from armwright.motion.polynomials import composed_peaks, evaluate, shifted_terms
 from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory, run_slower
 from armwright.tracing.loops import Loops, Table
@@ -89,18 +89,24 @@ class _Grid(NamedTuple):
 
     Attributes:
         solver: the arm.
-        path: of its joints, a cubic on each of m intervals.
+        times: (m + 1,) the parameters s of the path where m intervals begin, and the last one ends.
+        cubics: (m, 4, n) the joints on each.
         caps: (m,) the largest s' on each.
-        bounds: on each.
+        a: (m, rows) bounds |a u + b x| <= 1 on each, of x = s'² at its start and u = s'', that hold all along it.
+        b: (m, rows) the same.
         squares: (m + 1,) s'² at their ends on the fastest run whose s'' is constant on each.
-        shortest: the time of that run [s].
+        even: the time of a run at the largest s' throughout [s].
+        shortest: the time of the fastest run [s].
     """
 
     solver: Solver
-    path: Trajectory
+    times: Array
+    cubics: Array
     caps: Array
-    bounds: Bounds
+    a: Array
+    b: Array
     squares: Array
+    even: float
     shortest: float
 
     @property
@@ -108,17 +114,12 @@ class _Grid(NamedTuple):
         """How long a run may take [s]."""
         return _allowed(self.shortest)
 
-    @property
-    def lengths(self) -> Array:
-        """Of the intervals in s, (m,)."""
-        return self.path.lengths
-
 
 class _Run(NamedTuple):
     """A run of which the limits have been sampled.
 
     Attributes:
-        path: of the joints.
+        grid: the path.
         times: (p + 1,) when its p pieces begin, and the last one ends [s].
         intervals: (p,) on which interval of the path each is.
         law: (p, 4) coefficients of the path on that interval by the time since the piece began.
@@ -127,17 +128,13 @@ class _Run(NamedTuple):
         most: the largest part of all.
     """
 
-    path: Trajectory
+    grid: _Grid
     times: Array
     intervals: npt.NDArray[np.intp]
     law: Array
     along: Array
     of_joints: Array
     most: float
-
-    def terms(self, solver: Solver) -> Array:
-        """Return the coefficients of the joint positions over time, (p, 10, n)."""
-        return solver.rows(composed, [self.path.coefficients[self.intervals]], [self.law])[0]
 
     @property
     def duration(self) -> float:
@@ -155,8 +152,7 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
     """
     arm, grid = solver.arm, _gridded(solver, path, caps)
     run = _smooth(grid)
-    terms = run.terms(solver)
-    speed, acceleration = rate_peaks(terms, run.times[1:] - run.times[:-1], solver.rows, solver.run)
+    terms, speed, acceleration = composed_peaks(grid.cubics, run.law, run.intervals, run.times, solver.run)
     over = max(
         float((speed / arm.limits.speed).max()),
         math.sqrt(float((acceleration / arm.limits.acceleration).max())),
@@ -164,9 +160,9 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
         grid.allowed / float(run.times[-1]),
     )
     trajectory = run_slower(run.times, terms, over)
-    factor = trajectory.duration / _allowed(float((grid.lengths / grid.caps).sum()) + _RAMP)
+    factor = trajectory.duration / _allowed(grid.even + _RAMP)
     law = run.law.copy()
-    law[:, 0] += run.path.times[run.intervals]
+    law[:, 0] += grid.times[run.intervals]
     progress = run_slower(run.times, law[..., None], over)
     because = _binding(arm.n, run) if factor > 1 else None
     return TimedPath(trajectory, factor, because, progress, speed / over, acceleration / over**2)
@@ -179,41 +175,66 @@ def _allowed(shortest: float) -> float:
 
 def _gridded(solver: Solver, path: Trajectory, caps: Array) -> _Grid:
     """Return a path with every segment cut into equal parts."""
+    limits = solver.arm.limits
+    m, _, n = path.coefficients.shape
     finer = min(max(math.ceil(_ENOUGH / len(caps)), 1), _FINER)
-    starts = (path.lengths[:, None] * (np.arange(finer) / finer)).ravel()
-    coefficients = shifted(np.repeat(path.coefficients, finer, axis=0), starts, solver.rows)
-    times = np.append(np.repeat(path.times[:-1], finer) + starts, path.times[-1])
-    fine, caps = Trajectory(times=times, coefficients=coefficients), np.repeat(caps, finer)
-    bounds, lengths = _bounds(solver, fine, caps), fine.lengths
-    squares = largest_squares(bounds, lengths, (False, False), solver.run)
-    return _Grid(solver, fine, caps, bounds, squares, float(_steps(lengths, np.sqrt(squares)).sum()))
-
-
-def _bounds(solver: Solver, path: Trajectory, caps: Array) -> Bounds:
-    """Return bounds on x = s'² at the start of every segment, and on u = s'', that hold all along it."""
-    lengths, limits = path.lengths, solver.arm.limits
-    count, _, joints = path.coefficients.shape
-    slopes = solver.rows(_slopes, [path.coefficients], [lengths[:, None]])[0]
-    rates, bends = slopes[:, : len(_PARTS)], slopes[:, len(_PARTS) :]
     ramp = 0.0 if np.isfinite(limits.acceleration).all() else _RAMP
-    squares, bends = (rates / limits.speed) ** 2, bends / limits.acceleration
-    # At a part of the segment x has grown by 2 u times the path.
-    grown = 2 * lengths[:, None] * np.array(_PARTS)
-    on_x = np.zeros((count, 1 + len(_PARTS), 1 + 2 * joints))
-    on_x[:, 1:, 0], on_x[:, 1:, 1 : 1 + joints], on_x[:, 1:, 1 + joints :] = 1 / caps[:, None] ** 2, squares, bends
-    on_u = np.zeros_like(on_x)
-    on_u[:, 0, 0] = ramp
-    on_u[:, 1:] = on_x[:, 1:] * grown[..., None]
-    on_u[:, 1:, 1 + joints :] += rates / limits.acceleration
-    on_u, on_x = on_u.reshape(count, -1), on_x.reshape(count, -1)
-    return Bounds(on_u, on_x, np.zeros_like(on_u))
+    inputs = [path.times, path.coefficients, caps, limits.speed, limits.acceleration, np.array([ramp])]
+    of_rows = m * finer, 1 + len(_PARTS) * (1 + 2 * n)
+    times, cubics, fine_caps, a, b, squares, facts = solver.run(
+        _grid, inputs, (m * finer + 1,), (m, finer, 4, n), (m, finer), of_rows, of_rows, (m * finer + 1,), (2,)
+    )
+    return _Grid(
+        solver, times, cubics.reshape(-1, 4, n), fine_caps.reshape(-1), a, b, squares, float(facts[0]), float(facts[1])
+    )
 
 
-def _slopes(cubic: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
-    """Return the slopes of a cubic, and its second derivatives, at parts of its length."""
-    _, c1, c2, c3 = cubic
-    at = [part * length[0] for part in _PARTS]
-    return [[*((3 * c3 * s + 2 * c2) * s + c1 for s in at), *(6 * c3 * s + 2 * c2 for s in at)]]
+def _grid(loops: Loops, *tables: Table) -> None:
+    """Write a grid: see ``_gridded``.
+
+    Read are times and cubics of a path, the largest s' on its segments, the limits of the joints, and a bound of s'';
+    written the attributes of a ``_Grid`` in their order.
+    """
+    path, terms, caps, speed, acceleration, ramp, times, cubics, fine_caps, a, b, squares, facts = tables
+    m, finer, _, n = cubics.shape
+    count = m * finer
+
+    def begin(i: Scalar, k: Scalar) -> list[Scalar]:
+        return [path[i] + (path[i + 1] - path[i]) * (loops.number(k) / finer), caps[i]]
+
+    loops.fill([times.shaped(m, finer), fine_caps], [m, finer], begin)
+    times[count] = path[m]
+
+    def cubic(i: Scalar, k: Scalar, j: Scalar) -> list[Scalar]:
+        start = (path[i + 1] - path[i]) * (loops.number(k) / finer)
+        return shifted_terms([terms[i, power, j] for power in range(4)], [start])[0]
+
+    loops.fill([cubics.part(2, power) for power in range(4)], [m, finer, n], cubic)
+    local, most = cubics.shaped(count, 4, n), fine_caps.shaped(count)
+    (lengths,) = loops.each([count], lambda i: [times[i + 1] - times[i]])
+    loops.fill([a.part(1, 0), b.part(1, 0)], [count], lambda i: [0.0 * most[i] + ramp[0], 0.0 * most[i]])
+    for p, part in enumerate(_PARTS):
+        first = 1 + p * (2 * n + 1)
+
+        def of_path(i: Scalar, part: float = part) -> list[Scalar]:
+            on_x = 1 / (most[i] * most[i])
+            # At a part of the interval x has grown by 2 u times the path.
+            return [2 * lengths[i] * part * on_x, on_x]
+
+        def of_joint(i: Scalar, j: Scalar, part: float = part) -> list[Scalar]:
+            s, grown = part * lengths[i], 2 * lengths[i] * part
+            c1, c2, c3 = (local[i, power, j] for power in (1, 2, 3))
+            rate, bend = (3 * c3 * s + 2 * c2) * s + c1, (6 * c3 * s + 2 * c2) / acceleration[j]
+            square = (rate / speed[j]) ** 2
+            return [square * grown, bend * grown + rate / acceleration[j], square, bend]
+
+        loops.fill([a.part(1, first), b.part(1, first)], [count], of_path)
+        columns = [x.behind(first + 1 + k * n, 1) for x in (a, b) for k in (0, 1)]
+        loops.fill(columns, [count, n], of_joint)
+    write_largest_squares(loops, Bounds(a, b, Nothing()), lengths, (0.0, 0.0), squares)
+    facts[0] = loops.sums(count, lambda i: lengths[i] / most[i])[count]
+    (speeds,) = loops.each([count + 1], lambda i: [sqrt(squares[i])])
+    facts[1] = loops.sums(count, lambda i: 2 * lengths[i] / (speeds[i + 1] + speeds[i]))[count]
 
 
 def _smooth(grid: _Grid) -> _Run:
@@ -231,7 +252,7 @@ def _smooth(grid: _Grid) -> _Run:
 
 def _averaged_within(grid: _Grid, window: float) -> _Run:
     """Return the fastest run averaged over a window, with bounds drawn tighter where that passes limits."""
-    bounds, lengths = grid.bounds, grid.lengths
+    lengths = grid.times[1:] - grid.times[:-1]
     tighter, runs, x = np.ones((len(lengths), 1)), [], grid.squares
     for _ in range(_ROUNDS):
         runs.append(_averaged(grid, x, window))
@@ -241,14 +262,9 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
         uses = np.maximum(runs[-1].along, runs[-1].of_joints.max(axis=1))
         np.maximum.at(worst, runs[-1].intervals, uses)
         tighter = tighter * worst[:, None] ** 2
-        tight = bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter)
-        x = largest_squares(tight, lengths, (False, False), grid.solver.run)
+        bounds = Bounds(grid.a * tighter, grid.b * tighter, np.zeros_like(grid.a))
+        x = largest_squares(bounds, lengths, (False, False), grid.solver.run)
     return min(runs, key=lambda run: run.duration)
-
-
-def _steps(lengths: Array, speeds: Array) -> Array:
-    """Return how long the intervals take whose lengths (m,) and speeds at the ends (m + 1,) are given, (m,) [s]."""
-    return 2 * lengths / (speeds[1:] + speeds[:-1])
 
 
 def _averaged(grid: _Grid, squares: Array, window: float) -> _Run:
@@ -259,9 +275,9 @@ def _averaged(grid: _Grid, squares: Array, window: float) -> _Run:
         squares: (m + 1,) s'² at the ends of its intervals; s'' is constant on each.
         window: [s].
     """
-    path, limits = grid.path, grid.solver.arm.limits
-    m, _, n = path.coefficients.shape
-    inputs = [path.times, path.coefficients, grid.caps, limits.speed, limits.acceleration, squares, np.array([window])]
+    limits = grid.solver.arm.limits
+    m, _, n = grid.cubics.shape
+    inputs = [grid.times, grid.cubics, grid.caps, limits.speed, limits.acceleration, squares, np.array([window])]
     # As many pieces as there may be: each interval begins and ends in the window, and begins once more.
     p = 3 * m + 1
     times, law, intervals, along, of_joints, facts = grid.solver.run(
@@ -269,7 +285,7 @@ def _averaged(grid: _Grid, squares: Array, window: float) -> _Run:
     )
     count, most = int(facts[0]), float(facts[1])
     return _Run(
-        path,
+        grid,
         times[: count + 1],
         intervals[:count].astype(np.intp),
         law[:count],
@@ -432,8 +448,8 @@ def _apart(loops: Loops, first: Table, second: Table) -> tuple[Table, Scalar]:
     last = times.shape[0] - 1
     end = times[last]
     near = _SAME * end
-    places, count = loops.kept(
-        last - 1, lambda i: select(times[i + 1] - times[i] > near, end - times[i + 1] > near, False)
+    (places,), count = loops.kept(
+        [last - 1], lambda i: select(times[i + 1] - times[i] > near, end - times[i + 1] > near, False)
     )
     apart = loops.table(count + 2)
     loops.fill([apart.behind(1)], [count], lambda i: [times[loops.whole(places[i]) + 1]])

@@ -233,16 +233,23 @@ class EmittedLoops:
         self.walk(m + n, (), sunk)
         return table
 
-    def kept(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[EmittedTable, Scalar]:
-        """Return a new table of the indices for which a condition holds, as numbers, and how many there are."""
-        table = self.table(size)
+    def kept(self, sizes: Sequence[Scalar], body: Callable[..., Scalar]) -> tuple[list[EmittedTable], Scalar]:
+        """Return new tables of the indices, one per axis, for which a condition holds, and how many there are."""
+        every: Scalar = 1
+        for size in sizes:
+            every = size * every
+        tables = [self.table(every) for _ in sizes]
 
-        def step(i: Scalar, count: Scalar) -> tuple[Scalar]:
-            table[count] = i
-            return (count + select(body(i), 1, 0),)
+        def step(left: Sequence[Scalar], indices: tuple[Scalar, ...], count: Scalar) -> tuple[Scalar]:
+            if left:
+                (count,) = self.walk(left[0], (count,), lambda i, count: step(left[1:], (*indices, i), count))
+                return (count,)
+            for table, i in zip(tables, indices, strict=True):
+                table[count] = i
+            return (count + select(body(*indices), 1, 0),)
 
-        (count,) = self.walk(size, (0,), step)
-        return table, count
+        (count,) = step(sizes, (), 0)
+        return tables, count
 
     def whole(self, x: Scalar) -> Scalar:
         """Return a number without a fraction as an index."""
@@ -425,12 +432,17 @@ class EmittedTable:
         lengths, strides = (list(x[:axis]) + list(x[axis + 1 :]) for x in (self._lengths, self._strides))
         return EmittedTable(self._loops, pointer, lengths, strides)
 
-    def behind(self, k: Scalar) -> EmittedTable:
-        """Return the table of the rows from some on."""
+    def behind(self, k: Scalar, axis: int = 0) -> EmittedTable:
+        """Return the table from a place of an axis on."""
         loops = self._loops
-        pointer = self._address((k, *[0] * (len(self._lengths) - 1)))
-        length = loops._name(f"sub i64 {self._lengths[0]}, {loops._text(k, 'i64')}")  # noqa: SLF001
-        return EmittedTable(loops, pointer, [length, *self._lengths[1:]], self._strides)
+        pointer = self._address((*[0] * axis, k, *[0] * (len(self._lengths) - axis - 1)))
+        length = loops._name(f"sub i64 {self._lengths[axis]}, {loops._text(k, 'i64')}")  # noqa: SLF001
+        return EmittedTable(loops, pointer, [*self._lengths[:axis], length, *self._lengths[axis + 1 :]], self._strides)
+
+    def shaped(self, *lengths: Scalar) -> EmittedTable:
+        """Return the first numbers of a whole table as one of other lengths."""
+        loops = self._loops
+        return EmittedTable(loops, self._pointer, [loops._text(x, "i64") for x in lengths])  # noqa: SLF001
 
     def __getitem__(self, key: Scalar) -> Scalar:
         """Return an element."""

@@ -9,6 +9,7 @@ each other, ``walk`` and ``until``, is a loop of Python over floats, and the sam
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -22,7 +23,8 @@ from armwright.tracing.native import function_address
 from armwright.tracing.scalar import Scalar
 
 # A table has a ``shape``, and its numbers are read and written by index, a tuple of them where it has several axes.
-# ``table.part(axis, k)`` is the table without an axis, at its place k, and ``table.behind(k)`` that of the rows from k.
+# ``table.part(axis, k)`` is the table without an axis, at its place k, and ``table.behind(k, axis)`` that from k on.
+# ``table.shaped(...)`` has its first numbers, in C order, as a table of other lengths; for tables that are no such part.
 # Within ``walk`` tables of two axes are read row by row, ``table.row(i)[k]``.
 Table: TypeAlias = Any
 # Takes loops, the tables to read, and the tables to write.
@@ -53,8 +55,8 @@ class Loops(Protocol):
     def merged(self, first: Table, second: Table) -> Table:
         """Return a new table of the numbers of two tables in order; both are so but for rounding."""
 
-    def kept(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Table, Scalar]:
-        """Return a new table of the indices for which a condition holds, as numbers, and how many there are."""
+    def kept(self, sizes: Sequence[Scalar], body: Callable[..., Scalar]) -> tuple[list[Table], Scalar]:
+        """Return new tables of the indices, one per axis, for which a condition holds, and how many there are."""
 
     def whole(self, x: Scalar) -> Scalar:
         """Return a number without a fraction as an index."""
@@ -81,10 +83,10 @@ class Loops(Protocol):
         """Return what one of two functions returns; only that one runs. Within ``walk`` and ``until`` only."""
 
     def largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Scalar:
-        """Return the largest of what a body returns for the indices; some there must be."""
+        """Return the largest of what a body returns for the indices; minus infinity of none."""
 
     def least(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Scalar:
-        """Return the least of what a body returns for the indices; some there must be."""
+        """Return the least of what a body returns for the indices; infinity of none."""
 
     def first_largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
         """Return the largest of what a body returns, and the first index for which it does; within ``walk`` only."""
@@ -107,7 +109,7 @@ def with_numpy(routine: Routine, inputs: Sequence[Array], *shapes: tuple[int, ..
     """Run a routine with NumPy: see ``Runner``."""
     results = [_PlainTable(np.zeros(shape)) for shape in shapes]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        routine(_PlainLoops(), *map(_PlainTable, inputs), *results)
+        routine(_PlainLoops(), *(_PlainTable(np.asarray(x, dtype=np.float64)) for x in inputs), *results)
     return [x.array for x in results]
 
 
@@ -216,8 +218,11 @@ class _PlainTable:
     def part(self, axis: int, k: int) -> _PlainTable:
         return _PlainTable(self.array[(*[slice(None)] * axis, k)])
 
-    def behind(self, k: int) -> _PlainTable:
-        return _PlainTable(self.array[k:])
+    def behind(self, k: int, axis: int = 0) -> _PlainTable:
+        return _PlainTable(self.array[(*[slice(None)] * axis, slice(k, None))])
+
+    def shaped(self, *lengths: int) -> _PlainTable:
+        return _PlainTable(self.array.reshape(-1)[: math.prod(lengths)].reshape(lengths))
 
     def forget(self) -> None:
         """Take note that the array has been written to."""
@@ -233,12 +238,14 @@ class _PlainTable:
         indices = (key,) if type(key) is not tuple else key
         if any(type(index) is np.ndarray for index in indices):
             return self.array[tuple(index.numbers if type(index) is _Index else index for index in indices)]
-        lengths = [1] * _AXES
+        lengths, axes = [1] * _AXES, []
         for index in indices:
             if type(index) is _Index:
                 lengths[index.axis] = index.size
-        places = tuple(index.places if type(index) is _Index else index for index in indices)
-        return self.array[places].reshape(lengths)
+                axes.append(index.axis)
+        values = self.array[tuple(index.places if type(index) is _Index else index for index in indices)]
+        # An inner loop may run over an axis of the table before that of an outer one.
+        return (values.T if axes != sorted(axes) and len(axes) == 2 else values).reshape(lengths)  # noqa: PLR2004
 
     def __setitem__(self, key: int, value: float) -> None:
         if self._items is None:
@@ -285,9 +292,10 @@ class _PlainLoops:
     def merged(self, first: _PlainTable, second: _PlainTable) -> _PlainTable:
         return _PlainTable(np.sort(np.concatenate([first.array, second.array])))
 
-    def kept(self, size: int, body: Callable[[Any], Scalar]) -> tuple[_PlainTable, int]:
-        kept = self._of_all(size, body).nonzero()[0]
-        return _PlainTable(kept), len(kept)
+    def kept(self, sizes: Sequence[int], body: Callable[..., Scalar]) -> tuple[list[_PlainTable], int]:
+        (held,) = self.each(sizes, lambda *indices: [body(*indices)])
+        kept = held.array.nonzero()
+        return [_PlainTable(x) for x in kept], len(kept[0])
 
     def whole(self, x: Scalar) -> Scalar:
         return x.astype(np.intp) if isinstance(x, np.ndarray) else int(x)
@@ -332,10 +340,10 @@ class _PlainLoops:
         return tuple(then() if condition else otherwise())
 
     def largest(self, size: int, body: Callable[[Any], Scalar]) -> Scalar:
-        return self._reduced(np.maximum.reduce, size, body)
+        return self._reduced(partial(np.maximum.reduce, initial=-math.inf), size, body)
 
     def least(self, size: int, body: Callable[[Any], Scalar]) -> Scalar:
-        return self._reduced(np.minimum.reduce, size, body)
+        return self._reduced(partial(np.minimum.reduce, initial=math.inf), size, body)
 
     def first_largest(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
         values = body(slice(size))
