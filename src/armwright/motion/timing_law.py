@@ -395,7 +395,7 @@ def _cut(loops: Loops, starts: Table, breaks: Table, law: Table) -> tuple[Table,
 
 
 def _used(cubic: list[Scalar], seen: Iterable[tuple[Scalar, ...]]) -> tuple[Scalar, Scalar]:
-    """Return the largest speed and the largest acceleration of a joint on a cubic q(s), where s, s' and s'' are seen."""
+    """Return the largest speed and the largest acceleration of a joint on a cubic q(s), given s, s' and s'' there."""
     _, c1, c2, c3 = cubic
     speed: Scalar = 0.0
     acceleration: Scalar = 0.0

@@ -19,10 +19,8 @@ from armwright.motion.chain import beside, chain
 from armwright.motion.deviation import (
     HandMotion,
     TrackingError,
-    cubic_peaks,
-    hand_bounds,
+    curve_bounds,
     tracking_error,
-    turning_positions,
 )
 from armwright.motion.knots import divided
 from armwright.motion.obstruction import (
@@ -211,14 +209,14 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
             return obstruction
         trajectory = _spline(task, knots, q)
         h = knots[1:] - knots[:-1]
-        speed, acceleration = cubic_peaks(trajectory.coefficients, h, task.solver.rows)
-        hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
-        error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)
+        bounds = curve_bounds(task.solver, trajectory)
+        speed = bounds.speed
+        error = tracking_error(task.solver, task.motion, trajectory, bounds.hand, task.tolerance)
         tracking = Tracking(trajectory, error, speed)
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
             # Between two knots that keep a limit the spline may pass it where a joint reverses.
-            first, second = turning_positions(trajectory.coefficients, h, task.solver.rows)
+            first, second = bounds.turning
             return beyond_limits(arm, first, knots) or beyond_limits(arm, second, knots) or tracking
         if task.report_spline:
             return tracking

@@ -351,6 +351,11 @@ class EmittedLoops:
         (least,) = self.walk(size, (math.inf,), lambda i, least: (smaller(least, body(i)),))
         return least
 
+    def total(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Scalar:
+        """Return the sum of what a body returns for the indices."""
+        (total,) = self.walk(size, (0.0,), lambda i, total: (total + body(i),))
+        return total
+
     def first_largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
         """Return the largest of what a body returns, and the first index for which it does."""
         return self._first(size, body, -math.inf, lambda x, most: most < x)

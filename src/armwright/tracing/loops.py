@@ -24,7 +24,7 @@ from armwright.tracing.scalar import Scalar
 
 # A table has a ``shape``, and its numbers are read and written by index, a tuple of them where it has several axes.
 # ``table.part(axis, k)`` is the table without an axis, at its place k, and ``table.behind(k, axis)`` that from k on.
-# ``table.shaped(...)`` has its first numbers, in C order, as a table of other lengths; for tables that are no such part.
+# ``table.shaped(...)`` has its first numbers, in C order, as a table of other lengths, where it is no such part.
 # Within ``walk`` tables of two axes are read row by row, ``table.row(i)[k]``.
 Table: TypeAlias = Any
 # Takes loops, the tables to read, and the tables to write.
@@ -87,6 +87,9 @@ class Loops(Protocol):
 
     def least(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Scalar:
         """Return the least of what a body returns for the indices; infinity of none."""
+
+    def total(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Scalar:
+        """Return the sum of what a body returns for the indices."""
 
     def first_largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
         """Return the largest of what a body returns, and the first index for which it does; within ``walk`` only."""
@@ -236,6 +239,8 @@ class _PlainTable:
         if type(key) is slice:
             return self.array[key]
         indices = (key,) if type(key) is not tuple else key
+        if any(type(index) is slice for index in indices):
+            return self.array[indices]
         if any(type(index) is np.ndarray for index in indices):
             return self.array[tuple(index.numbers if type(index) is _Index else index for index in indices)]
         lengths, axes = [1] * _AXES, []
@@ -245,7 +250,7 @@ class _PlainTable:
                 axes.append(index.axis)
         values = self.array[tuple(index.places if type(index) is _Index else index for index in indices)]
         # An inner loop may run over an axis of the table before that of an outer one.
-        return (values.T if axes != sorted(axes) and len(axes) == 2 else values).reshape(lengths)  # noqa: PLR2004
+        return (values.T if axes != sorted(axes) and len(axes) == 2 else values).reshape(lengths)
 
     def __setitem__(self, key: int, value: float) -> None:
         if self._items is None:
@@ -344,6 +349,9 @@ class _PlainLoops:
 
     def least(self, size: int, body: Callable[[Any], Scalar]) -> Scalar:
         return self._reduced(partial(np.minimum.reduce, initial=math.inf), size, body)
+
+    def total(self, size: int, body: Callable[[Any], Scalar]) -> Scalar:
+        return self._reduced(np.add.reduce, size, body)
 
     def first_largest(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
         values = body(slice(size))
