@@ -37,7 +37,7 @@ from armwright.motion.obstruction import (
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline_path import smooth_xspline, xspline
+from armwright.motion.xspline_path import rate_at_first, smooth_xspline, xspline
 
 # Rounds of putting knots where they are missing, and how much closer they are put than the error asks for; into how
 # many parts an interval is divided at most.
@@ -235,14 +235,12 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
 
 def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
     """Return the spline through configurations (k, n) at knots (k,)."""
-    still = np.zeros(q.shape[1])
-    rates = (still, still) if task.rest else (_rate(knots, q), _rate(knots[::-1], q[::-1]))
-    return (xspline if task.report_spline else smooth_xspline)(knots, q, *rates)
-
-
-def _rate(t: Array, q: Array) -> Array:
-    """Return the rate (n,) at the first of four knots or more: that of the cubic through them."""
-    return np.asarray(np.linalg.solve(np.vander(t[:4] - t[0], increasing=True), q[:4])[1])
+    if task.report_spline:
+        still = np.zeros(q.shape[1])
+        return xspline(
+            knots, q, *((still, still) if task.rest else (rate_at_first(knots, q), rate_at_first(knots[::-1], q[::-1])))
+        )
+    return smooth_xspline(knots, q, rest=task.rest, run=task.solver.run)
 
 
 def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Array:

@@ -276,6 +276,28 @@ class EmittedLoops:
         """Apply a step to one index after the other; it takes the index and what was carried, and returns the new."""
         return self._loop(size, carry, lambda i, *state: (False, step(i, *state)), reverse=reverse)
 
+    def follow(
+        self,
+        sizes: Sequence[Scalar],
+        start: Callable[[Scalar], Scalar],
+        step: Callable[[Scalar, Scalar, Scalar], Scalar],
+        *,
+        reverse: bool = False,
+    ) -> EmittedTable:
+        """Return a new table of two axes whose rows follow each other, each column by itself."""
+        table = self.table(*sizes)
+
+        def of_column(j: Scalar) -> tuple[()]:
+            def of_row(i: Scalar, before: Scalar) -> tuple[Scalar]:
+                table[i, j] = x = step(i, j, before)
+                return (x,)
+
+            self.walk(sizes[0], (start(j),), of_row, reverse=reverse)
+            return ()
+
+        self.walk(sizes[1], (), of_column)
+        return table
+
     def until(
         self, most: int, carry: Sequence[Scalar], step: Callable[..., tuple[Scalar, Sequence[Scalar]]]
     ) -> tuple[Scalar, ...]:

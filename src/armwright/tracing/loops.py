@@ -72,6 +72,20 @@ class Loops(Protocol):
     ) -> tuple[Scalar, ...]:
         """Apply a step to one index after the other; it takes the index and what was carried, and returns the new."""
 
+    def follow(
+        self,
+        sizes: Sequence[Scalar],
+        start: Callable[[Scalar], Scalar],
+        step: Callable[[Scalar, Scalar, Scalar], Scalar],
+        *,
+        reverse: bool = False,
+    ) -> Table:
+        """Return a new table of two axes whose rows follow each other, each column by itself; not within a loop.
+
+        A step takes the row, the column, and the number of the row before, and returns the new one; before the first
+        row there are the numbers that ``start`` returns for the columns.
+        """
+
     def until(
         self, most: int, carry: Sequence[Scalar], step: Callable[..., tuple[Scalar, Sequence[Scalar]]]
     ) -> tuple[Scalar, ...]:
@@ -321,6 +335,22 @@ class _PlainLoops:
         for i in reversed(range(size)) if reverse else range(size):
             carry = step(i, *carry)
         return tuple(carry)
+
+    def follow(
+        self,
+        sizes: Sequence[int],
+        start: Callable[[Any], Scalar],
+        step: Callable[[int, Any, Scalar], Scalar],
+        *,
+        reverse: bool = False,
+    ) -> _PlainTable:
+        rows, columns = sizes
+        table, j = np.zeros((rows, columns)), _Index(0, columns)
+        value = start(j)
+        for i in reversed(range(rows)) if reverse else range(rows):
+            value = step(i, j, value)
+            table[i] = value[:, 0, 0]
+        return _PlainTable(table)
 
     def until(
         self, most: int, carry: Sequence[Scalar], step: Callable[..., tuple[Scalar, Sequence[Scalar]]]
