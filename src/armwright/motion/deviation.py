@@ -8,14 +8,14 @@ speeds and accelerations of the joints, which are known exactly on every interva
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, read_only
 from armwright.motion.polynomials import evaluate
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
@@ -348,10 +348,18 @@ def _turning_positions(c: list[Scalar], length: Scalar) -> list[Scalar]:
 
 def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:
     """Return the largest distance (n,) of the tool from the frame before each joint, slides as far out as they go."""
-    farthest = np.zeros(arm.n) if arm.revolute.all() else evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
-    parts = [joint.span(0.0 if joint.revolute else farthest[i]) for i, joint in enumerate(arm.joints)]
+    if arm.revolute.all():
+        return _distances(arm, (0.0,) * arm.n)
+    farthest = evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
+    return _distances(arm, tuple(np.where(arm.revolute, 0.0, farthest).tolist()))
+
+
+@lru_cache(maxsize=16)
+def _distances(arm: Arm, slides: tuple[float, ...]) -> Array:
+    """Return how far (n,) the tool may be from the frame before each joint, slides so far out."""
+    parts = [joint.span(slide) for joint, slide in zip(arm.joints, slides, strict=True)]
     tool = float(np.linalg.norm(arm.tool[:3, 3]))
-    return np.asarray(np.cumsum([tool, *parts[::-1]])[:0:-1])
+    return read_only(np.cumsum([tool, *parts[::-1]])[:0:-1])
 
 
 class LegDistance(NamedTuple):

@@ -18,7 +18,6 @@ from armwright.motion.deviation import (
     HandBounds,
     HandSamples,
     TrackingError,
-    rotated,
     spin_bound,
 )
 from armwright.motion.knots import segments_at
@@ -26,7 +25,7 @@ from armwright.motion.path import NEGLIGIBLE, Path, place_knots
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.poses import position_text
-from armwright.spatial.rotations import rotation_vector
+from armwright.spatial.rotations import rotation_vector, skew_matrix
 from armwright.tracing.loops import Loops, Runner, Table
 from armwright.tracing.scalar import Scalar, larger, select, sin, smaller, sqrt
 from armwright.tracing.vectors import dot
@@ -79,12 +78,25 @@ class StraightPath:
 
     def at(self, way: npt.ArrayLike, fraction: Array) -> Array:
         """Return the poses (k, 4, 4) at fractions (k,) of segments (k,), or of one segment."""
-        way = np.broadcast_to(way, fraction.shape)
+        R, skew, square = self._rotating
+        angle = self._angles[way] * fraction
+        sine, half = np.sin(angle), np.sin(angle / 2)
         X = np.zeros((len(fraction), 4, 4))
-        X[:, :3, :3] = (self.poses[way, None, :3, :3] @ rotated(self.rotations[way], fraction[:, None]))[:, 0]
+        X[:, :3, :3] = R[way] + sine[:, None, None] * skew[way] + (2 * half * half)[:, None, None] * square[way]
         X[:, :3, 3] = self.poses[way, :3, 3] + fraction[:, None] * self.shifts[way]
         X[:, 3, 3] = 1.0
         return X
+
+    @cached_property
+    def _rotating(self) -> tuple[Array, Array, Array]:
+        """Return R, R K and R K² of every segment, of its first orientation R and K v = axis × v."""
+        R, K = self.poses[:-1, :3, :3], skew_matrix(self._axes)
+        return R, R @ K, R @ K @ K
+
+    @cached_property
+    def _axes(self) -> Array:
+        """Of the rotations on the segments, (k, 3)."""
+        return np.asarray(self.rotations / np.where(self._angles > 0, self._angles, 1.0)[:, None])
 
     def _way(self, t: Array) -> SegmentNumbers:
         """Return the numbers of the segments (...) at times (...)."""
@@ -93,7 +105,11 @@ class StraightPath:
     def _along(self, t: Array) -> tuple[SegmentNumbers, Array]:
         """Return the numbers of the segments (...) at times (...), and the fractions of them."""
         way = self._way(t)
-        return way, self.progress(t)[..., 0] - way
+        starts, inside = self.progress.times, np.minimum(np.maximum(t, 0.0), self.progress.duration)
+        piece = segments_at(starts, inside, len(self.progress.coefficients))
+        c0, c1, c2, c3 = np.moveaxis(self.progress.coefficients[piece, :, 0], -1, 0)
+        local = inside - starts[piece]
+        return way, ((c3 * local + c2) * local + c1) * local + c0 - way
 
     def where(self, t: float) -> tuple[int, float, str]:
         """Return on which segment a time is, at which fraction of it, and that in words."""
@@ -131,11 +147,16 @@ class StraightPath:
     @property
     def _segments(self) -> Array:
         """Return the segments as ``_seen`` takes them, (k, 20)."""
-        angles = self._angles[:, None]
         squares = np.einsum("ki,ki->k", self.shifts, self.shifts)[:, None]
-        axes = self.rotations / np.where(angles > 0, angles, 1.0)
         R = self.poses[:-1, :3, :3].reshape(-1, 9)
-        parts = [self.poses[:-1, :3, 3], R, self.shifts, np.where(squares > 0, squares, 1.0), axes, angles]
+        parts = [
+            self.poses[:-1, :3, 3],
+            R,
+            self.shifts,
+            np.where(squares > 0, squares, 1.0),
+            self._axes,
+            self._angles[:, None],
+        ]
         return np.concatenate(parts, axis=1)
 
     @cached_property

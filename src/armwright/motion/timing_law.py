@@ -25,9 +25,9 @@ from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
 from armwright.motion.forward_backward import Bounds, Nothing, largest_squares, write_largest_squares
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import composed_peaks, evaluate, shifted_terms
+from armwright.motion.polynomials import composed_peaks, shifted_terms
 from armwright.motion.solver import Solver
-from armwright.motion.trajectory import Trajectory, run_slower
+from armwright.motion.trajectory import Trajectory
 from armwright.tracing.loops import Loops, Table
 from armwright.tracing.scalar import Scalar, larger, select, sqrt
 
@@ -62,7 +62,7 @@ class TimedPath(NamedTuple):
         trajectory: of the joints, at rest and without acceleration at both ends.
         factor: how many times longer it takes than a run at full speed that no joint limits.
         because: which limit, and which joint, from 0, binds longest; None where the joints do not slow it.
-        progress: s over time.
+        run: before it was slowed by the same factor throughout.
         speed: (n,) largest speeds of the joints.
         acceleration: (n,) largest accelerations.
     """
@@ -70,18 +70,29 @@ class TimedPath(NamedTuple):
     trajectory: Trajectory
     factor: float
     because: BindingLimit | None
-    progress: Trajectory
+    run: _Run
     speed: Array
     acceleration: Array
 
     def when(self, s: float) -> float:
         """Return when the run is at ``s``, as a part of its duration."""
-        starts = self.progress.coefficients[:, 0, 0]
-        k = int(segments_at(starts, s, len(starts)))
-        start, end = self.progress.times[k : k + 2]
-        t = np.linspace(start, end, _LOOKED_UP)
-        there = evaluate(self.progress.coefficients[k : k + 1], t[:, None] - start)[:, 0]
-        return float(np.interp(s, there, t)) / self.progress.duration
+        run = self.run
+        begins = run.law[:, 0] + run.grid.times[run.intervals]
+        k = int(segments_at(begins, s, len(begins)))
+        _, *law = run.law[k].tolist()
+        length = float(run.times[k + 1] - run.times[k])
+
+        def at(i: int) -> float:
+            t = i / (_LOOKED_UP - 1) * length
+            return ((law[2] * t + law[1]) * t + law[0]) * t
+
+        sought, low, high = s - float(begins[k]), 0, _LOOKED_UP - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if at(middle) <= sought else (low, middle)
+        rise = at(high) - at(low)
+        part = min(max((sought - at(low)) / rise, 0.0), 1.0) if rise > 0 else 0.0
+        return (float(run.times[k]) + (low + part) / (_LOOKED_UP - 1) * length) / float(run.times[-1])
 
 
 class _Grid(NamedTuple):
@@ -159,13 +170,11 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
         float(run.along.max()),
         grid.allowed / float(run.times[-1]),
     )
-    trajectory = run_slower(run.times, terms, over)
+    slower = over ** -np.arange(terms.shape[1], dtype=np.float64)
+    trajectory = Trajectory.of_planner(run.times * over, terms * slower[:, None])
     factor = trajectory.duration / _allowed(grid.even + _RAMP)
-    law = run.law.copy()
-    law[:, 0] += grid.times[run.intervals]
-    progress = run_slower(run.times, law[..., None], over)
     because = _binding(arm.n, run) if factor > 1 else None
-    return TimedPath(trajectory, factor, because, progress, speed / over, acceleration / over**2)
+    return TimedPath(trajectory, factor, because, run, speed / over, acceleration / over**2)
 
 
 def _allowed(shortest: float) -> float:

@@ -126,7 +126,7 @@ def smooth_xspline(times: Array, knots: Array, *, rest: bool, run: Runner) -> Tr
         return _through(times, knots, ends, usual_weight((h[:-1], h[1:]), b), b)
     k, n = knots.shape
     (terms,) = run(_smooth, [times, knots, np.array([float(rest)])], (k - 1, 4, n))
-    return Trajectory(times=times, coefficients=terms)
+    return Trajectory.of_planner(times.copy(), terms)
 
 
 def _smooth(loops: Loops, times: Table, knots: Table, rest: Table, terms: Table) -> None:
