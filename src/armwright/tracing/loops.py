@@ -106,10 +106,10 @@ class Loops(Protocol):
         """Return the sum of what a body returns for the indices."""
 
     def first_largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
-        """Return the largest of what a body returns, and the first index for which it does; within ``walk`` only."""
+        """Return the largest of what a body returns, and the first index for which it does."""
 
     def first_least(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
-        """Return the least of what a body returns, and the first index for which it does; within ``walk`` only."""
+        """Return the least of what a body returns, and the first index for which it does."""
 
 
 class Runner(Protocol):
@@ -383,21 +383,33 @@ class _PlainLoops:
     def total(self, size: int, body: Callable[[Any], Scalar]) -> Scalar:
         return self._reduced(np.add.reduce, size, body)
 
-    def first_largest(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
+    def first_largest(self, size: int, body: Callable[[Any], Scalar]) -> tuple[Scalar, Scalar]:
+        if self._axis:
+            values = self._of_inner(size, body)
+            at = values.argmax(axis=self._axis, keepdims=True)
+            return values.max(axis=self._axis, keepdims=True), at
         values = body(slice(size))
-        at = values.argmax()
-        return values.item(at), at
+        first = values.argmax()
+        return values.item(first), first
 
-    def first_least(self, size: int, body: Callable[[Any], Scalar]) -> tuple[float, int]:
+    def first_least(self, size: int, body: Callable[[Any], Scalar]) -> tuple[Scalar, Scalar]:
+        if self._axis:
+            values = self._of_inner(size, body)
+            at = values.argmin(axis=self._axis, keepdims=True)
+            return values.min(axis=self._axis, keepdims=True), at
         values = body(slice(size))
-        at = values.argmin()
-        return values.item(at), at
+        first = values.argmin()
+        return values.item(first), first
 
-    def _reduced(self, reduce: Callable[..., Any], size: int, body: Callable[[Any], Scalar]) -> Scalar:
+    def _of_inner(self, size: int, body: Callable[[Any], Scalar]) -> Any:
+        """Return what a body returns for the indices of an inner loop, along the next axis."""
         axis = self._axis
-        if not axis:
-            return float(reduce(body(slice(size))))
         self._axis += 1
         values = body(_Index(axis, size))
         self._axis = axis
-        return reduce(values, axis=axis, keepdims=True)
+        return values
+
+    def _reduced(self, reduce: Callable[..., Any], size: int, body: Callable[[Any], Scalar]) -> Scalar:
+        if not self._axis:
+            return float(reduce(body(slice(size))))
+        return reduce(self._of_inner(size, body), axis=self._axis, keepdims=True)
