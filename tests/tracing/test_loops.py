@@ -126,6 +126,76 @@ def test_largest_of_columns(run: Runner, rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(run(_of_columns, [x[:0]], (3,))[0], -np.inf)
 
 
+def _of_order(loops: Loops, x: Table, y: Table, *results: Table) -> None:
+    sums, highest, merged, kept, counts, segments = results
+    n = x.shape[0]
+    total, most = loops.sums(n, lambda i: x[i]), loops.highest(n, lambda i: x[i])
+    both = loops.merged(y, most)
+    (places,), count = loops.kept([n], lambda i: x[i] > 0.5)
+    (rows, columns), pairs = loops.kept([n, y.shape[0]], lambda i, k: x[i] < y[k])
+    loops.fill([sums], [n + 1], lambda i: [total[i]])
+    loops.fill([highest], [n], lambda i: [most[i]])
+    loops.fill([merged], [merged.shape[0]], lambda i: [both[i]])
+    loops.fill([kept], [count], lambda i: [x[loops.whole(places[i])]])
+    loops.fill([segments], [n], lambda i: [loops.number(loops.segment(y, x[i], y.shape[0]))])
+    counts[0], counts[1] = count, pairs
+    counts[2] = loops.total(pairs, lambda i: rows[i]) + 100 * loops.total(pairs, lambda i: columns[i])
+
+
+def test_order(run: Runner, rng: np.random.Generator) -> None:
+    """Sums, largest so far, tables in order, what is kept, and segments are those of NumPy."""
+    for n in (1, 2, 40):
+        x, y = rng.uniform(size=n), np.sort(rng.uniform(size=7))
+        y[3] = y[4]
+        above = x[x > 0.5]
+        rows, columns = np.nonzero(x[:, None] < y)
+
+        sums, highest, merged, kept, counts, segments = run(
+            _of_order, [x, y], (n + 1,), (n,), (n + 7,), (n,), (3,), (n,)
+        )
+
+        np.testing.assert_allclose(sums, np.append(0.0, np.cumsum(x)), rtol=1e-14)
+        np.testing.assert_array_equal(highest, np.maximum.accumulate(x))
+        np.testing.assert_array_equal(merged, np.sort([*y, *highest]))
+        np.testing.assert_array_equal(kept[: len(above)], above)
+        assert counts.tolist() == [len(above), len(rows), rows.sum() + 100 * columns.sum()]
+        np.testing.assert_array_equal(segments, np.clip(np.searchsorted(y, x, side="right") - 1, 0, 6))
+
+
+def _nearly(loops: Loops, x: Table, y: Table, merged: Table) -> None:
+    both = loops.merged(x, y)
+    loops.fill([merged], [merged.shape[0]], lambda i: [both[i]])
+
+
+def test_tables_that_are_in_order_but_for_rounding(run: Runner) -> None:
+    """A number that is out of order by rounding comes to its place."""
+    x, y = np.array([0.0, 1.0, 1.0 - 1e-16, 1.0 - 2e-16, 2.0]), np.array([1.0 - 3e-16, 1.0 - 4e-16, 3.0])
+
+    np.testing.assert_array_equal(run(_nearly, [x, y], (8,))[0], np.sort([*x, *y]))
+
+
+def _parts(loops: Loops, x: Table, result: Table, rows: Table) -> None:
+    m, k, n = x.shape
+    flat = x.shaped(m * k, n)
+    loops.fill([result.part(1, 0), result.part(1, 1)], [m, n], lambda i, j: [x.part(1, 1)[i, j], flat[i, j]])
+    loops.fill([result.behind(2, 1).part(1, 0)], [m - 1, n], lambda i, j: [x[i + 1, 0, j]])
+    below = loops.follow([k, n], lambda j: x[0, 0, j], lambda i, j, last: last / 2 + x.part(0, 1)[i, j], reverse=True)
+    loops.fill([rows], [k, n], lambda i, j: [below[i, j]])
+
+
+def test_parts_of_tables(run: Runner, rng: np.random.Generator) -> None:
+    """Parts of tables are read and written where they are, and rows follow each other column by column."""
+    x = rng.normal(size=(3, 2, 4))
+
+    result, rows = run(_parts, [x], (3, 3, 4), (2, 4))
+
+    np.testing.assert_array_equal(result[:, 0], x[:, 1])
+    np.testing.assert_array_equal(result[:, 1], x.reshape(6, 4)[:3])
+    np.testing.assert_array_equal(result[:2, 2], x[1:, 0])
+    last = x[0, 0] / 2 + x[1, 1]
+    np.testing.assert_array_equal(rows, [last / 2 + x[1, 0], last])
+
+
 def test_arrays_as_they_come(run: Runner, rng: np.random.Generator) -> None:
     """Arrays of other orders and kinds are converted; several tables are written."""
     x, y = rng.normal(size=(5, 4)), rng.integers(0, 9, 5)

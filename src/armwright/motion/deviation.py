@@ -20,7 +20,6 @@ from armwright.motion.polynomials import evaluate
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
-from armwright.spatial.rotations import skew_matrix
 from armwright.tracing.loops import Loops, Runner, Table
 from armwright.tracing.scalar import Scalar, larger, select, smaller, sqrt
 
@@ -195,14 +194,6 @@ def error_of(
         samples=errors.shape[1] - 1,
         backward=backward,
     )
-
-
-def rotated(rotation: Array, fraction: Array) -> Array:
-    """Return the rotations (m, k, 3, 3) by fractions (m, k) of rotation vectors (m, 3)."""
-    angle = np.sqrt(np.einsum("mi,mi->m", rotation, rotation))
-    K = skew_matrix(rotation / np.where(angle > 0, angle, 1.0)[:, None])[:, None]
-    phase = (angle[:, None] * fraction)[..., None, None]
-    return np.asarray(np.eye(3) + np.sin(phase) * K + (2 * np.sin(phase / 2) ** 2) * (K @ K))
 
 
 def half_sines(R_A: Array, R_B: Array) -> Array:

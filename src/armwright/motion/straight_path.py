@@ -76,7 +76,7 @@ class StraightPath:
         way, fraction = self._along(t)
         return self.at(way, fraction)
 
-    def at(self, way: npt.ArrayLike, fraction: Array) -> Array:
+    def at(self, way: SegmentNumbers | int, fraction: Array) -> Array:
         """Return the poses (k, 4, 4) at fractions (k,) of segments (k,), or of one segment."""
         R, skew, square = self._rotating
         angle = self._angles[way] * fraction
@@ -239,7 +239,7 @@ def _errors(loops: Loops, *tables: Table) -> None:
 
     def of_interval(i: Scalar) -> list[Scalar]:
         between, angle = steps[i] * steps[i] / 8, angles[i]
-        half, by_position = (loops.largest(each, lambda k, c=c: seen[i, k, c]) for c in (2, 3))
+        half, by_position = loops.largest(each, lambda k: seen[i, k, 2]), loops.largest(each, lambda k: seen[i, k, 3])
         planned = half + between * spin_bound(spin[i], spin_change[i], angle * changes[i], angle * rates[i])
         # Of the position on the line: how fast it can change, from where it is seen, and how far beyond the ends it is.
         hurry = pull[i] / length

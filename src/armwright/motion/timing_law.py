@@ -84,7 +84,7 @@ class TimedPath(NamedTuple):
 
         def at(i: int) -> float:
             t = i / (_LOOKED_UP - 1) * length
-            return ((law[2] * t + law[1]) * t + law[0]) * t
+            return float(((law[2] * t + law[1]) * t + law[0]) * t)
 
         sought, low, high = s - float(begins[k]), 0, _LOOKED_UP - 1
         while high - low > 1:

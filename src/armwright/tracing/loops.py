@@ -12,7 +12,7 @@ import ctypes
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -161,6 +161,8 @@ def _function(routine: Routine, axes: tuple[int, ...]) -> Callable[..., None]:
     if not layout_is_known():
         return partial(_by_addresses, function_address(ir, "routine", origin))
 
+    function: Callable[..., None]
+
     def careful(*arrays: Array) -> None:
         converted = [np.ascontiguousarray(x, dtype=np.float64) for x in arrays]
         if tuple(x.ndim for x in converted) != axes:
@@ -184,20 +186,19 @@ def _by_addresses(address: int, *arrays: Array) -> None:
         raise MemoryError("not enough memory for a routine")
 
 
-class _Index(NamedTuple):
+class _Index:
     """All indices of a loop at once, so many along an axis, from some number on."""
 
-    axis: int
-    size: int
-    start: int = 0
+    __slots__ = ("axis", "size", "start")
 
-    def __add__(self, by: Any) -> Any:
-        return self._replace(start=self.start + by)
+    def __init__(self, axis: int, size: int, start: int = 0) -> None:
+        self.axis, self.size, self.start = axis, size, start
 
-    __radd__ = __add__  # type: ignore[assignment]
+    def __add__(self, by: int) -> _Index:
+        return _Index(self.axis, self.size, self.start + by)
 
     def __sub__(self, by: int) -> _Index:
-        return self._replace(start=self.start - by)
+        return _Index(self.axis, self.size, self.start - by)
 
     @property
     def places(self) -> slice:
@@ -213,14 +214,14 @@ class _Index(NamedTuple):
 class _PlainTable:
     """A table as an array; as a list while single numbers or rows are read or written."""
 
-    def __init__(self, array: Array) -> None:
+    def __init__(self, array: Any) -> None:
         self.shape = array.shape
         self._array = array
         self._items: list[Any] | None = None
         self._changed = False
 
     @property
-    def array(self) -> Array:
+    def array(self) -> Any:
         if self._changed:
             self._array[...] = self._items
             self._items, self._changed = None, False
