@@ -189,20 +189,16 @@ def _by_addresses(address: int, *arrays: Array) -> None:
 class _Index:
     """All indices of a loop at once, so many along an axis, from some number on."""
 
-    __slots__ = ("axis", "size", "start")
+    __slots__ = ("axis", "places", "size", "start")
 
     def __init__(self, axis: int, size: int, start: int = 0) -> None:
-        self.axis, self.size, self.start = axis, size, start
+        self.axis, self.size, self.start, self.places = axis, size, start, slice(start, start + size)
 
     def __add__(self, by: int) -> _Index:
         return _Index(self.axis, self.size, self.start + by)
 
     def __sub__(self, by: int) -> _Index:
         return _Index(self.axis, self.size, self.start - by)
-
-    @property
-    def places(self) -> slice:
-        return slice(self.start, self.start + self.size)
 
     @property
     def numbers(self) -> Any:
@@ -253,19 +249,26 @@ class _PlainTable:
             return self._items[key]
         if type(key) is slice:
             return self.array[key]
-        indices = (key,) if type(key) is not tuple else key
-        if any(type(index) is slice for index in indices):
-            return self.array[indices]
-        if any(type(index) is np.ndarray for index in indices):
-            return self.array[tuple(index.numbers if type(index) is _Index else index for index in indices)]
-        lengths, axes = [1] * _AXES, []
-        for index in indices:
-            if type(index) is _Index:
-                lengths[index.axis] = index.size
-                axes.append(index.axis)
-        values = self.array[tuple(index.places if type(index) is _Index else index for index in indices)]
+        lengths, places, last, in_order = [1] * _AXES, [], -1, True
+        for index in key if type(key) is tuple else (key,):
+            kind = type(index)
+            if kind is _Index:
+                axis = index.axis
+                lengths[axis], last, in_order = index.size, axis, in_order and axis > last
+                places.append(index.places)
+            elif kind is np.ndarray:
+                return self._gathered(key if type(key) is tuple else (key,))
+            elif kind is slice:
+                return self.array[key]
+            else:
+                places.append(index)
+        values = self.array[tuple(places)]
         # An inner loop may run over an axis of the table before that of an outer one.
-        return (values.T if axes != sorted(axes) and len(axes) == 2 else values).reshape(lengths)
+        return (values if in_order else values.T).reshape(lengths)
+
+    def _gathered(self, key: tuple[Any, ...]) -> Any:
+        """Return the elements at places that differ from index to index."""
+        return self.array[tuple(index.numbers if type(index) is _Index else index for index in key)]
 
     def __setitem__(self, key: int, value: float) -> None:
         if self._items is None:
