@@ -12,6 +12,8 @@ from armwright.errors import IncapableArmError
 from armwright.motion.certificate import LIMITS, BindingLimit, Certificate, LimitName, slowing, stretched_peaks
 from armwright.motion.deviation import TrackingError
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
+from armwright.motion.knots import segments_at
+from armwright.motion.polynomials import evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.timing_law import timed
 from armwright.motion.tolerance import Tolerance
@@ -107,12 +109,19 @@ def certificate_of(
         rotation=float(error.orientation.max()),
         rotation_sampled=float(error.sampled_orientation.max()),
         worst_time=time,
-        worst_position=np.asarray(solver.forward(trajectory(time))[:3, 3]),
+        worst_position=np.asarray(solver.forward(_position(trajectory, time))[:3, 3]),
         knots=len(error.position) + 1,
         samples=error.samples * len(error.position),
         peaks=limit_peaks(arm, trajectory) if peaks is None else peaks,
         backward=error.backward,
     )
+
+
+def _position(trajectory: Trajectory, t: float) -> Array:
+    """Return where the joints (n,) are at a time from the start to the end of a trajectory."""
+    k = segments_at(trajectory.times, t, len(trajectory.coefficients))
+    local = np.array([[t - trajectory.times[k]]])
+    return np.asarray(evaluate(trajectory.coefficients[k, None], local)[0])
 
 
 def fastest(
