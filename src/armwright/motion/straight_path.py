@@ -25,7 +25,7 @@ from armwright.motion.path import NEGLIGIBLE, Path, place_knots
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.poses import position_text
-from armwright.spatial.rotations import rotation_vector, skew_matrix
+from armwright.spatial.rotations import rotation_vector
 from armwright.tracing.loops import Loops, Runner, Table
 from armwright.tracing.scalar import Scalar, larger, select, sin, smaller, sqrt
 from armwright.tracing.vectors import dot
@@ -90,8 +90,12 @@ class StraightPath:
     @cached_property
     def _rotating(self) -> tuple[Array, Array, Array]:
         """Return R, R K and R K² of every segment, of its first orientation R and K v = axis × v."""
-        R, K = self.poses[:-1, :3, :3], skew_matrix(self._axes)
-        return R, R @ K, R @ K @ K
+        R, (x, y, z) = self.poses[:-1, :3, :3], self._axes.T
+        K = np.zeros_like(R)
+        K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
+        K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
+        turned = R @ K
+        return R, turned, turned @ K
 
     @cached_property
     def _axes(self) -> Array:
@@ -107,7 +111,7 @@ class StraightPath:
         way = self._way(t)
         starts, inside = self.progress.times, np.minimum(np.maximum(t, 0.0), self.progress.duration)
         piece = segments_at(starts, inside, len(self.progress.coefficients))
-        c0, c1, c2, c3 = np.moveaxis(self.progress.coefficients[piece, :, 0], -1, 0)
+        c0, c1, c2, c3 = self.progress.coefficients[piece, :, 0].T
         local = inside - starts[piece]
         return way, ((c3 * local + c2) * local + c1) * local + c0 - way
 
@@ -162,7 +166,7 @@ class StraightPath:
     @cached_property
     def _angles(self) -> Array:
         """Of the rotations on the segments, (k,) [rad]."""
-        return np.asarray(np.linalg.norm(self.rotations, axis=-1))
+        return np.asarray(np.sqrt(np.einsum("ki,ki->k", self.rotations, self.rotations)))
 
     @cached_property
     def _length(self) -> float:
@@ -345,7 +349,7 @@ def line(A: Array, B: Array, rotation: Array, even: float, *, near: float, ramp:
         ramp: part of the duration that gathers speed, and that loses it again; at full speed from end to end if 0.
     """
     duration = even / (1 - ramp)
-    even_progress = Trajectory(times=[0.0, duration], coefficients=[[[0.0], [1 / duration], [0.0], [0.0]]])
+    even_progress = Trajectory.of_planner(np.array([0.0, duration]), np.array([[[0.0], [1 / duration], [0.0], [0.0]]]))
     return StraightPath(
         poses=np.stack([A, B]),
         rotations=rotation[None],
