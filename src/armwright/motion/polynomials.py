@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -173,9 +173,9 @@ def _composed_peaks(loops: Loops, *tables: Table) -> None:
     kept = []
     for order in (0, 1):
         peak = most.part(0, order)
-        ends, bound = loops.each([p, n], lambda i, j, order=order: _reach(rate(order, i, j), [lengths[i]])[0], 2)
+        ends, bound = loops.each([p, n], lambda i, j, order=order: _reach_of_terms(rate(order, i, j), lengths[i]), 2)
         loops.fill([peak], [n], lambda j, ends=ends: [loops.largest(p, lambda i: ends[i, j])])
-        kept.append(loops.kept([p, n], lambda i, j, bound=bound, peak=peak: bound[i, j] > peak[j]))
+        kept.append(_candidates(loops, lengths, peak, bound, partial(rate, order)))
     before: Scalar = 0
     for order, ((pieces, joints), count) in enumerate(kept):
         peak = most.part(0, order)
@@ -207,6 +207,33 @@ def _composed_peaks(loops: Loops, *tables: Table) -> None:
         loops.fill([rest.part(0, row) for row in range(3)], [further], of_rest)
         before = before + further
     facts[0] = before
+
+
+def _candidates(
+    loops: Loops, lengths: Table, peak: Table, bound: Table, rate: Callable[..., list[Scalar]]
+) -> tuple[list[Table], Scalar]:
+    """Return the pieces and joints where bounds, and those of Bernstein as well, are beyond the peaks of the joints."""
+    (pieces, joints), count = loops.kept(bound.shape, lambda i, j: bound[i, j] > peak[j])
+
+    def closer(k: Scalar) -> list[Scalar]:
+        i, j = loops.whole(pieces[k]), loops.whole(joints[k])
+        return [_reach(rate(i, j), [lengths[i]])[0][1] - peak[j]]
+
+    (beyond,) = loops.each([count], closer)
+    (places,), few = loops.kept([count], lambda k: beyond[k] > 0)
+    tables = loops.each([few], lambda k: [table[loops.whole(places[k])] for table in (pieces, joints)], 2)
+    return tables, few
+
+
+def _reach_of_terms(terms: list[Scalar], length: Scalar) -> list[Scalar]:
+    """Return the largest magnitude at an end of a polynomial, and a bound of that between: of the size of its terms."""
+    last, bound, power = terms[-1], abs(terms[0]), 1.0
+    for term in terms[1:]:
+        power = power * length
+        bound = bound + abs(term) * power
+    for term in terms[-2::-1]:
+        last = last * length + term
+    return [larger(abs(terms[0]), abs(last)), bound]
 
 
 def _between(loops: Loops, terms: list[Scalar], length: Scalar) -> tuple[Scalar, Scalar]:
