@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.motion.forward_backward import Bounds, largest_squares
+from armwright.tracing import loops
 from armwright.tracing.emit_loops import EmittedLoops
 from armwright.tracing.loops import Loops, Runner, Table, compiled, with_numpy
 from armwright.tracing.native import function_address
@@ -204,6 +205,18 @@ def test_arrays_as_they_come(run: Runner, rng: np.random.Generator) -> None:
         doubled, total = run(_two, [each, y], (4, 5), (1,))
         np.testing.assert_array_equal(doubled, (x.T + y) * 2)
         assert total == [y.max()]
+
+
+def test_without_the_layout_of_objects(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
+    """Where it is not known how objects lie in memory, a routine is called by the addresses of its arrays."""
+    monkeypatch.setattr(loops, "layout_is_known", lambda: False)
+    monkeypatch.setattr(loops, "_FUNCTIONS", {})
+    x, y = rng.normal(size=(4, 5)), rng.integers(0, 9, 5)
+
+    doubled, total = compiled(_two, [x[:, ::-1], y], (4, 5), (1,))
+
+    np.testing.assert_array_equal(doubled, (x[:, ::-1] + y) * 2)
+    assert total == [y.max()]
 
 
 def test_other_axes_are_refused() -> None:
