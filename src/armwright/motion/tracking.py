@@ -171,7 +171,10 @@ def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
         speed: (m, n) their largest speeds on its intervals.
     """
     times = trajectory.times
-    slower = 1.0 if task.clock is None else (np.diff(task.clock(times)) / np.diff(times))[:, None]
+    if task.clock is None:
+        return np.asarray(speed / task.solver.arm.limits.speed)
+    passed = task.clock(times)
+    slower = ((passed[1:] - passed[:-1]) / (times[1:] - times[:-1]))[:, None]
     return np.asarray(speed / slower / task.solver.arm.limits.speed)
 
 
