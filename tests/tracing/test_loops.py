@@ -211,7 +211,7 @@ def test_without_the_layout_of_objects(monkeypatch: pytest.MonkeyPatch, rng: np.
     """Where it is not known how objects lie in memory, a routine is called by the addresses of its arrays."""
     monkeypatch.setattr(loops, "layout_is_known", lambda: False)
     monkeypatch.setattr(loops, "_FUNCTIONS", {})
-    x, y = rng.normal(size=(4, 5)), rng.integers(0, 9, 5)
+    x, y = rng.normal(size=(4, 5)), rng.normal(size=5)
 
     doubled, total = compiled(_two, [x[:, ::-1], y], (4, 5), (1,))
 
