@@ -1,11 +1,15 @@
 """Routines do the same with NumPy and as machine code."""
 
+from ctypes import CFUNCTYPE, addressof, c_int64, c_void_p, cast, create_string_buffer
+
 import numpy as np
 import pytest
 
 from armwright.motion.forward_backward import Bounds, largest_squares
+from armwright.tracing import loops
 from armwright.tracing.emit_loops import EmittedLoops
 from armwright.tracing.loops import Loops, Runner, Table, compiled, with_numpy
+from armwright.tracing.native import function_address
 from armwright.tracing.scalar import Scalar, larger, select, sqrt
 
 
@@ -31,8 +35,8 @@ def test_steps_follow_each_other(run: Runner, rng: np.random.Generator) -> None:
     x = rng.uniform(1, 2, 17)
 
     behind = np.cumsum(x[::-1])[::-1] - x
-    np.testing.assert_allclose(run(_sums, [x], x.shape), behind / x.sum(), rtol=1e-14, atol=1e-15)
-    assert run(_sums, [x[:0]], (0,)).shape == (0,)
+    np.testing.assert_allclose(run(_sums, [x], x.shape)[0], behind / x.sum(), rtol=1e-14, atol=1e-15)
+    assert run(_sums, [x[:0]], (0,))[0].shape == (0,)
 
 
 def _roots(loops: Loops, x: Table, result: Table) -> None:
@@ -50,10 +54,10 @@ def test_each_is_done_by_itself(run: Runner, rng: np.random.Generator) -> None:
     """Numbers that take more steps than others do not change those, not by a bit."""
     x = 10 ** rng.uniform(-6, 6, 50)
 
-    found = run(_roots, [x], x.shape)
+    found = run(_roots, [x], x.shape)[0]
 
     np.testing.assert_allclose(found, np.sqrt(x), rtol=1e-15)
-    np.testing.assert_array_equal(found[:1], run(_roots, [x[:1]], (1,)))
+    np.testing.assert_array_equal(found[:1], run(_roots, [x[:1]], (1,))[0])
 
 
 def _of_rows(loops: Loops, x: Table, result: Table) -> None:
@@ -84,7 +88,7 @@ def test_largest_and_least(run: Runner, rng: np.random.Generator) -> None:
     scaled = x - x.max(axis=1, keepdims=True)
     least = x.max(axis=1).min()
     total = np.cumsum(x.argmax(axis=1) < x.argmin(axis=1))
-    np.testing.assert_array_equal(run(_of_rows, [x], (41,)), [least, *(total + np.abs(scaled).min(axis=1) + least)])
+    np.testing.assert_array_equal(run(_of_rows, [x], (41,))[0], [least, *(total + np.abs(scaled).min(axis=1) + least)])
 
 
 def test_squares_have_the_same_bits(rng: np.random.Generator) -> None:
@@ -102,6 +106,152 @@ def test_squares_have_the_same_bits(rng: np.random.Generator) -> None:
         use = np.abs(a * u[:, None] + b * x[:-1, None] + bounds.c)
         rounding = 1e-9 * (1 + np.abs(a * u[:, None]) + np.abs(b * x[:-1, None]))
         assert (use <= 1 + rounding).all()
+
+
+def _two(loops: Loops, x: Table, y: Table, doubled: Table, total: Table) -> None:
+    (sums,) = loops.each(x.shape, lambda i, k: [x[i, k] + y[k]])
+    loops.fill([doubled], x.shape, lambda i, k: [sums[i, k] * 2.0])
+    total[0] = loops.largest(x.shape[1], lambda k: y[k])
+
+
+def _of_columns(loops: Loops, x: Table, most: Table) -> None:
+    rows, columns = x.shape
+    loops.fill([most], [columns], lambda k: [loops.largest(rows, lambda i: x[i, k])])
+
+
+def test_largest_of_columns(run: Runner, rng: np.random.Generator) -> None:
+    """An inner loop may run over the first axis; of no rows the largest is minus infinity."""
+    x = rng.normal(size=(4, 3))
+
+    np.testing.assert_array_equal(run(_of_columns, [x], (3,))[0], x.max(axis=0))
+    np.testing.assert_array_equal(run(_of_columns, [x[:0]], (3,))[0], -np.inf)
+
+
+def _of_order(loops: Loops, x: Table, y: Table, *results: Table) -> None:
+    sums, highest, merged, kept, counts, segments = results
+    n = x.shape[0]
+    total, most = loops.sums(n, lambda i: x[i]), loops.highest(n, lambda i: x[i])
+    both = loops.merged(y, most)
+    (places,), count = loops.kept([n], lambda i: x[i] > 0.5)
+    (rows, columns), pairs = loops.kept([n, y.shape[0]], lambda i, k: x[i] < y[k])
+    loops.fill([sums], [n + 1], lambda i: [total[i]])
+    loops.fill([highest], [n], lambda i: [most[i]])
+    loops.fill([merged], [merged.shape[0]], lambda i: [both[i]])
+    loops.fill([kept], [count], lambda i: [x[loops.whole(places[i])]])
+    loops.fill([segments], [n], lambda i: [loops.number(loops.segment(y, x[i], y.shape[0]))])
+    counts[0], counts[1] = count, pairs
+    counts[2] = loops.total(pairs, lambda i: rows[i]) + 100 * loops.total(pairs, lambda i: columns[i])
+
+
+def test_order(run: Runner, rng: np.random.Generator) -> None:
+    """Sums, largest so far, tables in order, what is kept, and segments are those of NumPy."""
+    for n in (1, 2, 40):
+        x, y = rng.uniform(size=n), np.sort(rng.uniform(size=7))
+        y[3] = y[4]
+        above = x[x > 0.5]
+        rows, columns = np.nonzero(x[:, None] < y)
+
+        sums, highest, merged, kept, counts, segments = run(
+            _of_order, [x, y], (n + 1,), (n,), (n + 7,), (n,), (3,), (n,)
+        )
+
+        np.testing.assert_allclose(sums, np.append(0.0, np.cumsum(x)), rtol=1e-14)
+        np.testing.assert_array_equal(highest, np.maximum.accumulate(x))
+        np.testing.assert_array_equal(merged, np.sort([*y, *highest]))
+        np.testing.assert_array_equal(kept[: len(above)], above)
+        assert counts.tolist() == [len(above), len(rows), rows.sum() + 100 * columns.sum()]
+        np.testing.assert_array_equal(segments, np.clip(np.searchsorted(y, x, side="right") - 1, 0, 6))
+
+
+def _nearly(loops: Loops, x: Table, y: Table, merged: Table) -> None:
+    both = loops.merged(x, y)
+    loops.fill([merged], [merged.shape[0]], lambda i: [both[i]])
+
+
+def test_tables_that_are_in_order_but_for_rounding(run: Runner) -> None:
+    """A number that is out of order by rounding comes to its place."""
+    x, y = np.array([0.0, 1.0, 1.0 - 1e-16, 1.0 - 2e-16, 2.0]), np.array([1.0 - 3e-16, 1.0 - 4e-16, 3.0])
+
+    np.testing.assert_array_equal(run(_nearly, [x, y], (8,))[0], np.sort([*x, *y]))
+
+
+def _parts(loops: Loops, x: Table, result: Table, rows: Table) -> None:
+    m, k, n = x.shape
+    flat = x.shaped(m * k, n)
+    loops.fill([result.part(1, 0), result.part(1, 1)], [m, n], lambda i, j: [x.part(1, 1)[i, j], flat[i, j]])
+    loops.fill([result.behind(2, 1).part(1, 0)], [m - 1, n], lambda i, j: [x[i + 1, 0, j]])
+    below = loops.follow([k, n], lambda j: x[0, 0, j], lambda i, j, last: last / 2 + x.part(0, 1)[i, j], reverse=True)
+    loops.fill([rows], [k, n], lambda i, j: [below[i, j]])
+
+
+def test_parts_of_tables(run: Runner, rng: np.random.Generator) -> None:
+    """Parts of tables are read and written where they are, and rows follow each other column by column."""
+    x = rng.normal(size=(3, 2, 4))
+
+    result, rows = run(_parts, [x], (3, 3, 4), (2, 4))
+
+    np.testing.assert_array_equal(result[:, 0], x[:, 1])
+    np.testing.assert_array_equal(result[:, 1], x.reshape(6, 4)[:3])
+    np.testing.assert_array_equal(result[:2, 2], x[1:, 0])
+    last = x[0, 0] / 2 + x[1, 1]
+    np.testing.assert_array_equal(rows, [last / 2 + x[1, 0], last])
+
+
+def test_arrays_as_they_come(run: Runner, rng: np.random.Generator) -> None:
+    """Arrays of other orders and kinds are converted; several tables are written."""
+    x, y = rng.normal(size=(5, 4)), rng.integers(0, 9, 5)
+
+    for each in (x.T, np.ascontiguousarray(x.T)):
+        doubled, total = run(_two, [each, y], (4, 5), (1,))
+        np.testing.assert_array_equal(doubled, (x.T + y) * 2)
+        assert total == [y.max()]
+
+
+def test_without_the_layout_of_objects(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
+    """Where it is not known how objects lie in memory, a routine is called by the addresses of its arrays."""
+    monkeypatch.setattr(loops, "layout_is_known", lambda: False)
+    monkeypatch.setattr(loops, "_FUNCTIONS", {})
+    x, y = rng.normal(size=(4, 5)), rng.normal(size=5)
+
+    doubled, total = compiled(_two, [x[:, ::-1], y], (4, 5), (1,))
+
+    np.testing.assert_array_equal(doubled, (x[:, ::-1] + y) * 2)
+    assert total == [y.max()]
+
+
+def test_other_axes_are_refused() -> None:
+    """An array has as many axes as the one before it at the same place."""
+    compiled(_two, [np.ones((2, 3)), np.ones(3)], (2, 3), (1,))
+
+    with pytest.raises(TypeError, match="axes"):
+        compiled(_two, [np.ones(3), np.ones(3)], (2, 3), (1,))
+
+
+@pytest.mark.parametrize("tables", [0, 1])
+def test_memory_is_given_back(tables: int) -> None:
+    """Where memory is short a routine says so, and frees what it has taken."""
+    routine = CFUNCTYPE(c_int64, *[c_void_p] * 4)(
+        function_address(EmittedLoops().module(_two, [2, 1, 2, 1]), "routine")
+    )
+    taken, freed = list[int](), list[int]()
+
+    def allocate(size: int) -> int | None:
+        if len(taken) == tables:
+            return None
+        buffer = create_string_buffer(size)
+        keep.append(buffer)
+        taken.append(addressof(buffer))
+        return taken[-1]
+
+    keep: list[object] = []
+    functions = CFUNCTYPE(c_void_p, c_int64)(allocate), CFUNCTYPE(None, c_void_p)(freed.append)
+    arrays = [np.ones((2, 3)), np.ones(3), np.empty((2, 3)), np.empty(1)]
+    pointers = (c_void_p * 4)(*(x.ctypes.data for x in arrays))
+    lengths = (c_int64 * 6)(2, 3, 3, 2, 3, 1)
+
+    assert routine(pointers, lengths, *(cast(f, c_void_p) for f in functions)) == 1 - tables
+    assert freed == taken
+    assert len(taken) == tables
 
 
 def test_no_table_within_a_loop() -> None:

@@ -32,9 +32,28 @@ print(X.tobytes().hex(), len(traced), int("llvmlite" in sys.modules))
 """
 
 
-def _run(sources: Path, cache: Path) -> list[str]:
+_LINE = """
+import sys
+import numpy as np
+from armwright.arm.load import load_arm
+from armwright.compiled.arm import compile_arm
+from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.straight import straight_line
+from armwright.tracing.emit_loops import EmittedLoops
+written, module = [], EmittedLoops.module
+EmittedLoops.module = lambda *given: written.append(0) or module(*given)
+arm = load_arm("puma560")
+q = np.array([0.6, -0.3, 0.9, 0.3, 0.9, 0.1])
+X = forward(arm, q)
+X[:3, 3] += 0.1, -0.4, -0.28
+motion = straight_line(compile_arm(arm), q, X, deviation=1e-4)
+print(motion.trajectory.coefficients.tobytes().hex()[:1000], len(written), int("llvmlite" in sys.modules))
+"""
+
+
+def _run(sources: Path, cache: Path, program: str = _FORWARD) -> list[str]:
     environment = os.environ | {"PYTHONPATH": str(sources), "ARMWRIGHT_CACHE": str(cache)}
-    command = [sys.executable, "-B", "-c", _FORWARD]
+    command = [sys.executable, "-B", "-c", program]
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
 
 
@@ -51,6 +70,16 @@ def test_later_processes_need_no_compiler_until_a_source_changes(tmp_path: Path)
     assert second[1:] == ["0", "0"]
     assert third[1] == "1"
     assert first[0] == second[0] == third[0]
+
+
+@pytest.mark.skipif(not CAN_BE_LINKED, reason="LLVM loads objects of other forms")
+def test_later_processes_plan_a_line_without_a_compiler(tmp_path: Path) -> None:
+    """The routines of a planner are found again as well: the second process neither writes them nor loads LLVM."""
+    first, second = (_run(ROOT.parent, tmp_path, _LINE) for _ in range(2))
+
+    assert int(first[1]) > 0
+    assert first[2] == "1"
+    assert second == [first[0], "0", "0"]
 
 
 @pytest.mark.parametrize("name", ["tracing/graph.py", "kinematics/inverse_kinematics/branches.py", "arrays.py"])

@@ -12,11 +12,15 @@ from armwright.errors import IncapableArmError
 from armwright.motion.certificate import LIMITS, BindingLimit, Certificate, LimitName, slowing, stretched_peaks
 from armwright.motion.deviation import TrackingError
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
+from armwright.motion.knots import segments_at
+from armwright.motion.polynomials import evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.timing_law import timed
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.tracking import Tracking
-from armwright.motion.trajectory import Trajectory, hold, join, states, whole_ticks
+from armwright.motion.trajectory import Trajectory, hold, join, whole_ticks
+from armwright.tracing.loops import Loops, Table
+from armwright.tracing.scalar import Scalar, select
 
 # Efforts are sampled so often along a motion, and at the ends and in the middle of every segment, as the first ones of
 # a motion are short; those that come as near to a limit as this part of it are sampled closely.
@@ -105,12 +109,19 @@ def certificate_of(
         rotation=float(error.orientation.max()),
         rotation_sampled=float(error.sampled_orientation.max()),
         worst_time=time,
-        worst_position=np.asarray(solver.forward(trajectory(time))[:3, 3]),
+        worst_position=np.asarray(solver.forward(_position(trajectory, time))[:3, 3]),
         knots=len(error.position) + 1,
         samples=error.samples * len(error.position),
         peaks=limit_peaks(arm, trajectory) if peaks is None else peaks,
         backward=error.backward,
     )
+
+
+def _position(trajectory: Trajectory, t: float) -> Array:
+    """Return where the joints (n,) are at a time from the start to the end of a trajectory."""
+    k = segments_at(trajectory.times, t, len(trajectory.coefficients))
+    local = np.array([[t - trajectory.times[k]]])
+    return np.asarray(evaluate(trajectory.coefficients[k, None], local)[0])
 
 
 def fastest(
@@ -194,13 +205,52 @@ def _efforts(arm: AnyArm, trajectory: Trajectory) -> Array:
     limits = solver.arm.limits.effort
     if not np.isfinite(limits).any():
         return np.zeros(solver.arm.n)
-    ends = trajectory.times
-    t = np.concatenate([np.linspace(0.0, trajectory.duration, _SAMPLES), ends, (ends[1:] + ends[:-1]) / 2])
-    q, qd, qdd = states(trajectory, t, solver.rows)
-    # The sign of the speed of a joint that stands is rounding, and would give it Coulomb friction.
-    qd = np.where(np.abs(qd) > _STANDS * np.abs(qd).max(axis=0), qd, 0.0)
+    m, _, n = trajectory.coefficients.shape
+    shape = _SAMPLES + 2 * m + 1, n
+    q, qd, qdd = solver.run(_sampled_states, [trajectory.times, trajectory.coefficients], shape, shape, shape)
     efforts = np.abs(solver.inverse_dynamics(q, qd, qdd)).max(axis=0)
     return effort_peaks(arm, trajectory).peaks if (efforts > _NEAR * limits).any() else np.asarray(efforts)
+
+
+def _sampled_states(loops: Loops, *tables: Table) -> None:
+    """Write positions, speeds and accelerations at the samples of ``_efforts``; read times and polynomials."""
+    times, terms, q, qd, qdd = tables
+    m, powers, n = terms.shape
+    even = q.shape[0] - 2 * m - 1
+    duration = times[m]
+    (spread,) = loops.each([even], lambda i: [duration * (loops.number(i) / (even - 1))])
+    (middles,) = loops.each([m], lambda i: [(times[i + 1] + times[i]) / 2])
+
+    def written(first: Scalar, at: Table) -> None:
+        samples = at.shape[0]
+        pieces, local = loops.each([samples], lambda i: _place(loops, times, at[i], m), 2)
+
+        def state(i: Scalar, j: Scalar) -> tuple[Scalar, ...]:
+            piece, t = loops.whole(pieces[i]), local[i]
+            zero = 0.0 * t
+            value, rate, bend = loops.walk(
+                powers,
+                (zero, zero, zero),
+                lambda p, x, v, a: (x * t + terms[piece, p, j], v * t + x, a * t + v),
+                reverse=True,
+            )
+            return value, rate, 2 * bend
+
+        loops.fill([table.behind(first) for table in (q, qd, qdd)], [samples, n], state)
+
+    written(0, spread)
+    written(even, times)
+    written(even + m + 1, middles)
+    # The sign of the speed of a joint that stands is rounding, and would give it Coulomb friction.
+    (top,) = loops.each([n], lambda j: [loops.largest(even + 2 * m + 1, lambda i: abs(qd[i, j]))])
+    (moving,) = loops.each(qd.shape, lambda i, j: [select(abs(qd[i, j]) > _STANDS * top[j], qd[i, j], 0.0)])
+    loops.fill([qd], qd.shape, lambda i, j: [moving[i, j]])
+
+
+def _place(loops: Loops, times: Table, t: Scalar, count: Scalar) -> list[Scalar]:
+    """Return which segment a time is in, and how long that has lasted."""
+    segment = loops.segment(times, t, count)
+    return [loops.number(segment), t - times[segment]]
 
 
 def _inside_efforts(arm: AnyArm, trajectory: Trajectory, *, weak: bool) -> tuple[Trajectory, Array, int | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Iterator
 from typing import NamedTuple
 
@@ -15,6 +16,8 @@ from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
+from armwright.tracing.loops import Loops, Table
+from armwright.tracing.scalar import Scalar, select
 
 # A pose is met to this [m], and to this in the entries of its rotation.
 MET, _TURN_MET = 1e-8, 1e-6
@@ -27,6 +30,10 @@ _OTHER = 1e-6
 _STRIDE, _STRAIGHT, _CLOSE = 4, 0.25, 0.02
 # A step is halved at most so often; no tool has to keep nearer to its path than this [m], [rad].
 _HALVINGS, _CLOSEST = 16, (1e-6, 5e-6)
+
+
+# A revolution; and what is added to round to a whole number.
+_TURN, _ROUNDING = 2 * math.pi, 6755399441055744.0
 
 
 class Step(NamedTuple):
@@ -176,14 +183,40 @@ def _nearest_of(arm: Arm, candidates: Array, q: Array) -> Array:
 
 def _along_one_branch(solver: Solver, X: Array, branches: Array, singular: Array, q_start: Array) -> Array | None:
     """Return the branch (k, n) of the first configuration if it meets all poses (k, 4, 4) without a jump, else None."""
-    branch = int(np.abs(branches[0] - q_start).max(axis=-1).argmin())
-    steps = branches[1:, branch] - branches[:-1, branch]
-    steps -= np.where(solver.arm.revolute, 2 * np.pi * np.round(steps / (2 * np.pi)), 0.0)
-    jumps = np.abs(branches[0, branch] - q_start).max() > _OTHER or np.abs(steps).max() > _JUMP
-    if singular[:, branch].any() or jumps:
+    revolute = solver.arm.revolute.astype(np.float64)
+    q, facts = solver.run(_on_branch, [branches, q_start, revolute], (len(X), len(q_start)), (3,))
+    branch, apart, step = facts.tolist()
+    if singular[:, int(branch)].any() or not (apart <= _OTHER and step <= _JUMP):
         return None
-    q = np.concatenate([q_start[None], q_start + np.cumsum(steps, axis=0)])
-    return None if missed(solver, q, X).any() else q
+    difference = np.abs(solver.forward(q) - X)
+    met = difference[:, :3, 3].max() <= MET and difference[:, :3, :3].max() <= _TURN_MET
+    return q if met else None
+
+
+def _on_branch(loops: Loops, *tables: Table) -> None:
+    """Write configurations of the branch that the first one is of, without whole turns from one to the next.
+
+    Read are the branches of poses, the first configuration, and which joints rotate; written are also the number of
+    the branch, how far it is from the first configuration, and the longest step of a joint.
+    """
+    branches, start, revolute, q, facts = tables
+    last, n = branches.shape[0] - 1, branches.shape[2]
+    (away,) = loops.each([branches.shape[1]], lambda b: [loops.largest(n, lambda j: abs(branches[0, b, j] - start[j]))])
+    apart, branch = loops.first_least(branches.shape[1], lambda b: away[b])
+
+    def step(i: Scalar, j: Scalar) -> list[Scalar]:
+        x = branches[i + 1, branch, j] - branches[i, branch, j]
+        # Adding 1.5 · 2^52 rounds to a whole number.
+        turns = (x / _TURN + _ROUNDING) - _ROUNDING
+        return [x - _TURN * select(revolute[j] > 0, turns, 0.0)]
+
+    (steps,) = loops.each([last, n], step)
+    (longest,) = loops.each([last], lambda i: [loops.largest(n, lambda j: abs(steps[i, j]))])
+    on = loops.follow([last, n], lambda j: start[j], lambda i, j, before: before + steps[i, j])
+    loops.fill([q.part(0, 0)], [n], lambda j: [start[j]])
+    loops.fill([q.behind(1)], [last, n], lambda i, j: [on[i, j]])
+    facts[0], facts[1] = branch, apart
+    facts[2] = loops.largest(last, lambda i: longest[i])
 
 
 def _first_missed(solver: Solver, q: Array, X: Array) -> int | None:

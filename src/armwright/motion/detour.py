@@ -20,7 +20,7 @@ from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certified_motion import CertifiedMotion
-from armwright.motion.deviation import cubic_peaks, hand_bounds, tracking_error
+from armwright.motion.deviation import curve_bounds, tracking_error
 from armwright.motion.limit_utilization import slowing_for_limits
 from armwright.motion.obstruction import PathError
 from armwright.motion.solver import AnyArm, Solver, solver_of
@@ -303,8 +303,7 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
     if (lowest < solver.arm.limits.lower).any() or (highest > solver.arm.limits.upper).any():
         return None
     eased = attrs.evolve(line, corners=times[[0, -1]], progress=xspline(times, fractions), near=np.inf)
-    c, h = trajectory.coefficients, np.diff(times)
-    hand = hand_bounds(solver.arm, c, h, *cubic_peaks(c, h))
+    hand = curve_bounds(solver, trajectory).hand
     error = tracking_error(solver, eased, trajectory, hand, tolerance(_LOOKED_AT))
     try:
         factor, _ = slowing_for_limits(arm, trajectory)

@@ -8,20 +8,19 @@ speeds and accelerations of the joints, which are known exactly on every interva
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, read_only
 from armwright.motion.polynomials import evaluate
-from armwright.motion.rows import Evaluator, on_arrays
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
-from armwright.spatial.rotations import skew_matrix
+from armwright.tracing.loops import Loops, Runner, Table
 from armwright.tracing.scalar import Scalar, larger, select, smaller, sqrt
 
 # What a bound may add to what is seen, in parts of what is allowed; samples are taken so densely that it does not
@@ -74,7 +73,7 @@ class HandSamples(NamedTuple):
         step: (m,) between two of them [s].
         hand: how the tool moves on the intervals.
         bounds: of the error between samples.
-        rows: evaluates equations of many samples.
+        solver: evaluates equations of many samples, and runs routines.
     """
 
     times: Array
@@ -82,7 +81,7 @@ class HandSamples(NamedTuple):
     step: Array
     hand: HandBounds
     bounds: ErrorBounds
-    rows: Evaluator
+    solver: Solver
 
 
 class TrackingError(NamedTuple):
@@ -118,7 +117,7 @@ class HandMotion(Protocol):
     def __call__(self, t: Array) -> Array:
         """Return the poses (k, 4, 4) at times (k,), from 0 to the end."""
 
-    def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
+    def bounds(self, times: Array, hand: HandBounds, run: Runner) -> ErrorBounds:
         """Return bounds of the error on the intervals between times (m + 1,), where the tool moves as described."""
 
     def error(self, samples: HandSamples) -> TrackingError:
@@ -141,19 +140,33 @@ def tracking_error(
         allowed: the errors that matter; they decide how often the tool is sampled.
     """
     h = trajectory.lengths
-    bounds = motion.bounds(trajectory.times, hand)
+    bounds = motion.bounds(trajectory.times, hand, solver.run)
     needed = np.maximum(bounds.position / allowed.position, 2 * bounds.orientation / allowed.orientation)
     count = int(min(max(math.ceil(float((np.sqrt(needed / (8 * _ADDED)) * h).max())), _SAMPLES[0]), _SAMPLES[1]))
-    local = _even_parts(count) * h[:, None]
-    q = evaluate(trajectory.coefficients[:, :, None], local[..., None])
-    times = np.minimum(trajectory.times[:-1, None] + local, trajectory.duration)
-    return motion.error(HandSamples(times, np.asarray(solver.forward(q)), h / count, hand, bounds, solver.rows))
+    m, _, n = trajectory.coefficients.shape
+    inputs = [trajectory.times, trajectory.coefficients]
+    times, q = solver.run(_even_samples, inputs, (m, count + 1), (m, count + 1, n))
+    return motion.error(HandSamples(times, np.asarray(solver.forward(q)), h / count, hand, bounds, solver))
 
 
-@cache
-def _even_parts(count: int) -> Array:
-    """Return the ends of so many equal parts of an interval, from 0 to 1."""
-    return np.linspace(0.0, 1.0, count + 1)
+def _even_samples(loops: Loops, *tables: Table) -> None:
+    """Write times, and where the joints are then, at even parts of every interval of cubics; read those and times."""
+    starts, terms, times, q = tables
+    (m, samples), joints = times.shape, q.shape[2]
+    end = starts[m]
+
+    def local(i: Scalar, k: Scalar) -> Scalar:
+        return (starts[i + 1] - starts[i]) * (loops.number(k) / (samples - 1))
+
+    (parts,) = loops.each([m, samples], lambda i, k: [local(i, k)])
+    loops.fill([times], [m, samples], lambda i, k: [smaller(starts[i] + parts[i, k], end)])
+
+    def position(i: Scalar, k: Scalar, j: Scalar) -> list[Scalar]:
+        c0, c1, c2, c3 = (terms[i, power, j] for power in range(4))
+        t = parts[i, k]
+        return [((c3 * t + c2) * t + c1) * t + c0]
+
+    loops.fill([q], [m, samples, joints], position)
 
 
 def error_of(
@@ -183,14 +196,6 @@ def error_of(
     )
 
 
-def rotated(rotation: Array, fraction: Array) -> Array:
-    """Return the rotations (m, k, 3, 3) by fractions (m, k) of rotation vectors (m, 3)."""
-    angle = np.sqrt(np.einsum("mi,mi->m", rotation, rotation))
-    K = skew_matrix(rotation / np.where(angle > 0, angle, 1.0)[:, None])[:, None]
-    phase = (angle[:, None] * fraction)[..., None, None]
-    return np.asarray(np.eye(3) + np.sin(phase) * K + (2 * np.sin(phase / 2) ** 2) * (K @ K))
-
-
 def half_sines(R_A: Array, R_B: Array) -> Array:
     """Return sin(angle / 2) (...) of the rotations from rotations (..., 3, 3) to others, small ones to all digits."""
     Q = np.swapaxes(R_A, -1, -2) @ R_B
@@ -199,79 +204,125 @@ def half_sines(R_A: Array, R_B: Array) -> Array:
     return np.asarray(np.sqrt(a * a + b * b + c * c) / (4 * w))
 
 
-def spin_bound(hand: HandBounds, change: Array, rate: Array) -> Array:
-    """Return an upper bound (m,) of the acceleration of half the rotation between the tool and a rotating orientation.
+def spin_bound(spin: Scalar, spin_change: Scalar, change: Scalar, rate: Scalar) -> Scalar:
+    """Return an upper bound of the acceleration of half the rotation between the tool and a rotating orientation.
 
     This rotation is a unit quaternion; the second derivative of its vector part is at most half the angular
     acceleration and a quarter of the squared angular speed.
 
     Args:
-        hand: how the tool moves.
-        change: (m,) angular acceleration of that orientation, at most [rad/s²].
-        rate: (m,) its angular speed, at most [rad/s].
+        spin: the largest angular speed of the tool [rad/s].
+        spin_change: its largest angular acceleration [rad/s²].
+        change: angular acceleration of that orientation, at most [rad/s²].
+        rate: its angular speed, at most [rad/s].
     """
-    return np.asarray((hand.spin_change + change + hand.spin * rate) / 2 + (hand.spin + rate) ** 2 / 4)
+    return (spin_change + change + spin * rate) / 2 + (spin + rate) * (spin + rate) / 4
 
 
-def hand_bounds(arm: Arm, joints: Array, lengths: Array, qd: Array, qdd: Array) -> HandBounds:
-    """Return upper bounds of how the tool moves on intervals.
+class CurveBounds(NamedTuple):
+    """What is exactly known of cubics on m intervals, and of the tool that they move.
+
+    Attributes:
+        speed: (m, n) the largest speeds of the joints.
+        acceleration: (m, n) their largest accelerations.
+        turning: (2, m, n) positions where they reverse; at an end of an interval where they do not.
+        hand: upper bounds of how the tool moves.
+    """
+
+    speed: Array
+    acceleration: Array
+    turning: Array
+    hand: HandBounds
+
+
+def curve_bounds(solver: Solver, trajectory: Trajectory) -> CurveBounds:
+    """Return bounds of how joints and tool move on cubics.
 
     The tool accelerates by sum J_i qdd_i + sum H_ij qd_i qd_j, where |J_i| is at most the lever r_i of joint i and
     |H_ij| at most that of the later of two joints that rotate.
 
     Args:
-        arm: the arm, with n joints.
-        joints: (m, 4, n) coefficients of the joint positions.
-        lengths: (m,) of the intervals [s].
-        qd: (m, n) the largest speeds of the joints on them.
-        qdd: (m, n) the largest accelerations.
+        solver: the arm, with n joints.
+        trajectory: of the joints, cubics on m segments.
     """
-    turns = arm.revolute
-    lever = np.where(turns, _levers(arm, joints, lengths), 1.0)
-    n = arm.n
-    later = np.maximum(np.arange(n)[:, None], np.arange(n))
-    both, carried, earlier = _together(tuple(turns.tolist()))
-    pull = qdd @ lever + ((qd @ (both * lever[later] + carried)) * qd).sum(axis=1)
-    spin_change = qdd @ turns + ((qd @ earlier) * qd).sum(axis=1)
-    return HandBounds(np.asarray(pull), np.asarray(qd @ turns), np.asarray(spin_change))
+    arm, terms = solver.arm, trajectory.coefficients
+    m, _, n = terms.shape
+    lever = np.where(arm.revolute, _levers(arm, terms, trajectory.lengths), 1.0)
+    pairs = _pairs(tuple(arm.revolute.tolist()))
+    inputs = [trajectory.times, terms, arm.revolute, lever, pairs]
+    speed, acceleration, turning, pull, spin, change = solver.run(
+        _curve_bounds, inputs, (m, n), (m, n), (2, m, n), (m,), (m,), (m,)
+    )
+    return CurveBounds(speed, acceleration, turning, HandBounds(pull, spin, change))
+
+
+def _curve_bounds(loops: Loops, *tables: Table) -> None:
+    """Write ``CurveBounds``, given times, cubics, which joints rotate, their levers, and ``_pairs`` of them."""
+    times, terms, rotates, lever, pairs, speed, acceleration, turning, pull, spin, spin_change = tables
+    m, _, n = terms.shape
+
+    def of_joint(i: Scalar, j: Scalar) -> list[Scalar]:
+        cubic, length = [terms[i, power, j] for power in range(4)], times[i + 1] - times[i]
+        return [*_cubic_peaks(cubic, length), *_turning_positions(cubic, length)]
+
+    loops.fill([speed, acceleration, turning.part(0, 0), turning.part(0, 1)], [m, n], of_joint)
+    # What the speed of each joint adds with those of the others.
+    (together,) = loops.each(
+        [n, n], lambda j, k: [pairs[0, j, k] * lever[k] + pairs[1, j, k] * lever[j] + pairs[2, j, k]]
+    )
+
+    def of_pairs(i: Scalar, k: Scalar) -> list[Scalar]:
+        pulls = loops.total(n, lambda j: speed[i, j] * together[j, k])
+        return [pulls, loops.total(n, lambda j: speed[i, j] * pairs[3, j, k])]
+
+    pulls, spins = loops.each([m, n], of_pairs, 2)
+
+    def of_hand(i: Scalar) -> list[Scalar]:
+        return [
+            loops.total(n, lambda j: acceleration[i, j] * lever[j])
+            + loops.total(n, lambda j: pulls[i, j] * speed[i, j]),
+            loops.total(n, lambda j: speed[i, j] * rotates[j]),
+            loops.total(n, lambda j: acceleration[i, j] * rotates[j])
+            + loops.total(n, lambda j: spins[i, j] * speed[i, j]),
+        ]
+
+    loops.fill([pull, spin, spin_change], [m], of_hand)
 
 
 @cache
-def _together(turns: tuple[bool, ...]) -> tuple[Array, Array, Array]:
-    """Return (n, n) which pairs of joints rotate, where one carries a slide, and those that rotate once each."""
+def _pairs(turns: tuple[bool, ...]) -> Array:
+    """Return (4, n, n) of which pairs of joints both rotate.
+
+    Those of which the second one is the later, those of which the first one is, where one carries a slide, and those
+    that rotate once each.
+    """
     rotates, n = np.array(turns), len(turns)
     rows, columns = np.arange(n)[:, None], np.arange(n)
     both = rotates[:, None] & rotates
     # A slide is rotated by the joints before it; those beyond it do not change its direction.
     carried = rotates[np.minimum(rows, columns)] & ~rotates[np.maximum(rows, columns)] & (rows != columns)
-    return both.astype(np.float64), carried.astype(np.float64), np.triu(both, 1).astype(np.float64)
+    return np.stack([np.triu(both), np.tril(both, -1), carried, np.triu(both, 1)]).astype(np.float64)
 
 
-def cubic_peaks(c: Array, lengths: Array, rows: Evaluator = on_arrays) -> tuple[Array, Array]:
-    """Return the largest speeds and accelerations (m, n) of cubics (m, 4, n), exactly."""
-    peaks = rows(_cubic_peaks, [c], [lengths[:, None]])[0]
-    return peaks[:, 0], peaks[:, 1]
-
-
-def _cubic_peaks(c: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
-    """Return the largest speed and the largest acceleration of a cubic."""
-    h = length[0]
+def _cubic_peaks(c: list[Scalar], h: Scalar) -> list[Scalar]:
+    """Return the largest speed and the largest acceleration of a cubic, exactly."""
     start, bend, end = c[1], 2 * c[2], c[1] + (2 * c[2] + 3 * c[3] * h) * h
     bend_end = bend + 6 * c[3] * h
     speed = larger(abs(start), abs(end))
     # The speed has its own peak where the acceleration changes its sign.
     inside = bend * bend_end < 0
     vertex = start - bend * bend / select(inside, 12 * c[3], 1.0)
-    return [[select(inside, larger(speed, abs(vertex)), speed), larger(abs(bend), abs(bend_end))]]
+    return [select(inside, larger(speed, abs(vertex)), speed), larger(abs(bend), abs(bend_end))]
 
 
-def turning_positions(c: Array, lengths: Array, rows: Evaluator = on_arrays) -> tuple[Array, Array]:
+def turning_positions(c: Array, lengths: Array) -> tuple[Array, Array]:
     """Return two positions (m, n) where cubics (m, 4, n) reverse, exactly; at an end where they do not."""
-    positions = rows(_turning_positions, [c], [lengths[:, None]])[0]
-    return positions[:, 0], positions[:, 1]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        first, second = _turning_positions([c[:, power] for power in range(4)], lengths[:, None])
+    return first, second
 
 
-def _turning_positions(c: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
+def _turning_positions(c: list[Scalar], length: Scalar) -> list[Scalar]:
     """Return the two positions where a cubic reverses."""
     a, b, start = 3 * c[3], c[2], c[1]
     root = sqrt(b * b - a * start)
@@ -281,17 +332,25 @@ def _turning_positions(c: list[Scalar], length: list[Scalar]) -> list[list[Scala
     for over, under in ((large, a), (start, large)):
         there = abs(under) > 0
         t = select(there, over / select(there, under, 1.0), 0.0)
-        t = select(t > 0, smaller(t, length[0]), 0.0)
+        t = select(t > 0, smaller(t, length), 0.0)
         positions.append(((c[3] * t + c[2]) * t + c[1]) * t + c[0])
-    return [positions]
+    return positions
 
 
 def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:
     """Return the largest distance (n,) of the tool from the frame before each joint, slides as far out as they go."""
-    farthest = np.zeros(arm.n) if arm.revolute.all() else evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
-    parts = [joint.span(0.0 if joint.revolute else farthest[i]) for i, joint in enumerate(arm.joints)]
+    if arm.revolute.all():
+        return _distances(arm, (0.0,) * arm.n)
+    farthest = evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
+    return _distances(arm, tuple(np.where(arm.revolute, 0.0, farthest).tolist()))
+
+
+@lru_cache(maxsize=16)
+def _distances(arm: Arm, slides: tuple[float, ...]) -> Array:
+    """Return how far (n,) the tool may be from the frame before each joint, slides so far out."""
+    parts = [joint.span(slide) for joint, slide in zip(arm.joints, slides, strict=True)]
     tool = float(np.linalg.norm(arm.tool[:3, 3]))
-    return np.asarray(np.cumsum([tool, *parts[::-1]])[:0:-1])
+    return read_only(np.cumsum([tool, *parts[::-1]])[:0:-1])
 
 
 class LegDistance(NamedTuple):
@@ -323,7 +382,7 @@ def farthest_from_legs(solver: Solver, trajectory: Trajectory, positions: Array,
         times: (k,) when the trajectory passes them [s].
     """
     h = trajectory.lengths
-    bounds = hand_bounds(solver.arm, trajectory.coefficients, h, *cubic_peaks(trajectory.coefficients, h))
+    hand = curve_bounds(solver, trajectory).hand
     middles_of_legs = (times[1:] + times[:-1]) / 2
     leg = np.searchsorted(middles_of_legs[1:-1], (trajectory.times[1:] + trajectory.times[:-1]) / 2)
     samples = _LEG_SAMPLES
@@ -331,7 +390,7 @@ def farthest_from_legs(solver: Solver, trajectory: Trajectory, positions: Array,
         part = (np.arange(samples + 1) / samples)[:, None]
         q = np.stack([evaluate(trajectory.coefficients, (p * h)[:, None]) for p in part])
         distance = _chord_distances(solver.forward(q)[..., :3, 3], positions, leg)
-        bound = float((distance + (h / samples) ** 2 / 8 * bounds.pull).max())
+        bound = float((distance + (h / samples) ** 2 / 8 * hand.pull).max())
         if samples == _MAX_LEG_SAMPLES or bound <= (1 + _LEG_ADDED) * float(distance.max()) + _SMALL:
             worst = int(distance.max(axis=0).argmax())
             return LegDistance(bound, float(distance.max()), float(trajectory.times[worst]))

@@ -1,6 +1,7 @@
 """The largest x = s'² along a path under bounds |a u + b x + c| <= 1 with u = s'' constant on every interval.
 
-Two passes: backward, from the end, the largest x from which the end can still be reached; forward, from the start, the
+Two passes: backward, from the end, the largest x from which the end can still be reached, by the one linear inequality
+that each bound makes of what comes after; forward, from the start, the
 largest u that stays below them. Standing still, x = u = 0, keeps all bounds, so there is always a path.
 """
 
@@ -9,7 +10,7 @@ from __future__ import annotations
 import logging
 import math
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,9 +33,9 @@ _ROUNDS = 100
 class Bounds(NamedTuple):
     """Bounds |a u + b x + c| <= 1 on each of N intervals, x at its start; (N, rows) each, with |c| < 1."""
 
-    a: Array
-    b: Array
-    c: Array
+    a: Any
+    b: Any
+    c: Any
 
 
 def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool], run: Runner = with_numpy) -> Array:
@@ -50,32 +51,55 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool], ru
         Pham & Pham, "A new approach to time-optimal path parameterization based on reachability analysis" (2018).
     """
     ends = np.where(rests, UNBOUNDED, 0.0)
-    return run(_largest_squares, [*bounds, lengths, ends], (len(lengths) + 1,))
+    return run(_largest_squares, [*bounds, lengths, ends], (len(lengths) + 1,))[0]
 
 
 def _largest_squares(loops: Loops, *tables: Table) -> None:
     """Write the largest x at the ends of the intervals, given bounds, lengths, and the largest at both ends of all."""
     a, b, c, lengths, ends, x = tables
+    write_largest_squares(loops, Bounds(a, b, c), lengths, (ends[0], ends[1]), x)
+
+
+class Nothing:
+    """A table of zeros."""
+
+    def __getitem__(self, key: Scalar) -> float:
+        """Return 0."""
+        return 0.0
+
+
+def write_largest_squares(loops: Loops, bounds: Bounds, lengths: Table, ends: tuple[Scalar, Scalar], x: Table) -> None:
+    """Write the largest x (N + 1,) as ``largest_squares`` returns them.
+
+    Args:
+        loops: the loops of a routine.
+        bounds: tables of the bounds.
+        lengths: table of the lengths of the intervals.
+        ends: the largest x that there may be at the start and at the end.
+        x: the table to write.
+    """
+    a, b, c = bounds
     intervals, rows = a.shape
     sides = _sides(loops, a, b, c)
-    top = sides.top
+    # Of each interval by itself, all at once.
+    (own,) = loops.each([intervals], lambda i: [_largest(loops, sides, i, lengths[i])])
+
+    # Some u must not lead beyond what comes after: (lower - lean x) 2 h + x <= after, for each lower bound.
+    def by_after(i: Scalar, r: Scalar) -> list[Scalar]:
+        twice = 2 * lengths[i]
+        falls = 1 - sides.lean[i, r] * twice
+        part = select(falls > 0, 1 / select(falls > 0, falls, 1.0), 0.0)
+        return [select(falls > 0, -sides.lower[i, r] * twice * part, math.inf), part]
+
+    fixed, part = loops.each([intervals, rows], by_after, 2)
     reachable = loops.table(intervals + 1)
     reachable[intervals] = ends[1]
-    (highs,) = loops.each([intervals], lambda i: [sides.least_upper(loops, i, top[i])])
-    (lows,) = loops.each(
-        [intervals], lambda i: [loops.largest(rows, lambda r: sides.lower[i, r] - sides.lean[i, r] * top[i])]
-    )
 
-    def backward(i: Scalar, after: Scalar) -> tuple[Scalar, ...]:
-        # Mostly the end is reached from the largest x of all.
-        twice = 2 * lengths[i]
-        by_end = 1 / twice * top[i]
-        high, low = smaller(highs[i], after / twice - by_end), larger(lows[i], -by_end)
-        there = high - low >= -_ROUNDING * (abs(high) + abs(low))
-        (reachable[i],) = found = loops.when(
-            there, lambda: (top[i],), lambda: (_largest(loops, sides, i, twice, after),)
-        )
-        return found
+    def backward(i: Scalar, after: Scalar) -> tuple[Scalar]:
+        starts, by = fixed.row(i), part.row(i)
+        reached = loops.least(rows, lambda r: starts[r] + by[r] * after)
+        reachable[i] = here = larger(smaller(own[i], reached), 0.0)
+        return (here,)
 
     loops.walk(intervals, (ends[1],), backward, reverse=True)
     x[0] = smaller(reachable[0], ends[0])
@@ -94,9 +118,9 @@ def _largest_squares(loops: Loops, *tables: Table) -> None:
 
 
 class _Sides(NamedTuple):
-    """Bounds lower - lean x <= u <= upper - lean x on N intervals, (N, rows + 1) each, and x <= top, (N,).
+    """Bounds lower - lean x <= u <= upper - lean x on N intervals, (N, rows) each, and x <= top, (N,).
 
-    A row that does not bound u is infinite. The last column is kept for what comes after an interval.
+    A row that does not bound u is infinite.
     """
 
     upper: Table
@@ -106,7 +130,7 @@ class _Sides(NamedTuple):
 
     def least_upper(self, loops: Loops, i: Scalar, x: Scalar) -> Scalar:
         """Return the least upper bound of u on an interval at x."""
-        return loops.least(self.upper.shape[1] - 1, lambda r: self.upper[i, r] - self.lean[i, r] * x)
+        return loops.least(self.upper.shape[1], lambda r: self.upper[i, r] - self.lean[i, r] * x)
 
 
 def _sides(loops: Loops, a: Table, b: Table, c: Table) -> _Sides:
@@ -122,31 +146,36 @@ def _sides(loops: Loops, a: Table, b: Table, c: Table) -> _Sides:
         lean = select(on_u, b[i, r] / by, 0.0)
         return [upper, lower, lean, select(on_u, UNBOUNDED, select(on_x, top, UNBOUNDED))]
 
-    upper, lower, lean, tops = (loops.table(intervals, rows + 1) for _ in range(4))
-    loops.fill([upper, lower, lean, tops], [intervals, rows], of_row)
+    upper, lower, lean, tops = loops.each([intervals, rows], of_row, 4)
     (top,) = loops.each([intervals], lambda i: [smaller(loops.least(rows, lambda r: tops[i, r]), UNBOUNDED)])
     return _Sides(upper, lower, lean, top)
 
 
-def _largest(loops: Loops, sides: _Sides, i: Scalar, twice: Scalar, reachable: Scalar) -> Scalar:
-    """Return the largest x of an interval from which some u leads to an x between 0 and ``reachable`` at its end.
+def _largest(loops: Loops, sides: _Sides, i: Scalar, length: Scalar) -> Scalar:
+    """Return the largest x of an interval at which there is room for u, and some u leads to an x of 0 or more.
 
-    The room for u, between its least upper and its greatest lower bound, is a concave function of x that is 0 or more
-    at x = 0: Newton's steps from the right never pass its root.
+    The room, between the least upper and the greatest lower bound, is a concave function of x that is 0 or more at
+    x = 0: Newton's steps from the right never pass its root.
     """
-    upper, lower, lean = (table.row(i) for table in (sides.upper, sides.lower, sides.lean))
-    last = sides.upper.shape[1] - 1
-    upper[last], lower[last], lean[last] = reachable / twice, 0.0, 1 / twice
+    upper, lower, lean = sides.upper, sides.lower, sides.lean
+    rows = upper.shape[1]
 
-    def step(x: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
-        high, j = loops.first_least(last + 1, lambda r: upper[r] - lean[r] * x)
-        low, k = loops.first_largest(last + 1, lambda r: lower[r] - lean[r] * x)
-        slope = lean[j] - lean[k]
+    def step(x: Scalar) -> tuple[Scalar, tuple[Scalar]]:
+        high, j = loops.first_least(rows, lambda r: upper[i, r] - lean[i, r] * x)
+        low, k = loops.first_largest(rows, lambda r: lower[i, r] - lean[i, r] * x)
+        slope = lean[i, j] - lean[i, k]
         done = select(high - low >= -_ROUNDING * (abs(high) + abs(low)), True, slope <= 0)
-        return done, loops.when(done, lambda: (x,), lambda: (smaller(x, larger((upper[j] - lower[k]) / slope, 0.0)),))
+        ahead = (upper[i, j] - lower[i, k]) / select(slope > 0, slope, 1.0)
+        return done, (select(done, x, smaller(x, larger(ahead, 0.0))),)
 
     (x,) = loops.until(_ROUNDS, (sides.top[i],), step)
-    return x
+    rises = 1 / (2 * length)
+
+    def from_above(r: Scalar) -> Scalar:
+        more = lean[i, r] - rises
+        return select(more > 0, upper[i, r] / select(more > 0, more, 1.0), math.inf)
+
+    return smaller(x, loops.least(rows, from_above))
 
 
 def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array:

@@ -150,6 +150,8 @@ def unmet(arm: Arm, X: Array, before: Array, time: float, time_before: float) ->
 
 def beyond_limits(arm: Arm, q: Array, times: Array) -> Obstruction | None:
     """Return the first joint limit that configurations (k, n) at times (k,) pass; None where they keep them."""
+    if (q >= arm.limits.lower).all() and (q <= arm.limits.upper).all():
+        return None
     outside = ((q < arm.limits.lower) | (q > arm.limits.upper)).any(axis=1)
     for k in np.flatnonzero(outside):
         for violation in violations(arm, q[k]):

@@ -71,11 +71,11 @@ class Knots(NamedTuple):
 
 def closest_to_axis(A: ArrayLike, B: ArrayLike) -> float:
     """Return the shortest distance from the base axis to the segment between two positions (3,) [m]."""
-    a, b = np.asarray(A, dtype=np.float64)[:2], np.asarray(B, dtype=np.float64)[:2]
-    way = b - a
-    square = float(way @ way)
-    s = min(max(float(-(a @ way) / square), 0.0), 1.0) if square else 0.0
-    return float(np.linalg.norm(a + s * way))
+    (x, y, *_), (x_B, y_B, *_) = np.asarray(A, dtype=np.float64).tolist(), np.asarray(B, dtype=np.float64).tolist()
+    dx, dy = x_B - x, y_B - y
+    square = dx * dx + dy * dy
+    s = min(max(-(x * dx + y * dy) / square, 0.0), 1.0) if square else 0.0
+    return math.hypot(x + s * dx, y + s * dy)
 
 
 def report_step(arm: Arm, A: ArrayLike, B: ArrayLike, deviation: float) -> float:

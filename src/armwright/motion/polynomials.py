@@ -6,7 +6,9 @@ Coefficients are (m, k, n): of m segments and n joints, of the powers 0 to k-1 o
 from __future__ import annotations
 
 import math
-from functools import cache, reduce
+from collections.abc import Callable
+from functools import cache, partial, reduce
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -54,10 +56,10 @@ def slope(terms: list[Scalar]) -> list[Scalar]:
 
 def shifted(terms: Array, shift: Array, rows: Evaluator = on_arrays) -> Array:
     """Return the coefficients of the same polynomials around positions ``shift`` (m,)."""
-    return rows(_shifted, [terms], [shift[:, None]])[0]
+    return rows(shifted_terms, [terms], [shift[:, None]])[0]
 
 
-def _shifted(terms: list[Scalar], shift: list[Scalar]) -> list[list[Scalar]]:
+def shifted_terms(terms: list[Scalar], shift: list[Scalar]) -> list[list[Scalar]]:
     """Return the coefficients of a polynomial around another position."""
     moved = []
     for power in range(len(terms)):
@@ -119,20 +121,155 @@ def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
     return np.asarray(most)
 
 
-def rate_peaks(terms: Array, lengths: Array, rows: Evaluator, run: Runner) -> tuple[Array, Array]:
-    """Return the largest speeds and accelerations (n,) of all segments: see ``peaks``."""
-    reach = rows(_reach_of_rates, [terms], [lengths[:, None]])[0]
-    # Both together, accelerations as polynomials with one power more.
-    at_ends, bound = np.concatenate([reach[:, :2], reach[:, 2:]], axis=2).swapaxes(0, 1)
-    joints, most = terms.shape[2], at_ends.max(axis=0)
-    segment, index = np.nonzero(bound > most)
-    if len(segment):
-        speeds = derivative(terms[segment, :, index % joints][..., None], 1)
+def composed_peaks(cubics: Array, law: Array, places: Indices, times: Array, run: Runner) -> tuple[Array, Array, Array]:
+    """Return the coefficients (p, 10, n) of a run along cubics, and its largest speeds and accelerations (n,).
+
+    Args:
+        cubics: (m, 4, n) coefficients of the joint positions by a parameter.
+        law: (p, 4) coefficients of the parameter on each piece of the run, by the time since that begins.
+        places: (p,) on which cubic each piece is.
+        times: (p + 1,) when the pieces begin, and the last one ends [s].
+        run: runs routines.
+    """
+    p, n = len(law), cubics.shape[2]
+    terms, most, places_left, facts = run(
+        _composed_peaks, [cubics, law, places.astype(np.float64), times], (p, 10, n), (2, n), (3, 2 * p * n), (1,)
+    )
+    left = int(facts[0])
+    if left:
+        order, piece, joint = places_left[:, :left].astype(np.intp)
+        speeds = derivative(terms[piece, :, joint][..., None], 1)
         accelerations = np.zeros_like(speeds)
         accelerations[:, :-1] = derivative(speeds, 1)
-        sought = np.where((index < joints)[:, None, None], speeds, accelerations)
-        _rise_to_extremes(most, index, sought, lengths[segment], rows=rows, run=run)
-    return most[:joints], most[joints:]
+        sought, flat = np.where((order == 0)[:, None, None], speeds, accelerations), most.reshape(-1)
+        lengths = times[1:] - times[:-1]
+        _rise_to_extremes(flat, order * n + joint, sought, lengths[piece], rows=on_arrays, run=run)
+    return terms, most[0], most[1]
+
+
+def _composed_peaks(loops: Loops, *tables: Table) -> None:
+    """Write coefficients and peaks of a run: see ``composed_peaks``.
+
+    A polynomial whose slope has no two Bernstein coefficients of opposite signs is largest at an end; where these
+    change their sign once, there is one peak between. The others are left: their orders, 0 for speeds and 1 for
+    accelerations, their pieces and joints are written, and how many there are.
+    """
+    cubics, law, places, times, terms, most, left, facts = tables
+    p, powers, n = law.shape[0], 10, cubics.shape[2]
+
+    def of_run(i: Scalar, j: Scalar) -> list[Scalar]:
+        at = loops.whole(places[i])
+        return composed([cubics[at, power, j] for power in range(4)], [law[i, power] for power in range(4)])[0]
+
+    loops.fill([terms.part(1, power) for power in range(powers)], [p, n], of_run)
+
+    def rate(order: int, i: Scalar, j: Scalar) -> list[Scalar]:
+        found = [terms[i, power, j] for power in range(powers)]
+        for _ in range(order + 1):
+            found = slope(found)
+        return found
+
+    (lengths,) = loops.each([p], lambda i: [times[i + 1] - times[i]])
+    kept = []
+    for order in (0, 1):
+        peak = most.part(0, order)
+        ends, bound = loops.each([p, n], lambda i, j, order=order: _reach_of_terms(rate(order, i, j), lengths[i]), 2)
+        loops.fill([peak], [n], lambda j, ends=ends: [loops.largest(p, lambda i: ends[i, j])])
+        kept.append(_candidates(loops, lengths, peak, bound, partial(rate, order)))
+    before: Scalar = 0
+    for order, ((pieces, joints), count) in enumerate(kept):
+        peak = most.part(0, order)
+
+        def of_candidate(k: Scalar, order: int = order, pieces: Table = pieces, joints: Table = joints) -> list[Scalar]:
+            i, j = loops.whole(pieces[k]), loops.whole(joints[k])
+            return list(_between(loops, rate(order, i, j), lengths[i]))
+
+        sizes, turns = loops.each([count], of_candidate, 2)
+
+        def risen(
+            j: Scalar, sizes: Table = sizes, joints: Table = joints, count: Scalar = count, peak: Table = peak
+        ) -> list[Scalar]:
+            number = loops.number(j)
+            most_of = loops.largest(count, lambda k: select(abs(joints[k] - number) < 0.5, sizes[k], 0.0))
+            return [larger(peak[j], most_of)]
+
+        (peaks,) = loops.each([n], risen)
+        loops.fill([peak], [n], lambda j, peaks=peaks: [peaks[j]])
+        (several,), further = loops.kept([count], lambda k, turns=turns: turns[k] > 1.5)
+        rest = left.behind(before, 1)
+
+        def of_rest(
+            k: Scalar, order: int = order, pieces: Table = pieces, joints: Table = joints, several: Table = several
+        ) -> list[Scalar]:
+            at = loops.whole(several[k])
+            return [0.0 * several[k] + order, pieces[at], joints[at]]
+
+        loops.fill([rest.part(0, row) for row in range(3)], [further], of_rest)
+        before = before + further
+    facts[0] = before
+
+
+def _candidates(
+    loops: Loops, lengths: Table, peak: Table, bound: Table, rate: Callable[..., list[Scalar]]
+) -> tuple[list[Table], Scalar]:
+    """Return the pieces and joints where bounds, and those of Bernstein as well, are beyond the peaks of the joints."""
+    (pieces, joints), count = loops.kept(bound.shape, lambda i, j: bound[i, j] > peak[j])
+
+    def closer(k: Scalar) -> list[Scalar]:
+        i, j = loops.whole(pieces[k]), loops.whole(joints[k])
+        return [_reach(rate(i, j), [lengths[i]])[0][1] - peak[j]]
+
+    (beyond,) = loops.each([count], closer)
+    (places,), few = loops.kept([count], lambda k: beyond[k] > 0)
+    tables = loops.each([few], lambda k: [table[loops.whole(places[k])] for table in (pieces, joints)], 2)
+    return tables, few
+
+
+def _reach_of_terms(terms: list[Scalar], length: Scalar) -> list[Scalar]:
+    """Return the largest magnitude at an end of a polynomial, and a bound of that between: of the size of its terms."""
+    last, bound, power = terms[-1], abs(terms[0]), 1.0
+    for term in terms[1:]:
+        power = power * length
+        bound = bound + abs(term) * power
+    for term in terms[-2::-1]:
+        last = last * length + term
+    return [larger(abs(terms[0]), abs(last)), bound]
+
+
+def _between(loops: Loops, terms: list[Scalar], length: Scalar) -> tuple[Scalar, Scalar]:
+    """Return a magnitude of a polynomial where its slope changes its sign, and how often that may be.
+
+    Where it may not be, the magnitude is that at another point; where it may be several times, at any of them.
+    """
+    # By the part of the length that has passed, so that coefficients compare.
+    power, scaled = 1.0 + 0.0 * length, []
+    for term in slope(terms):
+        scaled.append(term * power)
+        power = power * length
+    control = [
+        sum((x * weight for x, weight in zip(scaled[1:], weights[1:], strict=True) if weight), scaled[0])
+        for weights in _bernstein(len(scaled) - 1).T.tolist()
+    ]
+    turns: Scalar = 0.0
+    start: Scalar = 0.5
+    for k, (low, high) in enumerate(pairwise(control)):
+        change = select(low < 0, high >= 0, high < 0)
+        turns = turns + select(change, 1.0, 0.0)
+        start = select(change, (k + low / select(change, low - high, 1.0)) / (len(control) - 1), start)
+    sign = select(control[0] < 0, 1.0, -1.0)
+
+    def value_and_rate(x: Scalar) -> tuple[Scalar, Scalar]:
+        value, rate = scaled[-1], 0.0 * x
+        for term in scaled[-2::-1]:
+            rate = rate * x + value
+            value = value * x + term
+        return value, rate
+
+    t = _crossed(loops, value_and_rate, sign, start) * length
+    value = terms[-1]
+    for term in terms[-2::-1]:
+        value = value * t + term
+    return abs(value), turns
 
 
 def _rise_to_extremes(
@@ -157,13 +294,6 @@ def _reach(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
         for weights in _bernstein(len(terms) - 1).T[1:-1].tolist()
     ]
     return [[ends, reduce(larger, control, ends)]]
-
-
-def _reach_of_rates(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
-    """Return what ``_reach`` does of the first and of the second derivative of a polynomial."""
-    first = slope(terms)
-    second = slope(first)
-    return [[*_reach(first, length)[0], *_reach(second, length)[0]]]
 
 
 def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays, run: Runner = with_numpy) -> Array:
@@ -192,7 +322,7 @@ def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays, run
         signs = np.where(below[once, 0], 1.0, -1.0)
         parts[turns[once], 0] = run(
             _crossing, [scaled[once], signs, _of_polygon(control[turns[once]], changes[once])], signs.shape
-        )
+        )[0]
         turns, scaled = turns[~once], scaled[~once]
     if len(turns):
         parts[turns] = _roots(scaled, rows)
@@ -214,24 +344,35 @@ def _crossing(loops: Loops, terms: Table, signs: Table, starts: Table, roots: Ta
     rows, count = terms.shape
 
     def of_row(i: Scalar) -> tuple[Scalar]:
-        def step(low: Scalar, high: Scalar, x: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+        def value_and_rate(x: Scalar) -> tuple[Scalar, ...]:
             zero = 0.0 * x
-            value, rate = loops.walk(
+            return loops.walk(
                 count, (zero, zero), lambda p, value, rate: (value * x + terms[i, p], rate * x + value), reverse=True
             )
-            before = value * signs[i] < 0
-            low, high = select(before, x, low), select(before, high, x)
-            # Newton's step where it stays between the bounds, else a halving.
-            rises = abs(rate) > 0
-            ahead = x - value / select(rises, rate, 1.0)
-            stays = select(rises, select(low <= ahead, ahead <= high, False), False)
-            following = select(stays, ahead, (low + high) / 2)
-            return abs(following - x) <= _NEAR, (low, high, following)
 
-        low = 0.0 * signs[i]
-        return (loops.until(_HALVINGS, (low, low + 1.0, starts[i]), step)[2],)
+        return (_crossed(loops, value_and_rate, signs[i], starts[i]),)
 
     loops.fill([roots], [rows], of_row)
+
+
+def _crossed(
+    loops: Loops, value_and_rate: Callable[[Scalar], tuple[Scalar, ...]], sign: Scalar, start: Scalar
+) -> Scalar:
+    """Return the root in [0, 1] of a function that has one there, with the sign of its slope, from a start."""
+
+    def step(low: Scalar, high: Scalar, x: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+        value, rate = value_and_rate(x)
+        before = value * sign < 0
+        low, high = select(before, x, low), select(before, high, x)
+        # Newton's step where it stays between the bounds, else a halving.
+        rises = abs(rate) > 0
+        ahead = x - value / select(rises, rate, 1.0)
+        stays = select(rises, select(low <= ahead, ahead <= high, False), False)
+        following = select(stays, ahead, (low + high) / 2)
+        return abs(following - x) <= _NEAR, (low, high, following)
+
+    low = 0.0 * sign
+    return loops.until(_HALVINGS, (low, low + 1.0, start + 0.0 * sign), step)[2]
 
 
 def _powers(lengths: Array, count: int) -> Array:

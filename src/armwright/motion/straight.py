@@ -159,9 +159,7 @@ def even_time(arm: Arm, A: Array, B: Array, rotation: Array, speed: float) -> fl
         IncapableArmError: the arm has no reach or tool speed.
     """
     check_speed(speed)
-    length = max(
-        float(np.linalg.norm(B[:3, 3] - A[:3, 3], axis=-1)), TURN_RADIUS * float(np.linalg.norm(rotation, axis=-1))
-    )
+    length = max(math.dist(A[:3, 3], B[:3, 3]), TURN_RADIUS * math.hypot(*rotation))
     if length <= NEGLIGIBLE:
         return None
     check_reach(arm)
@@ -171,7 +169,7 @@ def even_time(arm: Arm, A: Array, B: Array, rotation: Array, speed: float) -> fl
 def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
     """Return times to begin with, as many as the report's rule asks for."""
     A, B = motion.poses[:, :3, 3]
-    count = math.ceil(float(np.linalg.norm(B - A)) / report_step(arm, A, B, allowed.position)) + 2
+    count = math.ceil(math.dist(A, B) / report_step(arm, A, B, allowed.position)) + 2
     return np.linspace(0.0, motion.duration, min(max(_MIN_KNOTS, count), _MAX_KNOTS))
 
 

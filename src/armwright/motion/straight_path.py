@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import TypeAlias
 
@@ -12,22 +13,21 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.motion.deviation import (
+    ROUNDINGS,
     ErrorBounds,
     HandBounds,
     HandSamples,
     TrackingError,
-    error_of,
-    rotated,
     spin_bound,
 )
 from armwright.motion.knots import segments_at
 from armwright.motion.path import NEGLIGIBLE, Path, place_knots
-from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.poses import position_text
 from armwright.spatial.rotations import rotation_vector
-from armwright.tracing.scalar import Scalar, larger, sin, smaller, sqrt
+from armwright.tracing.loops import Loops, Runner, Table
+from armwright.tracing.scalar import Scalar, larger, select, sin, smaller, sqrt
 from armwright.tracing.vectors import dot
 
 SegmentNumbers: TypeAlias = npt.NDArray[np.intp]
@@ -76,14 +76,31 @@ class StraightPath:
         way, fraction = self._along(t)
         return self.at(way, fraction)
 
-    def at(self, way: npt.ArrayLike, fraction: Array) -> Array:
+    def at(self, way: SegmentNumbers | int, fraction: Array) -> Array:
         """Return the poses (k, 4, 4) at fractions (k,) of segments (k,), or of one segment."""
-        way = np.broadcast_to(way, fraction.shape)
+        R, skew, square = self._rotating
+        angle = self._angles[way] * fraction
+        sine, half = np.sin(angle), np.sin(angle / 2)
         X = np.zeros((len(fraction), 4, 4))
-        X[:, :3, :3] = (self.poses[way, None, :3, :3] @ rotated(self.rotations[way], fraction[:, None]))[:, 0]
+        X[:, :3, :3] = R[way] + sine[:, None, None] * skew[way] + (2 * half * half)[:, None, None] * square[way]
         X[:, :3, 3] = self.poses[way, :3, 3] + fraction[:, None] * self.shifts[way]
         X[:, 3, 3] = 1.0
         return X
+
+    @cached_property
+    def _rotating(self) -> tuple[Array, Array, Array]:
+        """Return R, R K and R K² of every segment, of its first orientation R and K v = axis × v."""
+        R, (x, y, z) = self.poses[:-1, :3, :3], self._axes.T
+        K = np.zeros_like(R)
+        K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
+        K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
+        turned = R @ K
+        return R, turned, turned @ K
+
+    @cached_property
+    def _axes(self) -> Array:
+        """Of the rotations on the segments, (k, 3)."""
+        return np.asarray(self.rotations / np.where(self._angles > 0, self._angles, 1.0)[:, None])
 
     def _way(self, t: Array) -> SegmentNumbers:
         """Return the numbers of the segments (...) at times (...)."""
@@ -92,7 +109,11 @@ class StraightPath:
     def _along(self, t: Array) -> tuple[SegmentNumbers, Array]:
         """Return the numbers of the segments (...) at times (...), and the fractions of them."""
         way = self._way(t)
-        return way, self.progress(t)[..., 0] - way
+        starts, inside = self.progress.times, np.minimum(np.maximum(t, 0.0), self.progress.duration)
+        piece = segments_at(starts, inside, len(self.progress.coefficients))
+        c0, c1, c2, c3 = self.progress.coefficients[piece, :, 0].T
+        local = inside - starts[piece]
+        return way, ((c3 * local + c2) * local + c1) * local + c0 - way
 
     def where(self, t: float) -> tuple[int, float, str]:
         """Return on which segment a time is, at which fraction of it, and that in words."""
@@ -100,62 +121,52 @@ class StraightPath:
         text = f"on the line near {position_text(self(np.array([t]))[0, :3, 3])}"
         return self.numbers[way], float(np.clip(fraction, 0.0, 1.0)), text
 
-    def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
+    def bounds(self, times: Array, hand: HandBounds, run: Runner) -> ErrorBounds:
         """Return bounds of the error on the intervals between times: the distance from a straight segment is convex."""
-        progress = way, rate, change = self._rates(times)
-        angle = self._angles[way]
-        spin = spin_bound(hand, angle * change, angle * rate)
-        if self._by_position:
-            # As an estimate the tool moves along the line as was planned; ``error`` does without.
-            spin = np.maximum(spin, spin_bound(hand, angle * hand.pull / self._length, angle * rate))
+        m = len(times) - 1
+        inputs = [times, *hand, self._on_line, self.corners, self._angles, self.progress.times]
+        spin, *progress = run(_bounds, [*inputs, self.progress.coefficients[:, :, 0]], *[(m,)] * 5)
         return ErrorBounds(hand.pull, spin, progress)
 
     def error(self, samples: HandSamples) -> TrackingError:
         """Return how far a sampled tool is from its segments."""
-        way, rate, change = samples.bounds.progress
-        planned = self._planned(samples.times) - way[:, None]
-        count, each = planned.shape
-        asked = np.concatenate([np.repeat(self._segments[way], each, axis=0), planned.reshape(-1, 1)], axis=1)
-        seen = samples.rows(_seen, [], [samples.poses.reshape(-1, 16), asked])[0].reshape(count, each, 4)
-        distance, along, (half, by_position) = seen[..., 0], seen[..., 1], seen[..., 2:].max(axis=1).T
-        angle = self._angles[way]
-        between, hand = samples.step**2 / 8, samples.hand
-        orientation = half + between * spin_bound(hand, angle * change, angle * rate)
-        if not self._by_position:
-            return error_of(samples, distance, half, orientation=orientation)
-        # Of the position on the line: how fast it can change, from where it is seen, and how far beyond the ends it is.
-        hurry = hand.pull / self._length
-        rate = np.abs(along[:, 1:] - along[:, :-1]).max(axis=1) / samples.step + samples.step * hurry
-        beyond = np.maximum(np.maximum(-along, along - 1).max(axis=1) + between * hurry, 0.0)
-        bound = by_position + between * spin_bound(hand, angle * hurry, angle * rate) + angle * beyond / 2
-        return error_of(
-            samples,
-            distance,
-            np.maximum(half, by_position),
-            orientation=np.maximum(orientation, bound),
-            backward=_backward(along * self._length, between * hand.pull),
+        m, each = samples.times.shape
+        solver, progress = samples.solver, [self.progress.times, self.progress.coefficients[:, :, 0]]
+        way = samples.bounds.progress[0]
+        (asked,) = solver.run(_asked, [samples.times, way, self._segments, *progress], (m * each, 21))
+        seen = solver.rows(_seen, [], [samples.poses.reshape(-1, 16), asked])[0].reshape(m, each, 4)
+        inputs = [samples.times, samples.poses, seen, samples.step, *samples.hand, *samples.bounds.progress]
+        position, angles, largest, times, facts = solver.run(
+            _errors, [*inputs, self._on_line], (m,), (2, m), (m,), (m,), (1,)
         )
+        bound, half = 2 * np.arcsin(np.minimum(angles, 1.0))
+        backward = float(facts[0]) if self._by_position else None
+        return TrackingError(position, bound + ROUNDINGS, largest, half, times, each - 1, backward)
 
-    def _planned(self, times: Array) -> Array:
-        """Return the progress (m, k) at times (m, k), each row of which lies within one cubic of it."""
-        starts, terms = self.progress.times, self.progress.coefficients
-        piece = segments_at(starts, (times[:, 0] + times[:, -1]) / 2, len(terms))
-        return evaluate(terms[piece], times - starts[piece, None])
+    @property
+    def _on_line(self) -> Array:
+        """Return the length of a line where orientations belong to positions on it, else 0."""
+        return np.array([self._length if self._by_position else 0.0])
 
     @property
     def _segments(self) -> Array:
         """Return the segments as ``_seen`` takes them, (k, 20)."""
-        angles = self._angles[:, None]
         squares = np.einsum("ki,ki->k", self.shifts, self.shifts)[:, None]
-        axes = self.rotations / np.where(angles > 0, angles, 1.0)
         R = self.poses[:-1, :3, :3].reshape(-1, 9)
-        parts = [self.poses[:-1, :3, 3], R, self.shifts, np.where(squares > 0, squares, 1.0), axes, angles]
+        parts = [
+            self.poses[:-1, :3, 3],
+            R,
+            self.shifts,
+            np.where(squares > 0, squares, 1.0),
+            self._axes,
+            self._angles[:, None],
+        ]
         return np.concatenate(parts, axis=1)
 
     @cached_property
     def _angles(self) -> Array:
         """Of the rotations on the segments, (k,) [rad]."""
-        return np.asarray(np.linalg.norm(self.rotations, axis=-1))
+        return np.asarray(np.sqrt(np.einsum("ki,ki->k", self.rotations, self.rotations)))
 
     @cached_property
     def _length(self) -> float:
@@ -165,21 +176,118 @@ class StraightPath:
     def _by_position(self) -> bool:
         return len(self.numbers) == 1 and self._length > self.near
 
-    def _rates(self, times: Array) -> tuple[SegmentNumbers, Array, Array]:
-        """Return of intervals (m,) between times: the segment, and upper bounds of the rate of progress and its change.
 
-        Each lies within one cubic of the progress, whose second derivative is largest at an end of the interval.
-        """
-        middles, h = (times[1:] + times[:-1]) / 2, times[1:] - times[:-1]
-        way = self._way(middles)
-        piece = segments_at(self.progress.times, middles, len(self.progress.coefficients))
-        local = middles - self.progress.times[piece]
-        first, second, third = (
-            np.abs(evaluate(derivative(self.progress.coefficients, order)[piece], local[:, None])[:, 0])
-            for order in (1, 2, 3)
-        )
+def _at(loops: Loops, times: Table, terms: Table, t: Scalar) -> tuple[list[Scalar], Scalar]:
+    """Return the coefficients of the cubic that a time is in, and when that begins."""
+    piece = loops.segment(times, t, terms.shape[0])
+    return [terms[piece, power] for power in range(4)], times[piece]
+
+
+def _bounds(loops: Loops, *tables: Table) -> None:
+    """Write bounds of the error on intervals: see ``StraightPath.bounds``.
+
+    Written are a bound of the second derivative of the sine of half the angle; and the segment, upper bounds of the
+    rate of progress and its change, and the angle of the rotation on the segment. Each interval lies within one cubic
+    of the progress, whose second derivative is largest at an end of the interval.
+    """
+    times, pull, spin, spin_change, on_line, corners, angles, starts, terms, bound, way, rate, change, turn = tables
+    m, line = bound.shape[0], on_line[0]
+
+    def of_interval(i: Scalar) -> list[Scalar]:
+        middle, h = (times[i + 1] + times[i]) / 2, times[i + 1] - times[i]
+        segment = loops.segment(corners, middle, angles.shape[0])
+        (_, c1, c2, c3), start = _at(loops, starts, terms, middle)
+        t = middle - start
+        first, second, third = abs((3 * c3 * t + 2 * c2) * t + c1), abs(6 * c3 * t + 2 * c2), abs(6 * c3)
         bend = second + third * h / 2
-        return way, first + bend * h / 2, bend
+        fast, angle = first + bend * h / 2, angles[segment]
+        planned = spin_bound(spin[i], spin_change[i], angle * bend, angle * fast)
+        # As an estimate the tool moves along the line as was planned; ``error`` does without.
+        hurry = pull[i] / select(line > 0, line, 1.0)
+        nearest = spin_bound(spin[i], spin_change[i], angle * hurry, angle * fast)
+        both = select(line > 0, larger(planned, nearest), planned)
+        return [both, loops.number(segment), fast, bend, angle]
+
+    loops.fill([bound, way, rate, change, turn], [m], of_interval)
+
+
+def _asked(loops: Loops, *tables: Table) -> None:
+    """Write what ``_seen`` takes beside the poses: at samples (m, k) on segments (m,) the segment and the progress."""
+    times, way, segments, starts, terms, asked = tables
+    m, each = times.shape
+    rows = asked.shaped(m, each, 21)
+
+    def planned(i: Scalar, k: Scalar) -> list[Scalar]:
+        (c0, c1, c2, c3), start = _at(loops, starts, terms, (times[i, 0] + times[i, each - 1]) / 2)
+        t = times[i, k] - start
+        return [((c3 * t + c2) * t + c1) * t + c0 - way[i]]
+
+    loops.fill([rows], [m, each, 20], lambda i, k, c: [segments[loops.whole(way[i]), c] + 0.0 * times[i, k]])
+    loops.fill([rows.part(2, 20)], [m, each], planned)
+
+
+def _errors(loops: Loops, *tables: Table) -> None:
+    """Write how far a tool is from segments, from what is seen at samples: see ``StraightPath.error``.
+
+    Written are bounds of the distance, bounds of the sine of half the angle and the largest one at the samples, the
+    largest distance there, when that is, and how far the tool runs back.
+    """
+    times, poses, seen, steps, pull, spin, spin_change, _, rates, changes, angles, on_line = tables[:12]
+    position, sines, largest, at, facts = tables[12:]
+    (m, each), line = times.shape, on_line[0]
+    length = select(line > 0, line, 1.0)
+    hands = poses.shaped(m * each, 16)
+    farthest = loops.largest(m * each, lambda k: larger(abs(hands[k, 3]), larger(abs(hands[k, 7]), abs(hands[k, 11]))))
+    rounding = ROUNDINGS * (1.0 + farthest)
+    distance, along, way = loops.each([m, each], lambda i, k: [seen[i, k, 0], seen[i, k, 1], seen[i, k, 1] * length], 3)
+
+    def of_interval(i: Scalar) -> list[Scalar]:
+        between, angle = steps[i] * steps[i] / 8, angles[i]
+        half, by_position = loops.largest(each, lambda k: seen[i, k, 2]), loops.largest(each, lambda k: seen[i, k, 3])
+        planned = half + between * spin_bound(spin[i], spin_change[i], angle * changes[i], angle * rates[i])
+        # Of the position on the line: how fast it can change, from where it is seen, and how far beyond the ends it is.
+        hurry = pull[i] / length
+        rate = loops.largest(each - 1, lambda k: abs(along[i, k + 1] - along[i, k])) / steps[i] + steps[i] * hurry
+        outside = loops.largest(each, lambda k: larger(-along[i, k], along[i, k] - 1))
+        beyond = larger(outside + between * hurry, 0.0)
+        bound = by_position + between * spin_bound(spin[i], spin_change[i], angle * hurry, angle * rate)
+        bound = bound + angle * beyond / 2
+        away = loops.largest(each, lambda k: distance[i, k])
+        return [
+            away + between * pull[i] + rounding,
+            select(line > 0, larger(planned, bound), planned),
+            select(line > 0, larger(half, by_position), half),
+            away,
+        ]
+
+    loops.fill([position, sines.part(0, 0), sines.part(0, 1), largest], [m], of_interval)
+
+    def latest(i: Scalar) -> tuple[()]:
+        row = distance.row(i)
+        at[i] = times.row(i)[loops.first_largest(each, lambda k: row[k])[1]]
+        return ()
+
+    loops.walk(m, (), latest)
+    facts[0] = _backward(loops, way, lambda i: steps[i] * steps[i] / 8 * pull[i], rounding)
+
+
+def _backward(loops: Loops, way: Table, between: Callable[[Scalar], Scalar], rounding: Scalar) -> Scalar:
+    """Return how far a tool at most runs back along its line, from samples (m, k) [m] and what lies between."""
+    m, each = way.shape
+    flat = way.shaped(m * each)
+    farthest = loops.highest(m * each, lambda k: flat[k]).shaped(m, each)
+    most = loops.largest(m, between)
+
+    def of_interval(i: Scalar) -> list[Scalar]:
+        back = loops.largest(each, lambda k: farthest[i, k] - way[i, k])
+        # Between two samples the tool is away from the chord by so much at most, before it reverses and after. Where
+        # the chord rises by four times that, the tool never reverses.
+        rises = loops.least(each - 1, lambda k: way[i, k + 1] - way[i, k]) > 4 * between(i)
+        # The end of an interval is the start of the next, but for rounding.
+        return [select(select(rises, back <= rounding, False), 0.0, back + 2 * most)]
+
+    (backs,) = loops.each([m], of_interval)
+    return loops.largest(m, lambda i: backs[i])
 
 
 def _seen(X: list[Scalar], segment: list[Scalar]) -> list[list[Scalar]]:
@@ -241,7 +349,7 @@ def line(A: Array, B: Array, rotation: Array, even: float, *, near: float, ramp:
         ramp: part of the duration that gathers speed, and that loses it again; at full speed from end to end if 0.
     """
     duration = even / (1 - ramp)
-    even_progress = Trajectory(times=[0.0, duration], coefficients=[[[0.0], [1 / duration]]])
+    even_progress = Trajectory.of_planner(np.array([0.0, duration]), np.array([[[0.0], [1 / duration], [0.0], [0.0]]]))
     return StraightPath(
         poses=np.stack([A, B]),
         rotations=rotation[None],
@@ -306,13 +414,3 @@ def report_path(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
         numbers=numbers,
         near=np.inf,
     )
-
-
-def _backward(along: Array, between: Array) -> float:
-    """Return how far a tool at most runs back along its line, from samples (m, k) [m] and what lies between (m,)."""
-    farthest = np.maximum.accumulate(along.ravel()).reshape(along.shape)
-    back = (farthest - along).max(axis=1)
-    # Between two samples the tool is away from the chord by so much at most, before it reverses and after. Where the
-    # chord rises by four times that, the tool never reverses.
-    rising = (along[:, 1:] - along[:, :-1]).min(axis=1) > 4 * between
-    return float(np.where(rising & (back <= 0), 0.0, back + 2 * between.max()).max())

@@ -14,7 +14,7 @@ window happens to fit.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable
 from functools import reduce
 from typing import NamedTuple
 
@@ -23,13 +23,13 @@ import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
-from armwright.motion.forward_backward import Bounds, largest_squares
+from armwright.motion.forward_backward import Bounds, Nothing, largest_squares, write_largest_squares
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import composed, evaluate, rate_peaks, shifted
+from armwright.motion.polynomials import composed_peaks, shifted_terms
 from armwright.motion.solver import Solver
-from armwright.motion.trajectory import Trajectory, run_slower
+from armwright.motion.trajectory import Trajectory
 from armwright.tracing.loops import Loops, Table
-from armwright.tracing.scalar import Scalar, larger, select
+from armwright.tracing.scalar import Scalar, larger, select, sqrt
 
 # From rest to the full speed of the path takes no less than this where a joint has no limit of acceleration [s].
 _RAMP = 0.05
@@ -43,7 +43,7 @@ _ROUNDS = 4
 # more, the fewer knots there are, so that there are some so many in all.
 _FINER, _ENOUGH = 4, 400
 # Parts of an interval where its bounds are kept, and parts of a piece where the limits are sampled.
-_PARTS, _SEEN = np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+_PARTS, _SEEN = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
 # Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed,
 # to this part of the piece.
 _SAME, _HALVINGS, _CONVERGED = 1e-10, 60, 1e-12
@@ -62,7 +62,7 @@ class TimedPath(NamedTuple):
         trajectory: of the joints, at rest and without acceleration at both ends.
         factor: how many times longer it takes than a run at full speed that no joint limits.
         because: which limit, and which joint, from 0, binds longest; None where the joints do not slow it.
-        progress: s over time.
+        run: before it was slowed by the same factor throughout.
         speed: (n,) largest speeds of the joints.
         acceleration: (n,) largest accelerations.
     """
@@ -70,18 +70,29 @@ class TimedPath(NamedTuple):
     trajectory: Trajectory
     factor: float
     because: BindingLimit | None
-    progress: Trajectory
+    run: _Run
     speed: Array
     acceleration: Array
 
     def when(self, s: float) -> float:
         """Return when the run is at ``s``, as a part of its duration."""
-        starts = self.progress.coefficients[:, 0, 0]
-        k = int(segments_at(starts, s, len(starts)))
-        start, end = self.progress.times[k : k + 2]
-        t = np.linspace(start, end, _LOOKED_UP)
-        there = evaluate(self.progress.coefficients[k : k + 1], t[:, None] - start)[:, 0]
-        return float(np.interp(s, there, t)) / self.progress.duration
+        run = self.run
+        begins = run.law[:, 0] + run.grid.times[run.intervals]
+        k = int(segments_at(begins, s, len(begins)))
+        _, *law = run.law[k].tolist()
+        length = float(run.times[k + 1] - run.times[k])
+
+        def at(i: int) -> float:
+            t = i / (_LOOKED_UP - 1) * length
+            return float(((law[2] * t + law[1]) * t + law[0]) * t)
+
+        sought, low, high = s - float(begins[k]), 0, _LOOKED_UP - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if at(middle) <= sought else (low, middle)
+        rise = at(high) - at(low)
+        part = min(max((sought - at(low)) / rise, 0.0), 1.0) if rise > 0 else 0.0
+        return (float(run.times[k]) + (low + part) / (_LOOKED_UP - 1) * length) / float(run.times[-1])
 
 
 class _Grid(NamedTuple):
@@ -89,18 +100,24 @@ class _Grid(NamedTuple):
 
     Attributes:
         solver: the arm.
-        path: of its joints, a cubic on each of m intervals.
+        times: (m + 1,) the parameters s of the path where m intervals begin, and the last one ends.
+        cubics: (m, 4, n) the joints on each.
         caps: (m,) the largest s' on each.
-        bounds: on each.
+        a: (m, rows) bounds |a u + b x| <= 1 on each, of x = s'² at its start and u = s'', that hold all along it.
+        b: (m, rows) the same.
         squares: (m + 1,) s'² at their ends on the fastest run whose s'' is constant on each.
-        shortest: the time of that run [s].
+        even: the time of a run at the largest s' throughout [s].
+        shortest: the time of the fastest run [s].
     """
 
     solver: Solver
-    path: Trajectory
+    times: Array
+    cubics: Array
     caps: Array
-    bounds: Bounds
+    a: Array
+    b: Array
     squares: Array
+    even: float
     shortest: float
 
     @property
@@ -108,38 +125,32 @@ class _Grid(NamedTuple):
         """How long a run may take [s]."""
         return _allowed(self.shortest)
 
-    @property
-    def lengths(self) -> Array:
-        """Of the intervals in s, (m,)."""
-        return self.path.lengths
-
 
 class _Run(NamedTuple):
     """A run of which the limits have been sampled.
 
     Attributes:
-        path: of the joints.
+        grid: the path.
         times: (p + 1,) when its p pieces begin, and the last one ends [s].
         intervals: (p,) on which interval of the path each is.
         law: (p, 4) coefficients of the path on that interval by the time since the piece began.
-        uses: (p, 1 + 2 n) the largest part of its limits that each piece uses: the speed on the path, the speeds and
-            the roots of the accelerations of the joints.
+        along: (p,) the largest part that each piece uses of the speed on the path.
+        of_joints: (p, 2 n) the same of the speeds and of the roots of the accelerations of the joints.
+        most: the largest part of all.
     """
 
-    path: Trajectory
+    grid: _Grid
     times: Array
     intervals: npt.NDArray[np.intp]
     law: Array
-    uses: Array
-
-    def terms(self, solver: Solver) -> Array:
-        """Return the coefficients of the joint positions over time, (p, 10, n)."""
-        return solver.rows(composed, [self.path.coefficients[self.intervals]], [self.law])[0]
+    along: Array
+    of_joints: Array
+    most: float
 
     @property
     def duration(self) -> float:
         """How long it takes, slowed to keep the limits where they were sampled [s]."""
-        return float(self.times[-1]) * max(1.0, float(self.uses.max()))
+        return float(self.times[-1]) * max(1.0, self.most)
 
 
 def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
@@ -152,21 +163,18 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
     """
     arm, grid = solver.arm, _gridded(solver, path, caps)
     run = _smooth(grid)
-    terms = run.terms(solver)
-    speed, acceleration = rate_peaks(terms, run.times[1:] - run.times[:-1], solver.rows, solver.run)
+    terms, speed, acceleration = composed_peaks(grid.cubics, run.law, run.intervals, run.times, solver.run)
     over = max(
         float((speed / arm.limits.speed).max()),
         math.sqrt(float((acceleration / arm.limits.acceleration).max())),
-        float(run.uses[:, 0].max()),
+        float(run.along.max()),
         grid.allowed / float(run.times[-1]),
     )
-    trajectory = run_slower(run.times, terms, over)
-    factor = trajectory.duration / _allowed(float((grid.lengths / grid.caps).sum()) + _RAMP)
-    law = run.law.copy()
-    law[:, 0] += run.path.times[run.intervals]
-    progress = run_slower(run.times, law[..., None], over)
+    slower = over ** -np.arange(terms.shape[1], dtype=np.float64)
+    trajectory = Trajectory.of_planner(run.times * over, terms * slower[:, None])
+    factor = trajectory.duration / _allowed(grid.even + _RAMP)
     because = _binding(arm.n, run) if factor > 1 else None
-    return TimedPath(trajectory, factor, because, progress, speed / over, acceleration / over**2)
+    return TimedPath(trajectory, factor, because, run, speed / over, acceleration / over**2)
 
 
 def _allowed(shortest: float) -> float:
@@ -176,41 +184,66 @@ def _allowed(shortest: float) -> float:
 
 def _gridded(solver: Solver, path: Trajectory, caps: Array) -> _Grid:
     """Return a path with every segment cut into equal parts."""
+    limits = solver.arm.limits
+    m, _, n = path.coefficients.shape
     finer = min(max(math.ceil(_ENOUGH / len(caps)), 1), _FINER)
-    starts = (path.lengths[:, None] * (np.arange(finer) / finer)).ravel()
-    coefficients = shifted(np.repeat(path.coefficients, finer, axis=0), starts, solver.rows)
-    times = np.append(np.repeat(path.times[:-1], finer) + starts, path.times[-1])
-    fine, caps = Trajectory(times=times, coefficients=coefficients), np.repeat(caps, finer)
-    bounds, lengths = _bounds(solver, fine, caps), fine.lengths
-    squares = largest_squares(bounds, lengths, (False, False), solver.run)
-    return _Grid(solver, fine, caps, bounds, squares, float(_steps(lengths, np.sqrt(squares)).sum()))
-
-
-def _bounds(solver: Solver, path: Trajectory, caps: Array) -> Bounds:
-    """Return bounds on x = s'² at the start of every segment, and on u = s'', that hold all along it."""
-    lengths, limits = path.lengths, solver.arm.limits
-    count, _, joints = path.coefficients.shape
-    slopes = solver.rows(_slopes, [path.coefficients], [lengths[:, None]])[0]
-    rates, bends = slopes[:, : len(_PARTS)], slopes[:, len(_PARTS) :]
     ramp = 0.0 if np.isfinite(limits.acceleration).all() else _RAMP
-    squares, bends = (rates / limits.speed) ** 2, bends / limits.acceleration
-    # At a part of the segment x has grown by 2 u times the path.
-    grown = 2 * lengths[:, None] * _PARTS
-    on_x = np.zeros((count, 1 + len(_PARTS), 1 + 2 * joints))
-    on_x[:, 1:, 0], on_x[:, 1:, 1 : 1 + joints], on_x[:, 1:, 1 + joints :] = 1 / caps[:, None] ** 2, squares, bends
-    on_u = np.zeros_like(on_x)
-    on_u[:, 0, 0] = ramp
-    on_u[:, 1:] = on_x[:, 1:] * grown[..., None]
-    on_u[:, 1:, 1 + joints :] += rates / limits.acceleration
-    on_u, on_x = on_u.reshape(count, -1), on_x.reshape(count, -1)
-    return Bounds(on_u, on_x, np.zeros_like(on_u))
+    inputs = [path.times, path.coefficients, caps, limits.speed, limits.acceleration, np.array([ramp])]
+    of_rows = m * finer, 1 + len(_PARTS) * (1 + 2 * n)
+    times, cubics, fine_caps, a, b, squares, facts = solver.run(
+        _grid, inputs, (m * finer + 1,), (m, finer, 4, n), (m, finer), of_rows, of_rows, (m * finer + 1,), (2,)
+    )
+    return _Grid(
+        solver, times, cubics.reshape(-1, 4, n), fine_caps.reshape(-1), a, b, squares, float(facts[0]), float(facts[1])
+    )
 
 
-def _slopes(cubic: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
-    """Return the slopes of a cubic, and its second derivatives, at parts of its length."""
-    _, c1, c2, c3 = cubic
-    at = [part * length[0] for part in _PARTS.tolist()]
-    return [[*((3 * c3 * s + 2 * c2) * s + c1 for s in at), *(6 * c3 * s + 2 * c2 for s in at)]]
+def _grid(loops: Loops, *tables: Table) -> None:
+    """Write a grid: see ``_gridded``.
+
+    Read are times and cubics of a path, the largest s' on its segments, the limits of the joints, and a bound of s'';
+    written the attributes of a ``_Grid`` in their order.
+    """
+    path, terms, caps, speed, acceleration, ramp, times, cubics, fine_caps, a, b, squares, facts = tables
+    m, finer, _, n = cubics.shape
+    count = m * finer
+
+    def begin(i: Scalar, k: Scalar) -> list[Scalar]:
+        return [path[i] + (path[i + 1] - path[i]) * (loops.number(k) / finer), caps[i]]
+
+    loops.fill([times.shaped(m, finer), fine_caps], [m, finer], begin)
+    times[count] = path[m]
+
+    def cubic(i: Scalar, k: Scalar, j: Scalar) -> list[Scalar]:
+        start = (path[i + 1] - path[i]) * (loops.number(k) / finer)
+        return shifted_terms([terms[i, power, j] for power in range(4)], [start])[0]
+
+    loops.fill([cubics.part(2, power) for power in range(4)], [m, finer, n], cubic)
+    local, most = cubics.shaped(count, 4, n), fine_caps.shaped(count)
+    (lengths,) = loops.each([count], lambda i: [times[i + 1] - times[i]])
+    loops.fill([a.part(1, 0), b.part(1, 0)], [count], lambda i: [0.0 * most[i] + ramp[0], 0.0 * most[i]])
+    for p, part in enumerate(_PARTS):
+        first = 1 + p * (2 * n + 1)
+
+        def of_path(i: Scalar, part: float = part) -> list[Scalar]:
+            on_x = 1 / (most[i] * most[i])
+            # At a part of the interval x has grown by 2 u times the path.
+            return [2 * lengths[i] * part * on_x, on_x]
+
+        def of_joint(i: Scalar, j: Scalar, part: float = part) -> list[Scalar]:
+            s, grown = part * lengths[i], 2 * lengths[i] * part
+            c1, c2, c3 = (local[i, power, j] for power in (1, 2, 3))
+            rate, bend = (3 * c3 * s + 2 * c2) * s + c1, (6 * c3 * s + 2 * c2) / acceleration[j]
+            square = (rate / speed[j]) ** 2
+            return [square * grown, bend * grown + rate / acceleration[j], square, bend]
+
+        loops.fill([a.part(1, first), b.part(1, first)], [count], of_path)
+        columns = [x.behind(first + 1 + k * n, 1) for x in (a, b) for k in (0, 1)]
+        loops.fill(columns, [count, n], of_joint)
+    write_largest_squares(loops, Bounds(a, b, Nothing()), lengths, (0.0, 0.0), squares)
+    facts[0] = loops.sums(count, lambda i: lengths[i] / most[i])[count]
+    (speeds,) = loops.each([count + 1], lambda i: [sqrt(squares[i])])
+    facts[1] = loops.sums(count, lambda i: 2 * lengths[i] / (speeds[i + 1] + speeds[i]))[count]
 
 
 def _smooth(grid: _Grid) -> _Run:
@@ -228,137 +261,186 @@ def _smooth(grid: _Grid) -> _Run:
 
 def _averaged_within(grid: _Grid, window: float) -> _Run:
     """Return the fastest run averaged over a window, with bounds drawn tighter where that passes limits."""
-    bounds, lengths = grid.bounds, grid.lengths
+    lengths = grid.times[1:] - grid.times[:-1]
     tighter, runs, x = np.ones((len(lengths), 1)), [], grid.squares
     for _ in range(_ROUNDS):
-        runs.append(_checked(grid, *_averaged(grid.solver, lengths, np.sqrt(x), window)))
+        runs.append(_averaged(grid, x, window))
         if runs[-1].duration <= (1 + _HAIR) * grid.allowed:
             break
         worst = np.ones(len(lengths))
-        np.maximum.at(worst, runs[-1].intervals, runs[-1].uses.max(axis=1))
+        uses = np.maximum(runs[-1].along, runs[-1].of_joints.max(axis=1))
+        np.maximum.at(worst, runs[-1].intervals, uses)
         tighter = tighter * worst[:, None] ** 2
-        tight = bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter)
-        x = largest_squares(tight, lengths, (False, False), grid.solver.run)
+        bounds = Bounds(grid.a * tighter, grid.b * tighter, np.zeros_like(grid.a))
+        x = largest_squares(bounds, lengths, (False, False), grid.solver.run)
     return min(runs, key=lambda run: run.duration)
 
 
-def _steps(lengths: Array, speeds: Array) -> Array:
-    """Return how long the intervals take whose lengths (m,) and speeds at the ends (m + 1,) are given, (m,) [s]."""
-    return 2 * lengths / (speeds[1:] + speeds[:-1])
+def _averaged(grid: _Grid, squares: Array, window: float) -> _Run:
+    """Return a run averaged over a moving window of time, and what it uses of the limits.
+
+    Args:
+        grid: the path.
+        squares: (m + 1,) s'² at the ends of its intervals; s'' is constant on each.
+        window: [s].
+    """
+    limits = grid.solver.arm.limits
+    m, _, n = grid.cubics.shape
+    inputs = [grid.times, grid.cubics, grid.caps, limits.speed, limits.acceleration, squares, np.array([window])]
+    # As many pieces as there may be: each interval begins and ends in the window, and begins once more.
+    p = 3 * m + 1
+    times, law, intervals, along, of_joints, facts = grid.solver.run(
+        _averaged_run, inputs, (p + 1,), (p, 4), (p,), (p,), (p, 2, n), (2,)
+    )
+    count, most = int(facts[0]), float(facts[1])
+    return _Run(
+        grid,
+        times[: count + 1],
+        intervals[:count].astype(np.intp),
+        law[:count],
+        along[:count],
+        of_joints[:count].reshape(count, -1),
+        most,
+    )
 
 
-def _averaged(solver: Solver, lengths: Array, speeds: Array, window: float) -> tuple[Array, Array]:
+def _averaged_run(loops: Loops, *tables: Table) -> None:
+    """Write the pieces of an averaged run: see ``_averaged``.
+
+    What is written are the attributes of a ``_Run`` in their order, and how many pieces there are and ``most``.
+    """
+    starts, cubics, caps, speed, acceleration, squares, window, times, laws, intervals, along, of_joints, facts = tables
+    breaks, law = _moving_average(loops, starts, squares, window[0])
+    parts, count = _cut(loops, starts, breaks, law)
+    m, _, n = cubics.shape
+    last = law.shape[0]
+
+    def of_piece(k: Scalar) -> list[Scalar]:
+        begin, middle = parts[k], (parts[k + 1] + parts[k]) / 2
+        piece = loops.segment(breaks, middle, last)
+        start, *higher = shifted_terms([law[piece, power] for power in range(4)], [begin - breaks[piece]])[0]
+        t = middle - begin
+        at = loops.segment(starts, ((higher[2] * t + higher[1]) * t + higher[0]) * t + start, m)
+        return [begin, start - starts[at], *higher, loops.number(at)]
+
+    columns = [laws.part(1, power) for power in range(4)]
+    loops.fill([times, *columns, intervals], [count], of_piece)
+
+    def samples(k: Scalar) -> list[Scalar]:
+        length = parts[k + 1] - parts[k]
+        return [x for part in _SEEN for x in _along([laws[k, power] for power in range(4)], part * length)]
+
+    seen = loops.each([count], samples, 3 * len(_SEEN))
+
+    def of_path(k: Scalar) -> list[Scalar]:
+        return [reduce(larger, (rates[k] for rates in seen[1::3]), 0.0) / caps[loops.whole(intervals[k])]]
+
+    def of_joint(k: Scalar, j: Scalar) -> list[Scalar]:
+        at = loops.whole(intervals[k])
+        cubic = [cubics[at, power, j] for power in range(4)]
+        fastest, hardest = _used(cubic, zip(*(iter([table[k] for table in seen]),) * 3, strict=True))
+        return [fastest / speed[j], sqrt(hardest / acceleration[j])]
+
+    loops.fill([along], [count], of_path)
+    loops.fill([of_joints.part(1, 0), of_joints.part(1, 1)], [count, n], of_joint)
+    times[count], facts[0] = parts[count], count
+    (uses,) = loops.each(
+        [count],
+        lambda k: [larger(loops.largest(n, lambda j: larger(of_joints[k, 0, j], of_joints[k, 1, j])), along[k])],
+    )
+    facts[1] = loops.largest(count, lambda k: uses[k])
+
+
+def _moving_average(loops: Loops, starts: Table, squares: Table, window: Scalar) -> tuple[Table, Table]:
     """Return s(t) averaged over a moving window of time: its breaks (k + 1,) and cubics (k, 4).
 
     Args:
-        solver: of the arm, to evaluate equations.
-        lengths: (m,) of the intervals in s.
-        speeds: (m + 1,) s' at their ends; s'' is constant on each.
+        loops: the loops.
+        starts: (m + 1,) where the intervals in s begin, and the last one ends.
+        squares: (m + 1,) s'² there; s'' is constant on each.
         window: [s].
     """
-    steps = _steps(lengths, speeds)
-    t = np.concatenate([[0.0], np.cumsum(steps)])
-    # The integral of s(t), on each interval, before the start and after the end.
-    integral = np.zeros((len(lengths) + 2, 4))
-    integral[1:-1, 1:3] = np.stack([np.cumsum(lengths) - lengths, speeds[:-1] / 2], axis=1)
-    integral[1:-1, 3] = (speeds[1:] - speeds[:-1]) / steps / 6
-    grown = (((integral[1:-1, 3] * steps + integral[1:-1, 2]) * steps) + integral[1:-1, 1]) * steps
-    integral[1:, 0] = np.concatenate([[0.0], np.cumsum(grown)])
-    integral[-1, 1] = lengths.sum()
-    begins = np.concatenate([[-window], t])
-    breaks = _apart(np.concatenate([t, t + window]))
-    middles = (breaks[1:] + breaks[:-1]) / 2
+    m = starts.shape[0] - 1
+    (speeds,) = loops.each([m + 1], lambda i: [sqrt(squares[i])])
+    (steps,) = loops.each([m], lambda i: [2 * (starts[i + 1] - starts[i]) / (speeds[i + 1] + speeds[i])])
+    t = loops.sums(m, lambda i: steps[i])
+    # The integral of s(t): on each interval and, with the last coefficients, after the end. Before the start it is 0.
+    bends = loops.table(m + 1)
+    loops.fill([bends], [m], lambda i: [(speeds[i + 1] - speeds[i]) / steps[i] / 6])
+    bends[m] = 0.0
+    grown = loops.sums(m, lambda i: ((bends[i] * steps[i] + speeds[i] / 2) * steps[i] + starts[i]) * steps[i])
+    (later,) = loops.each([m + 1], lambda i: [t[i] + window])
+    breaks, count = _apart(loops, t, later)
 
-    def around(length: Array, within: Array) -> Array:
-        piece = segments_at(begins, within, len(integral))
-        return shifted(integral[piece][..., None], length - begins[piece], solver.rows)[..., 0]
+    def around(begin: Scalar, within: Scalar) -> list[Scalar]:
+        piece = loops.segment(t, within, m + 1)
+        terms = [grown[piece], starts[piece], speeds[piece] / 2, bends[piece]]
+        started = within >= 0.0
+        return [select(started, x, 0.0) for x in shifted_terms(terms, [begin - t[piece]])[0]]
 
-    ahead, behind = around(breaks[:-1], middles), around(breaks[:-1] - window, middles - window)
-    return breaks, (ahead - behind) / window
+    def of_piece(k: Scalar) -> list[Scalar]:
+        begin, middle = breaks[k], (breaks[k + 1] + breaks[k]) / 2
+        ahead, behind = around(begin, middle), around(begin - window, middle - window)
+        return [(x - y) / window for x, y in zip(ahead, behind, strict=True)]
 
-
-def _checked(grid: _Grid, breaks: Array, law: Array) -> _Run:
-    """Return q(s(t)), cut where s(t) passes a knot of the path, and what it uses of the limits."""
-    limits, path, caps = grid.solver.arm.limits, grid.path, grid.caps
-    knots = path.times[1:-1]
-    begins = np.maximum.accumulate(law[:, 0])
-    piece = segments_at(begins, knots, len(law))
-    passed = breaks[piece] + _when(grid.solver, law[piece], (breaks[1:] - breaks[:-1])[piece], knots)
-    times = _apart(np.concatenate([breaks, passed]))
-    middles = (times[1:] + times[:-1]) / 2
-    piece = segments_at(breaks, middles, len(law))
-    inner = shifted(law[piece][..., None], times[:-1] - breaks[piece], grid.solver.rows)
-    there = evaluate(inner, (middles - times[:-1])[:, None])[:, 0]
-    interval = segments_at(path.times, there, len(caps))
-    inner[:, 0, 0] -= path.times[interval]
-    # Where the run is at the samples of each piece, how fast along the path, and with which acceleration.
-    run = np.concatenate([inner[..., 0], (times[1:] - times[:-1])[:, None]], axis=1)
-    (along,) = grid.solver.rows(_fastest, [], [run])
-    used = grid.solver.rows(_used, [path.coefficients[interval]], [run])[0]
-    speed, acceleration = used[:, 0] / limits.speed, np.sqrt(used[:, 1] / limits.acceleration)
-    uses = np.concatenate([along / caps[interval][:, None], speed, acceleration], axis=1)
-    return _Run(path, times, interval, inner[..., 0], uses)
+    law = loops.table(count, 4)
+    loops.fill([law.part(1, power) for power in range(4)], [count], of_piece)
+    return breaks, law
 
 
-def _used(cubic: list[Scalar], run: list[Scalar]) -> list[list[Scalar]]:
-    """Return the largest speed and the largest acceleration of a joint at samples of a run along a cubic q(s).
+def _cut(loops: Loops, starts: Table, breaks: Table, law: Table) -> tuple[Table, Scalar]:
+    """Return the times (p + 1,) at which cubics s(t) begin, and at which they pass an inner start; and p."""
+    count, knots = law.shape[0], starts.shape[0] - 2
+    begins = loops.highest(count, lambda k: law[k, 0])
 
-    Args:
-        cubic: (4,) its coefficients.
-        run: (5,) coefficients of s over time, and how long it takes.
-    """
+    def of_knot(i: Scalar) -> list[Scalar]:
+        knot = starts[i + 1]
+        piece = loops.segment(begins, knot, count)
+        length = breaks[piece + 1] - breaks[piece]
+        return [breaks[piece] + _passed(loops, [law[piece, power] for power in range(4)], length, knot)]
+
+    (passed,) = loops.each([knots], of_knot)
+    return _apart(loops, breaks, passed)
+
+
+def _used(cubic: list[Scalar], seen: Iterable[tuple[Scalar, ...]]) -> tuple[Scalar, Scalar]:
+    """Return the largest speed and the largest acceleration of a joint on a cubic q(s), given s, s' and s'' there."""
     _, c1, c2, c3 = cubic
     speed: Scalar = 0.0
     acceleration: Scalar = 0.0
-    for x, rate, bend in _along(run):
+    for x, rate, bend in seen:
         slope, curve = (3 * c3 * x + 2 * c2) * x + c1, 6 * c3 * x + 2 * c2
         speed = larger(abs(slope * rate), speed)
         acceleration = larger(abs(curve * rate * rate + slope * bend), acceleration)
-    return [[speed, acceleration]]
+    return speed, acceleration
 
 
-def _fastest(run: list[Scalar]) -> list[list[Scalar]]:
-    """Return the largest s' at samples of a run, 0 at least."""
-    return [[reduce(larger, (rate for _, rate, _ in _along(run)), 0.0 * run[0])]]
+def _along(law: list[Scalar], t: Scalar) -> tuple[Scalar, ...]:
+    """Return s, s' and s'' of a cubic s(t)."""
+    a, b, c, d = law
+    return ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b, 6 * d * t + 2 * c
 
 
-def _along(run: list[Scalar]) -> Iterator[tuple[Scalar, Scalar, Scalar]]:
-    """Give s, s' and s'' at the samples of a run: see ``_used``."""
-    a, b, c, d, length = run
-    for part in _SEEN.tolist():
-        t = part * length
-        yield ((d * t + c) * t + b) * t + a, (3 * d * t + 2 * c) * t + b, 6 * d * t + 2 * c
+def _passed(loops: Loops, law: list[Scalar], length: Scalar, knot: Scalar) -> Scalar:
+    """Return when a cubic s(t), which never falls, passes a knot, from 0 to ``length`` [s]."""
+    start, slow, bend, jerk = law
 
+    def step(low: Scalar, high: Scalar, last: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+        residual = ((jerk * last + bend) * last + slow) * last + start - knot
+        low, high = select(residual < 0, last, low), select(residual < 0, high, last)
+        rate = (3 * jerk * last + 2 * bend) * last + slow
+        # Newton's step where it stays between the bounds, else a halving.
+        ahead = last - residual / select(rate > 0, rate, math.inf)
+        stays = select(ahead >= low, select(high >= ahead, rate > 0, False), False)
+        t = select(stays, ahead, (low + high) / 2)
+        return abs(t - last) <= _CONVERGED * length, (low, high, t)
 
-def _when(solver: Solver, law: Array, steps: Array, knots: Array) -> Array:
-    """Return when cubics s(t) (k, 4), which never fall, pass knots (k,), from 0 to ``steps`` (k,) [s]."""
-    return solver.run(_passed, [law, steps, knots], knots.shape)
-
-
-def _passed(loops: Loops, law: Table, steps: Table, knots: Table, times: Table) -> None:
-    """Write when cubics pass knots: see ``_when``."""
-
-    def of_knot(i: Scalar) -> tuple[Scalar]:
-        start, slow, bend, jerk = (law[i, power] for power in range(4))
-
-        def step(low: Scalar, high: Scalar, last: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
-            residual = ((jerk * last + bend) * last + slow) * last + start - knots[i]
-            low, high = select(residual < 0, last, low), select(residual < 0, high, last)
-            rate = (3 * jerk * last + 2 * bend) * last + slow
-            # Newton's step where it stays between the bounds, else a halving.
-            ahead = last - residual / select(rate > 0, rate, math.inf)
-            stays = select(ahead >= low, select(high >= ahead, rate > 0, False), False)
-            t = select(stays, ahead, (low + high) / 2)
-            return abs(t - last) <= _CONVERGED * steps[i], (low, high, t)
-
-        return (loops.until(_HALVINGS, (0.0 * steps[i], steps[i], steps[i] / 2), step)[2],)
-
-    loops.fill([times], [knots.shape[0]], of_knot)
+    return loops.until(_HALVINGS, (0.0 * length, length, length / 2), step)[2]
 
 
 def _binding(joints: int, run: _Run) -> BindingLimit:
     """Return which limit of which joint binds for the longest time."""
-    steps, of_joints = run.times[1:] - run.times[:-1], run.uses[:, 1:]
+    steps, of_joints = run.times[1:] - run.times[:-1], run.of_joints
     fullest = of_joints.argmax(axis=1)
     near = of_joints.max(axis=1) >= _BINDS * of_joints.max()
     counts = np.bincount(fullest[near], weights=steps[near], minlength=2 * joints)
@@ -366,11 +448,19 @@ def _binding(joints: int, run: _Run) -> BindingLimit:
     return ("acceleration" if name else "speed"), joint
 
 
-def _apart(times: Array) -> Array:
-    """Return times in order, without those that follow the one before at no distance; the last one stays."""
-    times = np.sort(times)
-    distinct = times[1:] - times[:-1] > _SAME * times[-1]
-    inner = times[1:-1][distinct[:-1]]
-    if len(inner) and times[-1] - inner[-1] <= _SAME * times[-1]:
-        inner = inner[:-1]
-    return np.concatenate([times[:1], inner, times[-1:]])
+def _apart(loops: Loops, first: Table, second: Table) -> tuple[Table, Scalar]:
+    """Return times of two tables in order, and how many there are but the first.
+
+    Those that follow the one before at no distance are left out; the last one stays.
+    """
+    times = loops.merged(first, second)
+    last = times.shape[0] - 1
+    end = times[last]
+    near = _SAME * end
+    (places,), count = loops.kept(
+        [last - 1], lambda i: select(times[i + 1] - times[i] > near, end - times[i + 1] > near, False)
+    )
+    apart = loops.table(count + 2)
+    loops.fill([apart.behind(1)], [count], lambda i: [times[loops.whole(places[i]) + 1]])
+    apart[0], apart[count + 1] = times[0], end
+    return apart, count + 1

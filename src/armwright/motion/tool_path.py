@@ -24,6 +24,7 @@ from armwright.motion.trajectory import Trajectory
 from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
 from armwright.spatial.poses import homogeneous, position_text
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
+from armwright.tracing.loops import Runner
 
 # Knots to begin with in each blend and on each straight segment, at most.
 _ENOUGH = 500
@@ -65,12 +66,14 @@ class ToolPath:
         position, orientation = self.position.slowed(factor), self.orientation.slowed(factor)
         return ToolPath(position=position, orientation=orientation, times=self.times * factor)
 
-    def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
+    def bounds(self, times: Array, hand: HandBounds, run: Runner) -> ErrorBounds:  # noqa: ARG002
         """Return bounds of the error on the intervals between times: those of tool and path together."""
         middles = (times[1:] + times[:-1]) / 2
         piece = segments_at(self.knots, middles, len(self.knots) - 1)
         rate, change = (bound[piece] for bound in self.spin())
-        return ErrorBounds(hand.pull + self.acceleration()[piece], spin_bound(hand, change, rate))
+        return ErrorBounds(
+            hand.pull + self.acceleration()[piece], spin_bound(hand.spin, hand.spin_change, change, rate)
+        )
 
     def error(self, samples: HandSamples) -> TrackingError:
         """Return how far a sampled tool is from where it should be at the time."""

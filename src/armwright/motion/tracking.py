@@ -19,10 +19,8 @@ from armwright.motion.chain import beside, chain
 from armwright.motion.deviation import (
     HandMotion,
     TrackingError,
-    cubic_peaks,
-    hand_bounds,
+    curve_bounds,
     tracking_error,
-    turning_positions,
 )
 from armwright.motion.knots import divided
 from armwright.motion.obstruction import (
@@ -39,7 +37,7 @@ from armwright.motion.obstruction import (
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline_path import smooth_xspline, xspline
+from armwright.motion.xspline_path import rate_at_first, smooth_xspline, xspline
 
 # Rounds of putting knots where they are missing, and how much closer they are put than the error asks for; into how
 # many parts an interval is divided at most.
@@ -173,7 +171,10 @@ def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
         speed: (m, n) their largest speeds on its intervals.
     """
     times = trajectory.times
-    slower = 1.0 if task.clock is None else (np.diff(task.clock(times)) / np.diff(times))[:, None]
+    if task.clock is None:
+        return np.asarray(speed / task.solver.arm.limits.speed)
+    passed = task.clock(times)
+    slower = ((passed[1:] - passed[:-1]) / (times[1:] - times[:-1]))[:, None]
     return np.asarray(speed / slower / task.solver.arm.limits.speed)
 
 
@@ -211,14 +212,14 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
             return obstruction
         trajectory = _spline(task, knots, q)
         h = knots[1:] - knots[:-1]
-        speed, acceleration = cubic_peaks(trajectory.coefficients, h, task.solver.rows)
-        hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
-        error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)
+        bounds = curve_bounds(task.solver, trajectory)
+        speed = bounds.speed
+        error = tracking_error(task.solver, task.motion, trajectory, bounds.hand, task.tolerance)
         tracking = Tracking(trajectory, error, speed)
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
             # Between two knots that keep a limit the spline may pass it where a joint reverses.
-            first, second = turning_positions(trajectory.coefficients, h, task.solver.rows)
+            first, second = bounds.turning
             return beyond_limits(arm, first, knots) or beyond_limits(arm, second, knots) or tracking
         if task.report_spline:
             return tracking
@@ -237,14 +238,12 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
 
 def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
     """Return the spline through configurations (k, n) at knots (k,)."""
-    still = np.zeros(q.shape[1])
-    rates = (still, still) if task.rest else (_rate(knots, q), _rate(knots[::-1], q[::-1]))
-    return (xspline if task.report_spline else smooth_xspline)(knots, q, *rates)
-
-
-def _rate(t: Array, q: Array) -> Array:
-    """Return the rate (n,) at the first of four knots or more: that of the cubic through them."""
-    return np.asarray(np.linalg.solve(np.vander(t[:4] - t[0], increasing=True), q[:4])[1])
+    if task.report_spline:
+        still = np.zeros(q.shape[1])
+        return xspline(
+            knots, q, *((still, still) if task.rest else (rate_at_first(knots, q), rate_at_first(knots[::-1], q[::-1])))
+        )
+    return smooth_xspline(knots, q, rest=task.rest, run=task.solver.run)
 
 
 def _within_limits_by_revolutions(arm: Arm, q: Array, failed: int | None) -> Array:

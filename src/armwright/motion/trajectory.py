@@ -12,10 +12,8 @@ import numpy as np
 from armwright.arrays import Array, ArrayLike, floats, integer, not_negative, positive, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import joint_vector, segments_at
-from armwright.motion.polynomials import derivative, extremes, peaks, shifted, slope
-from armwright.motion.rows import Evaluator
+from armwright.motion.polynomials import derivative, extremes, peaks, shifted
 from armwright.notebook import html_table
-from armwright.tracing.scalar import Scalar
 
 # Nobody reads more samples than this; a shorter period is a slip of the unit.
 _MAX_SAMPLES = 100_000_000
@@ -80,6 +78,15 @@ class Trajectory:
         """Refuse a number of segments that does not fit the times."""
         if len(self.coefficients) != len(self.times) - 1:
             raise ShapeError(f"trajectory: {len(self.times)} times but {len(self.coefficients)} segments")
+
+    @classmethod
+    def of_planner(cls, times: Array, coefficients: Array) -> Trajectory:
+        """Return a trajectory whose attributes are arrays of a planner that nobody else has, and need no check."""
+        trajectory = cls.__new__(cls)
+        for name, array in (("times", times), ("coefficients", coefficients)):
+            array.setflags(write=False)
+            object.__setattr__(trajectory, name, array)
+        return trajectory
 
     @property
     def duration(self) -> float:
@@ -236,26 +243,6 @@ def run_slower(times: Array, coefficients: Array, factor: float) -> Trajectory:
         powers = factor ** -np.arange(coefficients.shape[1], dtype=np.float64)
         slower = coefficients * powers[:, None]
     return Trajectory(times=times * factor, coefficients=slower)
-
-
-def states(trajectory: Trajectory, t: Array, rows: Evaluator) -> tuple[Array, Array, Array]:
-    """Return positions, speeds and accelerations (k, n) of a trajectory at times (k,) from its start to its end."""
-    segment = segments_at(trajectory.times, t, len(trajectory.coefficients))
-    local = t - trajectory.times[segment]
-    q, qd, qdd = rows(_state, [trajectory.coefficients[segment]], [local[:, None]])
-    return q[:, 0], qd[:, 0], qdd[:, 0]
-
-
-def _state(terms: list[Scalar], local: list[Scalar]) -> list[list[Scalar]]:
-    """Return the value of a polynomial, and of its first two derivatives."""
-    found = []
-    for _ in range(3):
-        value = terms[-1]
-        for term in terms[-2::-1]:
-            value = value * local[0] + term
-        found.append([value])
-        terms = slope(terms)
-    return found
 
 
 def hold(q: ArrayLike, duration: float) -> Trajectory:

@@ -10,8 +10,8 @@ other curves to the fourth order, where
     a h_last + b h_next = h_last h_next / (h_last + h_next)
 
 The report has b = 0: then each rate follows from the one before it and the next knot, which is what lets
-``xspline_online`` plan while the arm moves. With ``smooth_weight``, b = h_last / 2 (h_last + h_next), it is the spline
-whose acceleration is continuous, which has to know all knots.
+``xspline_online`` plan while the arm moves. With b = h_last / 2 (h_last + h_next), as ``smooth_xspline`` has it, it is
+the spline whose acceleration is continuous, which has to know all knots.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from armwright.motion.continuity_report import continuity
 from armwright.motion.cubic_polynomials import hermite
 from armwright.motion.knots import divided, limit_per_joint, rate_or_rest, timed_points
 from armwright.motion.trajectory import Trajectory
-from armwright.tracing.scalar import Scalar
+from armwright.tracing.loops import Loops, Runner, Table
+from armwright.tracing.scalar import Scalar, select, smaller
 
 # Before and after a knot; and the knots beside it with itself between.
 Pair: TypeAlias = tuple[Scalar, Scalar]
@@ -45,12 +46,6 @@ def usual_weight(steps: Pair, b: Scalar = 0.0) -> Scalar:
     """Return the a that makes the spline exact for cubics, given b; for b = 0 it is the report's."""
     h_last, h_next = steps
     return h_next / (h_last + h_next) - b * (h_next / h_last)
-
-
-def smooth_weight(times: Array) -> Array:
-    """Return the b of every inner knot with which the acceleration is continuous, (k - 2,), for times (k,)."""
-    h = times[1:] - times[:-1]
-    return np.asarray(h[:-1] / (2 * (h[:-1] + h[1:])))
 
 
 def right_side(slopes: Pair, steps: Pair, a: Scalar, b: Scalar) -> Scalar:
@@ -108,13 +103,88 @@ def xspline(
     return _through(t, q, ends, *_parameters(np.diff(t), a, b))
 
 
-def smooth_xspline(times: Array, knots: Array, start: Array, end: Array) -> Trajectory:
-    """Return the X-spline of ``smooth_weight`` through knots (k, n) at times (k,), with rates (n,) at its ends.
+def smooth_xspline(times: Array, knots: Array, *, rest: bool, run: Runner) -> Trajectory:
+    """Return the X-spline through knots (k, n) at times (k,) whose acceleration is continuous.
 
-    Its |a| + |b| is 1/2 at every knot; nothing is checked.
+    Its |a| + |b| is 1/2 at every inner knot; nothing is checked.
+
+    Args:
+        times: (k,) of the knots.
+        knots: (k, n) joint positions; four knots at least where the joints do not rest.
+        rest: whether the joints rest at both ends; otherwise they have the rates of the cubics through the four knots
+            there.
+        run: runs the routine.
     """
-    h, b = times[1:] - times[:-1], smooth_weight(times)
-    return _through(times, knots, (start, end), usual_weight((h[:-1], h[1:]), b), b)
+    h = times[1:] - times[:-1]
+    b = h[:-1] / (2 * (h[:-1] + h[1:]))
+    if len(times) > _FEW:
+        ends = (
+            (np.zeros(knots.shape[1]),) * 2
+            if rest
+            else (rate_at_first(times, knots), rate_at_first(times[::-1], knots[::-1]))
+        )
+        return _through(times, knots, ends, usual_weight((h[:-1], h[1:]), b), b)
+    k, n = knots.shape
+    (terms,) = run(_smooth, [times, knots, np.array([float(rest)])], (k - 1, 4, n))
+    return Trajectory.of_planner(times.copy(), terms)
+
+
+def _smooth(loops: Loops, times: Table, knots: Table, rest: Table, terms: Table) -> None:
+    """Write the cubics of ``smooth_xspline``: the equations of inner knots are solved by elimination, row by row."""
+    k, n = knots.shape
+    rests = rest[0] > 0
+    last, inner = k - 1, k - 2
+    (h,) = loops.each([last], lambda i: [times[i + 1] - times[i]])
+    (slope,) = loops.each([last, n], lambda i, j: [(knots[i + 1, j] - knots[i, j]) / h[i]])
+
+    def rates(j: Scalar) -> list[Scalar]:
+        first, final = [smaller(last, i) for i in range(4)], [last - smaller(last, i) for i in range(4)]
+        return [
+            select(rests, 0.0, _rate_through([times[i] for i in at], [knots[i, j] for i in at]))
+            for at in (first, final)
+        ]
+
+    start, end = loops.table(n), loops.table(n)
+    loops.fill([start, end], [n], rates)
+
+    def weights(i: Scalar) -> list[Scalar]:
+        b = h[i] / (2 * (h[i] + h[i + 1]))
+        return [usual_weight((h[i], h[i + 1]), b), b]
+
+    a, b = loops.each([inner], weights, 2)
+
+    def right(i: Scalar, j: Scalar) -> list[Scalar]:
+        return [right_side((slope[i, j], slope[i + 1, j]), (h[i], h[i + 1]), a[i], b[i])]
+
+    (sides,) = loops.each([inner, n], right)
+    # Each equation without the rate of the knot before: m + upper m_next = side.
+    upper, pivot = loops.table(inner), loops.table(inner)
+
+    def eliminated(i: Scalar, before: Scalar) -> tuple[Scalar]:
+        pivot[i] = under = 1 - a[i] * before
+        upper[i] = after = b[i] / under
+        return (after,)
+
+    loops.walk(inner, (0.0,), eliminated)
+    forward = loops.follow([inner, n], lambda j: start[j], lambda i, j, m: (sides[i, j] - a[i] * m) / pivot[i])
+    found = loops.follow([inner, n], lambda j: end[j], lambda i, j, m: forward[i, j] - upper[i] * m, reverse=True)
+    m = loops.table(k, n)
+    loops.fill([m.behind(1)], [inner, n], lambda i, j: [found[i, j]])
+    loops.fill([m.part(0, 0)], [n], lambda j: [start[j]])
+    loops.fill([m.part(0, last)], [n], lambda j: [end[j]])
+
+    def of_segment(i: Scalar, j: Scalar) -> list[Scalar]:
+        return list(hermite(knots[i, j], m[i, j], knots[i + 1, j], m[i + 1, j], h[i]))
+
+    loops.fill([terms.part(1, power) for power in range(4)], [last, n], of_segment)
+
+
+def _rate_through(t: list[Scalar], q: list[Scalar]) -> Scalar:
+    """Return the rate at the first of four knots: that of the cubic through them, by divided differences."""
+    first = [(q[i + 1] - q[i]) / (t[i + 1] - t[i]) for i in range(3)]
+    second = [(first[i + 1] - first[i]) / (t[i + 2] - t[i]) for i in range(2)]
+    third = (second[1] - second[0]) / (t[3] - t[0])
+    return first[0] + (t[0] - t[1]) * (second[0] + (t[0] - t[2]) * third)
 
 
 def xspline_along(
@@ -168,6 +238,11 @@ def xspline_along(
         f"at {spline.times[k + 1]:g} s, {allowed[j]:g} is allowed; the curve has a corner there, or its rate at the "
         "start or end differs from the specified one"
     )
+
+
+def rate_at_first(t: Array, q: Array) -> Array:
+    """Return the rate (n,) at the first of four knots or more: that of the cubic through them."""
+    return np.asarray(_rate_through(list(t[:4]), list(q[:4])))
 
 
 def _parameters(h: Array, a: ArrayLike | None, b: ArrayLike | None) -> tuple[Array, Array]:

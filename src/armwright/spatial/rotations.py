@@ -83,10 +83,13 @@ def rotation_vector(R: ArrayLike) -> Array:
         (..., 3) rotation vectors [rad], of length at most pi.
     """
     R = of_shape(R, (3, 3), "rotation")
-    x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
-    skew = np.stack([x, y, z], axis=-1) / 2
-    sine = np.linalg.norm(skew, axis=-1)
-    cosine = (np.trace(R, axis1=-2, axis2=-1) - 1) / 2
+    skew = np.empty(R.shape[:-1])
+    skew[..., 0] = R[..., 2, 1] - R[..., 1, 2]
+    skew[..., 1] = R[..., 0, 2] - R[..., 2, 0]
+    skew[..., 2] = R[..., 1, 0] - R[..., 0, 1]
+    skew /= 2
+    sine = np.sqrt(np.add.reduce(skew * skew, axis=-1))
+    cosine = (R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1) / 2
     angle = np.arctan2(sine, cosine)
     small = sine < _TINY_ANGLE
     factor = np.where(small, 1.0, angle / np.where(small, 1.0, sine))

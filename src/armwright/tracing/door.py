@@ -42,7 +42,11 @@ _FIELDS = (
     "PyEval_SaveThread", "PyEval_RestoreThread",
 )  # fmt: skip
 _PLACE = {name: 8 * i for i, name in enumerate(_FIELDS)}
-_FUNCTIONS = tuple(name for name in _FIELDS if name.startswith("Py"))
+# The same for the function of a routine.
+_OF_ROUTINE = (
+    "careful", "array_type", "none", "kind", "PyObject_Vectorcall", "Py_IncRef", "PyMem_RawMalloc", "PyMem_RawFree"
+)  # fmt: skip
+_FUNCTIONS = tuple(dict.fromkeys(name for name in (*_FIELDS, *_OF_ROUTINE) if name.startswith("Py")))
 _AXES_MAX = 4
 # Of each array: how many axes a value has, their lengths, its size in bytes, the kind of its numbers, and its shape.
 _OF_ARRAY = ("axes", *(f"length{i}" for i in range(_AXES_MAX)), "size", "kind", "shape")
@@ -131,9 +135,42 @@ class Door:
         self._tables.append(table)
         for part, place in self._kernels.items():  # another thread may have compiled it meanwhile
             self.connect(part, place)
-        new = ctypes.pythonapi.PyCFunction_NewEx
-        new.restype, new.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p]
-        return new(_address_of(table) + 8 * len(words), table, None)  # type: ignore[no-any-return]
+        return _built_in(table, 8 * len(words))
+
+
+class RoutineDoor:
+    """The function of a routine, see ``loops``: it takes all arrays of the routine, and returns nothing."""
+
+    def __init__(self, axes: Sequence[int]) -> None:
+        """Prepare a function of arrays that have so many axes each."""
+        self._axes = tuple(axes)
+
+    def ir(self) -> str:
+        """Return the IR of ``call``, which stands beside that of ``routine(tables, lengths, allocate, free)``."""
+        return _ir_of_routine(self._axes)
+
+    def open(self, name: str, address: int, careful: Callable[..., None]) -> Callable[..., None]:
+        """Return a built-in function.
+
+        Args:
+            name: of the function.
+            address: of ``call``.
+            careful: takes the same arrays where they are not in C order, not of numbers, or where memory is short.
+        """
+        known = {"careful": id(careful), "array_type": id(np.ndarray), "none": id(None),
+                 "kind": id(np.dtype(np.float64)), **_api()}  # fmt: skip
+        words = [known[field] for field in _OF_ROUTINE]
+        text = name.encode()
+        definition = [_address_of(text), address, _METH_FASTCALL | _METH_KEYWORDS, 0]
+        table = _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())
+        table.keep, table.origin = (careful, text), None
+        return _built_in(table, 8 * len(words))
+
+
+def _built_in(table: _Table, definition: int) -> Callable[..., Any]:
+    new = ctypes.pythonapi.PyCFunction_NewEx
+    new.restype, new.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p]
+    return new(_address_of(table) + definition, table, None)  # type: ignore[no-any-return]
 
 
 _OUT, _THREADS = sys.intern("out"), sys.intern("threads")
@@ -270,6 +307,43 @@ def _ir(inputs: int, outputs: int) -> str:
     call = text.known("PyObject_Vectorcall")
     answer = text.call("ptr", call, f"ptr {text.known('careful')}", "ptr %args", "i64 %nargs", "ptr %names")
     text.do(f"ret ptr {answer}")
+    text.do("}")
+    return "\n".join([*text.lines, ""])
+
+
+@cache
+def _ir_of_routine(axes: tuple[int, ...]) -> str:
+    """Return the IR of ``call`` for arrays that have so many axes each."""
+    text = _Text()
+    text.do("define ptr @call(ptr %self, ptr %args, i64 %nargs, ptr %names) nounwind {")
+    text.do("entry:")
+    text.do(f"%table = getelementptr i8, ptr %self, i64 {_BYTES_DATA}")
+    text.do(f"%arrays = alloca [{len(axes)} x ptr]")
+    text.do(f"%lengths = alloca [{max(sum(axes), 1)} x i64]")
+    places = {name: 8 * i for i, name in enumerate(_OF_ROUTINE)}
+    known = {name: text.load("ptr", "%table", place) for name, place in places.items()}
+    text.unless(text.equal("%nargs", len(axes), "i64"), "careful")
+    text.unless(text.equal("%names", "null"), "careful")
+    place = 0
+    for k, count in enumerate(axes):
+        x = text.load("ptr", "%args", 8 * k)
+        text.unless(text.equal(text.load("ptr", x, _TYPE), known["array_type"]), "careful")
+        flags = text.let(f"and i32 {text.load('i32', x, _FLAGS)}, {_READABLE}")
+        plain = [text.equal(flags, _READABLE, "i32"), text.equal(text.load("i32", x, _AXES), count, "i32")]
+        text.unless(text.all([*plain, text.equal(text.load("ptr", x, _KIND), known["kind"])]), "careful")
+        text.do(f"store ptr {text.load('ptr', x, _DATA)}, ptr {text.at('%arrays', 8 * k)}")
+        found = text.load("ptr", x, _LENGTHS) if count else ""
+        for i in range(count):
+            text.do(f"store i64 {text.load('i64', found, 8 * i)}, ptr {text.at('%lengths', 8 * (place + i))}")
+        place += count
+    memory = f"ptr {known['PyMem_RawMalloc']}", f"ptr {known['PyMem_RawFree']}"
+    status = text.call("i64", "@routine", "ptr %arrays", "ptr %lengths", *memory)
+    text.unless(text.equal(status, 0, "i64"), "careful")
+    text.do(f"call void {known['Py_IncRef']}(ptr {known['none']})")
+    text.do(f"ret ptr {known['none']}")
+    text.do("careful:")
+    operands = f"ptr {known['careful']}", "ptr %args", "i64 %nargs", "ptr %names"
+    text.do(f"ret ptr {text.call('ptr', known['PyObject_Vectorcall'], *operands)}")
     text.do("}")
     return "\n".join([*text.lines, ""])
 

@@ -36,8 +36,6 @@ _TRUTHS = frozenset({"less", "less_equal"})
 _DECLARED = (
     "declare double @llvm.fabs.f64(double)",
     "declare double @llvm.sqrt.f64(double)",
-    "declare noalias ptr @malloc(i64)",
-    "declare void @free(ptr)",
 )
 
 
@@ -98,6 +96,9 @@ class EmittedLoops:
         self._count += 1
         self._lines.append(f"  %v{self._count} = {instruction}")
         return f"%v{self._count}"
+
+    def _product(self, a: str, b: str) -> str:
+        return b if a == "1" else a if b == "1" else self._name(f"mul i64 {a}, {b}")
 
     def _traced(self, kind: str, text: str) -> Traced:
         return Traced(self, self._new(_Value(kind, text)))  # type: ignore[arg-type]
@@ -168,15 +169,134 @@ class EmittedLoops:
         lengths = [self._text(size, "i64") for size in sizes]
         for length in lengths:
             count = self._name(f"mul i64 {count}, {length}")
-        pointer = self._name(f"call noalias ptr @malloc(i64 {self._name(f'mul i64 {count}, 8')})")
+        # Memory of no bytes may have no address.
+        bytes_ = self._name(f"add i64 {self._name(f'mul i64 {count}, 8')}, 8")
+        pointer = self._name(f"call noalias ptr %allocate(i64 {bytes_})")
+        none, label = self._name(f"icmp eq ptr {pointer}, null"), f"table{self._count}"
+        self._jump(f"br i1 {none}, label %short{len(self._tables)}, label %{label}", label)
         self._tables.append(pointer)
         return EmittedTable(self, pointer, lengths)
+
+    def sums(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> EmittedTable:
+        """Return a new table of the sums of what a body returns for the indices before each, from 0 to all of them."""
+        table = self.table(size + 1)
+        table[0] = 0.0
+
+        def step(i: Scalar, total: Scalar) -> tuple[Scalar]:
+            table[i + 1] = after = total + body(i)
+            return (after,)
+
+        self.walk(size, (0.0,), step)
+        return table
+
+    def highest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> EmittedTable:
+        """Return a new table of the largest of what a body returns for the indices up to each."""
+        table = self.table(size)
+
+        def step(i: Scalar, most: Scalar) -> tuple[Scalar]:
+            table[i] = after = larger(most, body(i))
+            return (after,)
+
+        self.walk(size, (-math.inf,), step)
+        return table
+
+    def merged(self, first: EmittedTable, second: EmittedTable) -> EmittedTable:
+        """Return a new table of the numbers of two tables in order; both are so but for rounding."""
+        (m,), (n,) = first.shape, second.shape
+        table = self.table(m + n)
+
+        def taken(k: Scalar, i: Scalar, j: Scalar) -> tuple[Scalar, ...]:
+            (x,) = self.when(i < m, lambda: (first[i],), lambda: (math.inf,))
+            (y,) = self.when(j < n, lambda: (second[j],), lambda: (math.inf,))
+            table[k] = select(x <= y, x, y)
+            return i + select(x <= y, 1, 0), j + select(x <= y, 0, 1)
+
+        self.walk(m + n, (0, 0), taken)
+
+        def sunk(k: Scalar) -> tuple[()]:
+            x = table[k]
+
+            def step(at: Scalar) -> tuple[Scalar, tuple[Scalar]]:
+                (before,) = self.when(at > 0, lambda: (table[at - 1],), lambda: (-math.inf,))
+                done = before <= x
+
+                def moved() -> tuple[Scalar]:
+                    table[at] = before
+                    return (at - 1,)
+
+                return done, self.when(done, lambda: (at,), moved)
+
+            (at,) = self.until(k + 1, (k + 0,), step)
+            table[at] = x
+            return ()
+
+        self.walk(m + n, (), sunk)
+        return table
+
+    def kept(self, sizes: Sequence[Scalar], body: Callable[..., Scalar]) -> tuple[list[EmittedTable], Scalar]:
+        """Return new tables of the indices, one per axis, for which a condition holds, and how many there are."""
+        every: Scalar = 1
+        for size in sizes:
+            every = size * every
+        tables = [self.table(every) for _ in sizes]
+
+        def step(left: Sequence[Scalar], indices: tuple[Scalar, ...], count: Scalar) -> tuple[Scalar]:
+            if left:
+                (count,) = self.walk(left[0], (count,), lambda i, count: step(left[1:], (*indices, i), count))
+                return (count,)
+            for table, i in zip(tables, indices, strict=True):
+                table[count] = i
+            return (count + select(body(*indices), 1, 0),)
+
+        (count,) = step(sizes, (), 0)
+        return tables, count
+
+    def whole(self, x: Scalar) -> Scalar:
+        """Return a number without a fraction as an index."""
+        return self._traced("i64", self._name(f"fptosi double {self._text(x, 'double')} to i64"))
+
+    def number(self, i: Scalar) -> Scalar:
+        """Return an index as a number."""
+        return self._traced("double", self._text(i, "double"))
+
+    def segment(self, starts: EmittedTable, x: Scalar, count: Scalar) -> Scalar:
+        """Return which of ``count`` segments, by their starts, a number is in; at a start the next."""
+
+        def step(low: Scalar, high: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+            middle = self._traced("i64", self._name(f"lshr i64 {self._text(low + high, 'i64')}, 1"))
+            behind = starts[middle] <= x
+            low, high = select(behind, middle, low), select(behind, high, middle)
+            return high - low <= 1, (low, high)
+
+        return self.until(64, (0, count), step)[0]
 
     def walk(
         self, size: Scalar, carry: Sequence[Scalar], step: Callable[..., Sequence[Scalar]], *, reverse: bool = False
     ) -> tuple[Scalar, ...]:
         """Apply a step to one index after the other; it takes the index and what was carried, and returns the new."""
         return self._loop(size, carry, lambda i, *state: (False, step(i, *state)), reverse=reverse)
+
+    def follow(
+        self,
+        sizes: Sequence[Scalar],
+        start: Callable[[Scalar], Scalar],
+        step: Callable[[Scalar, Scalar, Scalar], Scalar],
+        *,
+        reverse: bool = False,
+    ) -> EmittedTable:
+        """Return a new table of two axes whose rows follow each other, each column by itself."""
+        table = self.table(*sizes)
+
+        def of_column(j: Scalar) -> tuple[()]:
+            def of_row(i: Scalar, before: Scalar) -> tuple[Scalar]:
+                table[i, j] = x = step(i, j, before)
+                return (x,)
+
+            self.walk(sizes[0], (start(j),), of_row, reverse=reverse)
+            return ()
+
+        self.walk(sizes[1], (), of_column)
+        return table
 
     def until(
         self, most: int, carry: Sequence[Scalar], step: Callable[..., tuple[Scalar, Sequence[Scalar]]]
@@ -253,6 +373,11 @@ class EmittedLoops:
         (least,) = self.walk(size, (math.inf,), lambda i, least: (smaller(least, body(i)),))
         return least
 
+    def total(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> Scalar:
+        """Return the sum of what a body returns for the indices."""
+        (total,) = self.walk(size, (0.0,), lambda i, total: (total + body(i),))
+        return total
+
     def first_largest(self, size: Scalar, body: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
         """Return the largest of what a body returns, and the first index for which it does."""
         return self._first(size, body, -math.inf, lambda x, most: most < x)
@@ -278,7 +403,7 @@ class EmittedLoops:
     # ---- the function ----
 
     def module(self, routine: Callable[..., None], axes: Sequence[int]) -> str:
-        """Return the IR of ``routine(tables, lengths)``.
+        """Return the IR of ``routine(tables, lengths, allocate, free)``, which returns 0, or 1 where memory is short.
 
         Args:
             routine: takes loops, and a table for each array.
@@ -291,26 +416,60 @@ class EmittedLoops:
             tables.append(EmittedTable(self, pointer, [self._name(f"load i64, ptr {one}") for one in places]))
             place += count
         routine(self, *tables)
-        self._lines += [f"  call void @free(ptr {table})" for table in self._tables]
-        head = "define void @routine(ptr noalias %tables, ptr noalias %lengths) {"
-        return "\n".join([*_DECLARED, head, "entry:", *self._lines, "  ret void", "}", ""])
+        # What was taken is given back, the last one first, also where memory was too short for another.
+        end = [f"  br label %short{len(self._tables)}_end"]
+        for k in reversed(range(len(self._tables) + 1)):
+            before = f"[0, %{self._block}]" if k == len(self._tables) else f"[%status{k + 1}, %short{k + 1}_end]"
+            end += [] if k == len(self._tables) else [f"short{k}:", f"  br label %short{k}_end"]
+            end += [f"short{k}_end:", f"  %status{k} = phi i64 {before}"]
+            end[-1] += "" if k == len(self._tables) else f", [1, %short{k}]"
+            if k:
+                end += [f"  call void %free(ptr {self._tables[k - 1]})", f"  br label %short{k - 1}_end"]
+        head = "define i64 @routine(ptr noalias %tables, ptr noalias %lengths, ptr %allocate, ptr %free) nounwind {"
+        return "\n".join([*_DECLARED, head, "entry:", *self._lines, *end, "  ret i64 %status0", "}", ""])
 
 
 class EmittedTable:
-    """An array in memory, in C order."""
+    """An array in memory, or a part of one."""
 
-    def __init__(self, loops: EmittedLoops, pointer: str, lengths: Sequence[str]) -> None:
-        """Stand for an array by its address and the lengths of its axes."""
+    def __init__(
+        self, loops: EmittedLoops, pointer: str, lengths: Sequence[str], strides: Sequence[str] | None = None
+    ) -> None:
+        """Stand for an array by its address, the lengths of its axes, and how far apart their numbers are."""
         self._loops, self._pointer, self._lengths = loops, pointer, lengths
+        self._strides: list[str] = list(strides or [])
+        if strides is None:
+            # In C order.
+            self._strides = ["1"] * len(lengths)
+            for i in reversed(range(len(lengths) - 1)):
+                self._strides[i] = loops._product(self._strides[i + 1], lengths[i + 1])  # noqa: SLF001 - of one module
 
     @property
     def shape(self) -> tuple[Scalar, ...]:
         """How long the axes are."""
-        return tuple(self._loops._traced("i64", length) for length in self._lengths)  # noqa: SLF001 - of one module
+        return tuple(self._loops._traced("i64", length) for length in self._lengths)  # noqa: SLF001
 
     def row(self, i: Scalar) -> EmittedTable:
         """Return a row as a table of one axis less."""
-        return EmittedTable(self._loops, self._address((i, *[0] * (len(self._lengths) - 1))), self._lengths[1:])
+        return self.part(0, i)
+
+    def part(self, axis: int, k: Scalar) -> EmittedTable:
+        """Return the table without an axis, at one place of it."""
+        pointer = self._address((*[0] * axis, k, *[0] * (len(self._lengths) - axis - 1)))
+        lengths, strides = (list(x[:axis]) + list(x[axis + 1 :]) for x in (self._lengths, self._strides))
+        return EmittedTable(self._loops, pointer, lengths, strides)
+
+    def behind(self, k: Scalar, axis: int = 0) -> EmittedTable:
+        """Return the table from a place of an axis on."""
+        loops = self._loops
+        pointer = self._address((*[0] * axis, k, *[0] * (len(self._lengths) - axis - 1)))
+        length = loops._name(f"sub i64 {self._lengths[axis]}, {loops._text(k, 'i64')}")  # noqa: SLF001
+        return EmittedTable(loops, pointer, [*self._lengths[:axis], length, *self._lengths[axis + 1 :]], self._strides)
+
+    def shaped(self, *lengths: Scalar) -> EmittedTable:
+        """Return the first numbers of a whole table as one of other lengths."""
+        loops = self._loops
+        return EmittedTable(loops, self._pointer, [loops._text(x, "i64") for x in lengths])  # noqa: SLF001
 
     def __getitem__(self, key: Scalar) -> Scalar:
         """Return an element."""
@@ -326,9 +485,11 @@ class EmittedTable:
     def _address(self, key: Scalar) -> str:
         loops = self._loops
         indices = [loops._text(x, "i64") for x in (key if isinstance(key, tuple) else (key,))]  # noqa: SLF001
-        place = indices[0]
-        for index, length in zip(indices[1:], self._lengths[1:], strict=True):
-            place = loops._name(f"add i64 {loops._name(f'mul i64 {place}, {length}')}, {index}")  # noqa: SLF001
+        place = "0"
+        for index, stride in zip(indices, self._strides, strict=True):
+            if index != "0":
+                further = loops._product(index, stride)  # noqa: SLF001
+                place = further if place == "0" else loops._name(f"add i64 {place}, {further}")  # noqa: SLF001
         return loops._name(f"getelementptr double, ptr {self._pointer}, i64 {place}")  # noqa: SLF001
 
 

@@ -15,6 +15,7 @@ from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, 
 from armwright.kinematics.inverse_kinematics.solution import Branch, InverseSolution, Outcome, violations
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, nearest_rotation, orthonormality_error
+from armwright.tracing.vectors import cross, dot
 
 # A pose typed with a few digits is turned into a rotation up to this error; beyond it is a mistake.
 _TYPED_ROTATION = 2e-2
@@ -42,13 +43,26 @@ def exact_pose(X_BT: ArrayLike) -> Array:
         ShapeError: it is not (4, 4).
         InvalidValueError: it is no pose, not even one typed with two digits.
     """
-    X, error = _typed_poses(X_BT)
+    X = of_shape(X_BT, (4, 4), "pose", LARGEST)
+    if X.ndim == 2 and _is_computed(X):
+        return X
+    X, error = _typed_poses(X)
     if X.ndim != 2:
         raise ShapeError(f"pose: expected one pose, shape (4, 4), got {X.shape}; inverse_branches takes arrays of them")
     # A rotation that was computed is as exact as one can be; what is typed is off by far more.
     if float(error) < _COMPUTED:
         return X
     return homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
+
+
+def _is_computed(X: Array) -> bool:
+    """Whether a pose (4, 4) is as exact as one can be; what is not is looked at more closely."""
+    *rows, last = X.tolist()
+    if last != [0.0, 0.0, 0.0, 1.0]:
+        return False
+    a, b, c = ([row[j] for row in rows] for j in range(3))
+    near = all(abs(dot(x, x) - 1) < _COMPUTED for x in (a, b, c))
+    return near and all(abs(dot(x, y)) < _COMPUTED for x, y in ((a, b), (a, c), (b, c))) and dot(cross(a, b), c) > 0
 
 
 def typed_poses(X_BT: ArrayLike) -> Array:
