@@ -67,7 +67,7 @@ def derivative(
     if not callable(equation):
         raise KindError(f"equation: expected a function of scalars, got {shown(equation)}")
     name_of_equation = getattr(equation, "__name__", "")
-    title = name_of_equation if name_of_equation.isidentifier() else "equation"
+    title = name_of_equation if isinstance(name_of_equation, str) and name_of_equation.isidentifier() else "equation"
     # What the equation returns is known once it has run.
     trial = Graph()
     values, value_shape = _values(equation(*(trial.inputs(math.prod(shape)) for shape in shapes.values())))
