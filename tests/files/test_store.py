@@ -347,10 +347,10 @@ def test_full_disk(store: Store) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="open files are counted where Linux lists them")
-def test_a_folder_for_an_entry_stays_not_open(tmp_path: Path) -> None:
+def test_folder_in_place_of_an_entry_leaves_no_file_open(tmp_path: Path) -> None:
     """A folder where an entry should be counts as absent, and no file stays open."""
     (tmp_path / KEY).mkdir()
-    before = len(os.listdir("/proc/self/fd"))
+    before = len(list(Path("/proc/self/fd").iterdir()))
 
     assert all(Store(tmp_path).get(KEY) is None for _ in range(5))
-    assert len(os.listdir("/proc/self/fd")) == before
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
