@@ -344,3 +344,13 @@ def test_full_disk(store: Store) -> None:
     assert sorted(path.name for path in store.folder.iterdir()) == ["ab.lock"]
     assert get_or_make(store, KEY, lambda: DATA) == DATA == store.get(KEY)
     np.testing.assert_equal(store.get(KEY), DATA)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="open files are counted where Linux lists them")
+def test_folder_in_place_of_an_entry_leaves_no_file_open(tmp_path: Path) -> None:
+    """A folder where an entry should be counts as absent, and no file stays open."""
+    (tmp_path / KEY).mkdir()
+    before = len(list(Path("/proc/self/fd").iterdir()))
+
+    assert all(Store(tmp_path).get(KEY) is None for _ in range(5))
+    assert len(list(Path("/proc/self/fd").iterdir())) == before

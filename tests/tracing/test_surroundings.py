@@ -13,6 +13,7 @@ import pytest
 import armwright
 from armwright.arm.load import load_arm
 from armwright.compiled.arm import compile_arm
+from armwright.errors import ArmwrightError
 from armwright.tracing import native, surroundings
 from armwright.tracing.emit import emit
 from armwright.tracing.image import CAN_BE_LINKED, linked, placed
@@ -167,28 +168,28 @@ def test_code_in_memory_cannot_be_written() -> None:
     assert rights == "r-xp"
 
 
+@pytest.mark.skipif(not CAN_BE_LINKED, reason="LLVM loads objects of other forms")
 def test_memory_that_cannot_be_executed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Where the system refuses, LLVM loads the code, when it is made and when it is found again."""
+    """Where the system refuses memory for code an error says so, when code is made and when it is found again."""
 
     def refused(_image: bytes) -> tuple[int, object]:
-        raise OSError
+        raise OSError(13, "Permission denied")
 
     monkeypatch.setenv("ARMWRIGHT_CACHE", str(tmp_path))
     monkeypatch.setattr(native, "placed", refused)
+    emitted = emit("sum", lambda x: [[x[0] + 1.75]], {"x": 1}, shapes=[(1,)], origin="a refused sum")
     for _ in range(2):
-        monkeypatch.setattr(native, "_LOADED", {})
-        monkeypatch.setattr(native, "_REFERRED", {})
-        emitted = emit("sum", lambda x: [[x[0] + 1.75]], {"x": 1}, shapes=[(1,)], origin="a refused sum")
-        assert Kernel(emitted=emitted)([2.0]) == 3.75
+        with pytest.raises(ArmwrightError, match=r"memory that can be executed.*Permission denied"):
+            Kernel(emitted=emitted)([2.0])
 
 
 def test_another_processor_has_other_code(monkeypatch: pytest.MonkeyPatch) -> None:
     """What one processor has compiled is not found by another, by its name, its abilities or what the system says."""
     processor = native.processor()
-    keys = {native._key("some IR", "f")}
+    keys = {native._key("some IR", "f", False)}
     for other in (processor._replace(name="another"), processor._replace(features="+another")):
         monkeypatch.setattr(native, "processor", lambda other=other: other)
-        keys.add(native._key("some IR", "f"))
+        keys.add(native._key("some IR", "f", False))
     assert len(keys) == 3
 
     before = surroundings.surroundings.__wrapped__()

@@ -89,7 +89,7 @@ class _KernelMethod:
         method, name = self._method, self._method.__name__
         if compiled is None:
             return wraps(method)(lambda arm, *inputs, **options: getattr(arm, name)(*inputs, **options))
-        function = compiled._function(name, str(method.__doc__))  # noqa: SLF001 - where it is computed
+        function = compiled._function(name, method.__doc__ or "")  # noqa: SLF001 - where it is computed
         # Found there before this descriptor from now on.
         compiled.__dict__[name] = function
         return function

@@ -68,7 +68,7 @@ def derivative(
     if not callable(equation):
         raise KindError(f"equation: expected a function of scalars, got {shown(equation)}")
     name_of_equation = getattr(equation, "__name__", "")
-    title = name_of_equation if name_of_equation.isidentifier() else "equation"
+    title = name_of_equation if isinstance(name_of_equation, str) and name_of_equation.isidentifier() else "equation"
     values, value_shape = _tried(equation, shapes)
     if order == 2 and value_shape:
         raise InvalidValueError(

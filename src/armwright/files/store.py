@@ -140,10 +140,14 @@ def _trusted_store(folder: Path, name: str) -> Store:
 def cache_folder() -> Path | None:
     """Return the user's cache folder: ``$ARMWRIGHT_CACHE``, or armwright where the system keeps such folders.
 
-    None where the user has no home: no such variable is set and no such user is known, as in many containers.
+    None where the user has no home: no such variable is set and no such user is known, as in many containers; or where
+    the variable counts from a working directory that is gone.
     """
     if own := os.environ.get("ARMWRIGHT_CACHE"):
-        return Path(own).absolute()
+        try:
+            return Path(own).absolute()
+        except FileNotFoundError:
+            return None
     caches = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if not caches.is_absolute():
         try:
@@ -224,11 +228,15 @@ def _checksum(key: str, data: bytes) -> bytes:
 
 def _read(path: Path) -> bytes:
     """Return the bytes of a file that only the user can have written; they are checked as they lie in memory."""
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    with os.fdopen(handle, "rb") as file:
-        about = os.fstat(handle)
+    with open(path, "rb", opener=_opened) as file:
+        about = os.fstat(file.fileno())
         sound = stat.S_ISREG(about.st_mode) and _is_trusted(about.st_uid) and not about.st_mode & _WRITABLE_BY_OTHERS
         return file.read(about.st_size) if sound and about.st_size < _MAX_LENGTH else b""
+
+
+def _opened(path: str, _flags: int) -> int:
+    """Open a file to be read: no link, and nothing that would be waited for."""
+    return os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
 
 
 def _replace(path: Path, data: bytes) -> None:

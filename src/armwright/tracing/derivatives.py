@@ -35,9 +35,12 @@ def jacobian(outputs: Sequence[Scalar], inputs: Sequence[Traced]) -> Matrix:
 
     Returns:
         (outputs, inputs) traced scalars.
+
+    Raises:
+        TypeError: an output was traced in another graph.
     """
     graph = inputs[0].graph
-    ends = [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in outputs]
+    ends = [graph.node(x) for x in outputs]
     starts = [x.node for x in inputs]
     rows = None
     if not _may_divide_by_zero(graph, ends):

@@ -120,12 +120,14 @@ class Graph:
         """Return the node of a scalar, a traced one or a number.
 
         Raises:
-            TypeError: it was traced in another graph, as where the step of a scan takes it past its arguments.
+            TypeError: it was traced in another graph, as where an equation or a scan takes it past its arguments.
         """
         if not isinstance(x, Traced):
             return self.constant(float(x))
         if x.graph is not self:
-            raise TypeError("a scalar of another graph: a step of a scan takes scalars from its arguments only")
+            raise TypeError(
+                "a scalar of another graph: an equation, or a step of a scan, takes scalars from its arguments only"
+            )
         return x.node
 
     def known(self, node: Node) -> int | None:

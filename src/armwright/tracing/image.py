@@ -114,6 +114,8 @@ def placed(image: bytes) -> tuple[int, Any]:
     address = ctypes.addressof(keeper)
     if _protect()(address, len(code), mmap.PROT_READ | mmap.PROT_EXEC):
         raise OSError(ctypes.get_errno(), "memory cannot be made executable")
+    # While the interpreter ends, functions and threads may still call code whose module is gone.
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(keeper))
     return address + start, keeper
 
 

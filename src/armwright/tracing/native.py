@@ -6,16 +6,17 @@ What is loaded comes out of a store that checks every byte (``armwright.files.st
 import contextlib
 import hashlib
 import os
-import sys
 import threading
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Literal, NamedTuple
 
+from armwright.errors import ArmwrightError
 from armwright.files.store import user_store
 from armwright.tracing.emit_llvm import Target
 from armwright.tracing.image import CAN_BE_LINKED, linked, placed
 from armwright.tracing.surroundings import sources_are_unchanged, surroundings
+from armwright.version import __version__
 
 # Addresses of functions by their keys, with what keeps the code as long as the process lives; and by their references.
 _LOADED: dict[str, tuple[int, Any]] = {}
@@ -125,16 +126,19 @@ def _made(key: str, ir: str, name: str, quickly: bool) -> int:  # noqa: FBT001
             code = _compile(ir, quickly)
             image = linked(code, name)
             store.put(key, _OBJECT + name.encode() + b"\n" + code if image is None else _IMAGE + image)
-            _LOADED[key] = _engine(code, name) if image is None else _placed(image, code, name)
+            _LOADED[key] = _engine(code, name) if image is None else _placed(image)
             address = _LOADED[key][0]
         return address
 
 
-def _placed(image: bytes, code: bytes, name: str) -> tuple[int, Any]:
+def _placed(image: bytes) -> tuple[int, Any]:
     try:
         return placed(image)
-    except OSError:
-        return _engine(code, name)
+    except OSError as error:  # LLVM would run into the same, and end the process
+        raise ArmwrightError(
+            f"compiled functions need memory that can be executed, which this system refuses ({error.strerror}): allow "
+            "it for this process (execmem of SELinux), or call the plain functions"
+        ) from error
 
 
 def _compile(ir: str, quickly: bool = False) -> bytes:  # noqa: FBT001, FBT002
@@ -185,6 +189,9 @@ def _machine(effort: Literal[0, 1, 2] = 2) -> Any:
 def _key(ir: str, name: str, quickly: bool) -> str:  # noqa: FBT001
     """Name IR by itself, what compiles it, and the processor it is compiled for."""
     import llvmlite  # noqa: PLC0415
+    import llvmlite.binding as llvm  # noqa: PLC0415
 
-    parts = [ir, name, str(quickly), sys.platform, llvmlite.__version__, *map(str, processor())]
+    # Other versions of ours link otherwise, and processes of 32 bits run on the same processor.
+    compiler = __version__, llvmlite.__version__, llvm.llvm_version_info, llvm.get_process_triple()
+    parts = [ir, name, str(quickly), *map(str, compiler), *map(str, processor())]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -83,5 +83,5 @@ def _host() -> str:
     first, end, _ = text.partition("\n\n")
     lines = [line for line in first.splitlines() if line.startswith(_OF_PROCESSOR)]
     # What NumPy has asked the processor itself: an emulator may have fewer abilities than the machine that it runs on.
-    abilities = np.show_config(mode="dicts")["SIMD Extensions"]
+    abilities = np.show_config(mode="dicts").get("SIMD Extensions")
     return "\n".join([*lines, str(abilities)]) if end and len(lines) > 1 else ""
