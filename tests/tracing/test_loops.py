@@ -202,7 +202,7 @@ def test_arrays_as_they_come(run: Runner, rng: np.random.Generator) -> None:
     x, y = rng.normal(size=(5, 4)), rng.integers(0, 9, 5)
 
     for each in (x.T, np.ascontiguousarray(x.T)):
-        doubled, total = run(_two, [each, y], (4, 5), (1,))
+        doubled, total = run(_two, [each, np.asarray(y)], (4, 5), (1,))
         np.testing.assert_array_equal(doubled, (x.T + y) * 2)
         assert total == [y.max()]
 

@@ -292,6 +292,8 @@ class _PlainLoops:
         return tables
 
     def fill(self, tables: Sequence[_PlainTable], sizes: Sequence[int], body: Callable[..., Sequence[Scalar]]) -> None:
+        if not all(sizes):
+            return
         self._axis = len(sizes)
         values = body(*map(_Index, range(len(sizes)), sizes))
         self._axis = 0
