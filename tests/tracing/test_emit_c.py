@@ -127,8 +127,11 @@ def test_loops_of_long_arms(name: str, tmp_path: Path, sample: Sample) -> None:
 
     half = attrs.evolve(arm, joints=arm.joints[:10], links=arm.links[:10], motors=arm.motors[:10])
     texts = [source_text(one, names[:1], language) for one in (half, arm)]
-    assert all("for (int i = 0; i < " in text for text in texts)
-    assert len(texts[1]) < 1.7 * len(texts[0])
+    # On a device, arms that are straight code on the processor are so, too: the shorter one may be.
+    loops = ["for (int i = 0; i < " in text for text in texts]
+    assert loops[1]
+    assert loops[0] or language == "cuda"
+    assert not loops[0] or len(texts[1]) < 1.7 * len(texts[0])
     sample.record(f"rows of an arm of 20 joints with the processor's bits, {name}", rows, 0)
 
 
