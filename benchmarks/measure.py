@@ -58,6 +58,7 @@ def compiled_for(arm: Any, lanes: int) -> Any:
     host = _HOST.setdefault("it", native.processor())
     made_for = host if lanes >= host.target.lanes else native.Processor("haswell", "", Target(lanes, has_fma=True))
     native.processor = kernel.processor = lambda: made_for
+    native.surroundings = lambda: ""  # what this machine has compiled for itself is not to be found
     return CompiledArm(arm=arm)
 
 
