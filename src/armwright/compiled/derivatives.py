@@ -47,23 +47,24 @@ def derivative(
         (..., k, k), by all k numbers of these inputs together, one input behind the other.
 
     Raises:
-        KindError: ``equation`` is no function, or returns something else than scalars, or ``inputs`` is no mapping.
-        ShapeError: an input or a list of values has no numbers.
+        KindError: ``equation`` is no function, returns something else than scalars, or uses something else together
+            with a scalar; or ``inputs`` is no mapping of texts, or ``of`` no text or list of texts.
+        ShapeError: an input or a list of values has no numbers, or an input has more than 10 000.
         UnknownNameError: ``of`` names no input.
-        InvalidValueError: ``order`` is neither 1 nor 2, or 2 for more than a scalar; or the name of an input is no
-            identifier.
+        InvalidValueError: ``order`` is neither 1 nor 2, or 2 for more than a scalar; the name of an input is no
+            identifier; or the equation uses or returns a number beyond the range of float64.
 
     Source:
         Griewank & Walther (2008), Evaluating Derivatives, chapters 3 and 5.
     """
     shapes = _shapes(inputs)
-    names = [of] if isinstance(of, str) else list(of)
+    names = _names(of)
     for name in names:
         if name not in shapes:
             raise UnknownNameError("input", name, shapes)
     if not names:
         raise InvalidValueError("of: expected the name of an input, got none")
-    if order not in (1, 2):
+    if isinstance(order, bool) or not isinstance(order, Integral) or order not in (1, 2):
         raise InvalidValueError(f"order: expected 1 or 2, got {shown(order)}")
     if not callable(equation):
         raise KindError(f"equation: expected a function of scalars, got {shown(equation)}")
@@ -94,13 +95,28 @@ def derivative(
     return kernel.function(title, _DOC.format(", ".join(names)))
 
 
+# Numbers of one input at most: each is a node of the graph, and code is written for it.
+_MAX_NUMBERS = 10_000
+
 _DOC = "Return the values of the equation, and their derivatives by {}: see ``armwright.compiled.derivative``."
 
 
 def _shapes(inputs: Mapping[str, int | Shape]) -> dict[str, Shape]:
     if not isinstance(inputs, Mapping):
         raise KindError(f"inputs: expected names with sizes, such as {{'q': 6}}, got {shown(inputs)}")
+    for name in inputs:
+        if not isinstance(name, str):
+            raise KindError(f"inputs: expected the name of each to be a text, such as 'q', got {shown(name)}")
     return {name: _shape(name, value) for name, value in inputs.items()}
+
+
+def _names(of: str | Sequence[str]) -> list[str]:
+    """Return the names of the inputs to differentiate by."""
+    names: list[Any] = [of] if isinstance(of, str) or not isinstance(of, Iterable) else list(of)
+    for name in names:
+        if not isinstance(name, str):
+            raise KindError(f"of: expected the name of an input, or a list of such, got {shown(of)}")
+    return names
 
 
 def _shape(name: str, value: int | Shape) -> Shape:
@@ -108,6 +124,8 @@ def _shape(name: str, value: int | Shape) -> Shape:
     shape = tuple(int(size) for size in sizes if isinstance(size, Integral) and not isinstance(size, bool) and size > 0)
     if len(shape) < len(sizes):
         raise ShapeError(f"inputs: expected a size above 0, or a shape of such, for {name!r}, got {shown(value)}")
+    if math.prod(shape) > _MAX_NUMBERS:
+        raise ShapeError(f"inputs: expected at most {_MAX_NUMBERS:,} numbers for {name!r}, got {shown(value)}")
     return shape
 
 

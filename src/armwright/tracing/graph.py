@@ -10,6 +10,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
+
+from armwright.arrays import number
+
 _COMMUTE = frozenset({"add", "multiply"})
 # The values that a loop leaves.
 _OF_LOOPS = frozenset({"state", "each"})
@@ -121,9 +125,13 @@ class Graph:
 
         Raises:
             TypeError: it was traced in another graph, as where an equation or a scan takes it past its arguments.
+            KindError: it is neither a scalar nor a number.
+            InvalidValueError: it is a number beyond the range of float64.
         """
-        if not isinstance(x, Traced):
+        if isinstance(x, bool | np.bool_):
             return self.constant(float(x))
+        if not isinstance(x, Traced):
+            return self.constant(number(x, "equation"))
         if x.graph is not self:
             raise TypeError(
                 "a scalar of another graph: an equation, or a step of a scan, takes scalars from its arguments only"
