@@ -277,9 +277,15 @@ class _Target:
 
     def _size(self, node: int) -> float:
         """Return how large a value can be where all inputs are angles."""
-        for i in reachable(self.graph, [node]):
+        # What is known is not gone through again, which in a chain of sines would take time quadratic in its length.
+        waiting = [node]
+        while waiting:
+            op, operands, value = self.graph.nodes[waiting[-1]]
+            if unknown := [k for k in operands if k not in self._sizes and waiting[-1] not in self._sizes]:
+                waiting += unknown
+                continue
+            i = waiting.pop()
             if i not in self._sizes:
-                op, operands, value = self.graph.nodes[i]
                 sizes = [self._sizes[k] for k in operands]
                 constant = abs(value) if op == "constant" else LARGEST_ANGLE
                 self._sizes[i] = _SIZES[op](*sizes) if op in _SIZES else constant if not operands else math.inf
