@@ -21,6 +21,8 @@ Flags: TypeAlias = npt.NDArray[np.bool_]
 
 # Larger than any quantity of a robot; products of three such numbers are still finite.
 LARGEST = 1e100
+# No angle is larger: less than ten digits of its sine would be right.
+LARGEST_ANGLE = 1e12
 _ANY = sys.float_info.max
 
 

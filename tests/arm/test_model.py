@@ -288,3 +288,10 @@ def test_limits_of_all_joints() -> None:
         np.testing.assert_array_equal(limits.lower, arm.limits.lower)
         with pytest.raises(ValueError, match="read-only"):
             limits.lower[0] = 0.0
+
+
+@pytest.mark.parametrize("name", ["theta", "alpha"])
+def test_fixed_angles_that_have_no_sine(name: str) -> None:
+    """A fixed angle is no larger than a position may be: of a larger one no digit of the sine is right."""
+    with pytest.raises(InvalidValueError, match=rf"joint: {name} must not be larger than 1e\+12, got 1e\+15"):
+        Joint(kind="revolute", **{name: 1e15})

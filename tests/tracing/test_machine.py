@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from armwright.arrays import LARGEST
+from armwright.arrays import LARGEST, LARGEST_ANGLE
 from armwright.tracing.emit import Guarded, emit
 from armwright.tracing.graph import Graph, Traced
-from armwright.tracing.machine import LARGEST_ANGLE, MachineCode, Watched, fused, machine_code, scheduled, with_results
+from armwright.tracing.machine import MachineCode, Watched, fused, machine_code, scheduled, with_results
 from armwright.tracing.scalar import Scalar, atan2, cos, round_half_even, select, sin, sqrt
 from oracles.graphs import evaluate_machine
 

@@ -24,6 +24,7 @@ from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.units import PRISMATIC, REVOLUTE, JointUnits
 from armwright.arrays import (
     LARGEST,
+    LARGEST_ANGLE,
     Array,
     ArrayLike,
     Flags,
@@ -89,12 +90,12 @@ def _inertia(value: ArrayLike) -> Array:
     return read_only((tensor + tensor.T) / 2)  # to the last bit, so that six numbers tell it
 
 
-def _check_numbers(part: Any, what: str, names: Iterable[str], must: str = "") -> None:
+def _check_numbers(part: Any, what: str, names: Iterable[str], must: str = "", largest: float = LARGEST) -> None:
     """Make floats of fields that must be numbers, of one of ``_RANGES`` if any, while their part is being built."""
     for name in names:
         value = number(getattr(part, name), f"{what}: {name}")
-        if LARGEST < abs(value) < math.inf:
-            raise InvalidValueError(f"{what}: {name} must not be larger than {LARGEST:g}, got {value:g}")
+        if largest < abs(value) < math.inf:
+            raise InvalidValueError(f"{what}: {name} must not be larger than {largest:g}, got {value:g}")
         if must and not _RANGES[must](value):
             raise InvalidValueError(f"{what}: {name} must be {must}, got {value:g}")
         object.__setattr__(part, name, value)
@@ -179,7 +180,8 @@ class Joint:
             raise InvalidValueError(f"joint: expected kind revolute or prismatic, got {shown(self.kind)}")
         if not isinstance(self.limits, Limits):
             raise KindError(f"joint: expected limits to be Limits, got {shown(self.limits)}")
-        _check_numbers(self, "joint", ("theta", "d", "a", "alpha"), "finite")
+        _check_numbers(self, "joint", ("d", "a"), "finite")
+        _check_numbers(self, "joint", ("theta", "alpha"), "finite", LARGEST_ANGLE)
 
     @property
     def revolute(self) -> bool:

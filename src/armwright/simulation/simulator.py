@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
-from armwright.arrays import Array, ArrayLike, exact_shape, one_per_joint, positive
+from armwright.arrays import LARGEST_ANGLE, Array, ArrayLike, exact_shape, one_per_joint, positive
 from armwright.dynamics.accelerations import check_pivots, eliminated
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
@@ -27,7 +27,6 @@ from armwright.simulation.controllers import Controller, no_effort
 from armwright.simulation.integrators import Gill, Integrator, Slope, Step, first_crossing
 from armwright.simulation.plant import Moment, Phase, Plant, Start
 from armwright.simulation.result import Brake, Event, JointState, Simulation, Status
-from armwright.tracing.machine import LARGEST_ANGLE
 
 # So many events within so short a time [s] are an entanglement.
 _ENTANGLED = 50

@@ -15,12 +15,11 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import LARGEST, Array, ArrayLike, cores, floats, leading_axes
+from armwright.arrays import LARGEST, LARGEST_ANGLE, Array, ArrayLike, cores, floats, leading_axes
 from armwright.errors import InvalidValueError, ShapeError, shown
 from armwright.tracing.door import Door, Origin, Passed
 from armwright.tracing.emit import Emitted, Shape
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
-from armwright.tracing.machine import LARGEST_ANGLE
 from armwright.tracing.native import function_address, processor
 
 # Rows are given to threads in multiples of this, so that every one but the last works on whole vectors.

@@ -23,7 +23,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from armwright.arrays import LARGEST
+from armwright.arrays import LARGEST, LARGEST_ANGLE
 from armwright.tracing.elementary import arc_tangent, root, rounded, sine_cosine
 from armwright.tracing.graph import Graph, Loop, LoopStep, Node, Traced, reachable
 from armwright.tracing.scalar import select
@@ -35,8 +35,6 @@ _SUMS = frozenset({"add", "subtract"})
 # What the library of a language has for each type of numbers.
 _OF_A_LIBRARY = frozenset({"sin", "cos", "atan2", "round"})
 
-# No input whose sine is taken is larger: less than ten digits would be right.
-LARGEST_ANGLE = 1e12
 # No angle beyond has a sine: what an equation computes of its inputs may be one.
 _LARGEST_REDUCED = 1e15
 
