@@ -280,10 +280,12 @@ def _backward(loops: Loops, way: Table, between: Callable[[Scalar], Scalar], rou
 
     def of_interval(i: Scalar) -> list[Scalar]:
         back = loops.largest(each, lambda k: farthest[i, k] - way[i, k])
-        # Between two samples the tool is away from the chord by so much at most, before it reverses and after. Where
-        # the chord rises by four times that, the tool never reverses.
+        # Between two samples the tool is away from the chord by so much at most, before it reverses and after. Its
+        # speed differs from the slope of the chord by four times that over the step at most, so that where the chord
+        # rises by more, the tool never reverses.
         rises = loops.least(each - 1, lambda k: way[i, k + 1] - way[i, k]) > 4 * between(i)
-        # The end of an interval is the start of the next, but for rounding.
+        # The end of an interval is the start of the next, but for the rounding of a position of the tool: the position
+        # on the line is computed from that.
         return [select(select(rises, back <= rounding, False), 0.0, back + 2 * most)]
 
     (backs,) = loops.each([m], of_interval)
