@@ -191,7 +191,11 @@ def test_numbers_that_are_none() -> None:
         ({"of": ("q", 5)}, KindError, "of: expected the name of an input"),
         ({"of": "q", "order": True}, InvalidValueError, "order: expected 1 or 2, got True"),
         ({"of": "q", "equation": lambda _q, _p: 10**400}, InvalidValueError, "equation: expected a number no larger"),
-        ({"of": "q", "equation": lambda q, _p: 10**400 * q[0]}, InvalidValueError, "equation: expected a number no lar"),
+        (
+            {"of": "q", "equation": lambda q, _p: 10**400 * q[0]},
+            InvalidValueError,
+            "equation: expected a number no lar",
+        ),
         ({"of": "q", "equation": lambda q, _p: q[0] * "3"}, KindError, "equation: expected a number, got '3'"),
         ({"of": "q", "equation": lambda q, _p: "a" + q[0]}, KindError, "equation: expected a number, got 'a'"),
         ({"of": "q", "equation": lambda q, _p: q[0] * 1j}, KindError, "equation: expected a number, got 1j"),

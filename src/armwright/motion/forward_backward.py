@@ -1,7 +1,8 @@
 """The largest x = s'² along a path under bounds |a u + b x + c| <= 1 with u = s'' constant on every interval.
 
 Two passes: backward, from the end, the largest x from which the end can still be reached, by the one linear inequality
-that each bound makes of what comes after; forward, from the start, the largest u that stays below them. Standing still, x = u = 0, keeps all bounds, so there is always a path.
+that each bound makes of what comes after; forward, from the start, the largest u that stays below them. Standing still,
+x = u = 0, keeps all bounds, so there is always a path.
 """
 
 from __future__ import annotations
