@@ -49,6 +49,7 @@ bound = st.one_of(st.just(math.inf), positive)
 # An arm file does not take limits of a revolute joint beyond a thousand turns.
 turned = st.one_of(st.just(math.inf), st.floats(1e-99, 6000.0))
 number = st.floats(-1e99, 1e99)
+angle = st.floats(-1e12, 1e12)
 
 
 @settings(max_examples=examples(100), suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -56,10 +57,10 @@ number = st.floats(-1e99, 1e99)
     joint=st.builds(
         Joint,
         kind=st.sampled_from(("revolute", "prismatic")),
-        theta=number,
+        theta=angle,
         d=number,
         a=number,
-        alpha=number,
+        alpha=angle,
         limits=st.builds(
             Limits, lower=turned.map(lambda x: -x), upper=turned, speed=bound, acceleration=bound, effort=bound
         ),
