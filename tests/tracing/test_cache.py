@@ -32,7 +32,7 @@ from armwright.tracing.emit import emit
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import sin
 compile_ir, compiled = native._compile, []
-native._compile = lambda ir, *how: compiled.append(ir) or compile_ir(ir, *how)
+native._compile = lambda ir, **how: compiled.append(ir) or compile_ir(ir, **how)
 kernel = Kernel(emitted=emit("wave", lambda x: [[sin(x[0]) * 1.25]], {"x": 1}))
 print(repr(float(kernel(np.array([0.5]))[0])), int(not compiled))
 """

@@ -326,7 +326,7 @@ def test_a_signal_ends_a_call_and_its_work(monkeypatch: pytest.MonkeyPatch) -> N
     """When a call ends early no thread works on its arrays any more, and parts not begun are left out."""
     kernel = Kernel(emitted=emit("ends", lambda x: [[x[0]]], {"x": 1}))
     begun, ended = threading.Event(), []
-    monkeypatch.setattr(kernels, "_ROWS_BETWEEN_SIGNALS", LANES)
+    monkeypatch.setattr(kernels, "ROWS_BETWEEN_SIGNALS", LANES)
 
     def rows(first: int, _last: int, _arrays: Any) -> int:
         if not first:

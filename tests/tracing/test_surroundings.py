@@ -186,10 +186,10 @@ def test_memory_that_cannot_be_executed(monkeypatch: pytest.MonkeyPatch, tmp_pat
 def test_another_processor_has_other_code(monkeypatch: pytest.MonkeyPatch) -> None:
     """What one processor has compiled is not found by another, by its name, its abilities or what the system says."""
     processor = native.processor()
-    keys = {native._key("some IR", "f", False)}
+    keys = {native._key("some IR", "f", quickly=False)}
     for other in (processor._replace(name="another"), processor._replace(features="+another")):
         monkeypatch.setattr(native, "processor", lambda other=other: other)
-        keys.add(native._key("some IR", "f", False))
+        keys.add(native._key("some IR", "f", quickly=False))
     assert len(keys) == 3
 
     before = surroundings.surroundings.__wrapped__()

@@ -32,8 +32,9 @@ _READABLE, _WRITABLE = 0x101, 0x501
 _METH_FASTCALL, _METH_KEYWORDS = 0x80, 0x02
 # From so many rows on other threads of Python may run meanwhile.
 _ROWS_TO_LET_GO = 256
-# From so many rows a call on one thread goes to the function in Python, which hears signals meanwhile.
-_ROWS_ALONE = 65536
+# After so many rows, milliseconds of work, a signal is heard; a multiple of the lanes. From as many on a call on one
+# thread goes to the function in Python, which hears them.
+ROWS_BETWEEN_SIGNALS = 65536
 
 # What a function needs to know, by the places in its table; the arrays follow, inputs first.
 _FIELDS = (
@@ -41,7 +42,6 @@ _FIELDS = (
     "PyObject_Vectorcall", "PyTuple_New", "PyTuple_SetItem", "PyLong_FromSsize_t", "Py_IncRef", "Py_DecRef",
     "PyEval_SaveThread", "PyEval_RestoreThread",
 )  # fmt: skip
-_PLACE = {name: 8 * i for i, name in enumerate(_FIELDS)}
 # The same for the function of a routine.
 _OF_ROUTINE = (
     "careful", "array_type", "none", "kind", "PyObject_Vectorcall", "Py_IncRef", "PyMem_RawMalloc", "PyMem_RawFree"
@@ -98,7 +98,7 @@ class Door:
         """Tell where a function of the kernel is, ``single`` or ``rows``; before, the careful function is called."""
         self._kernels[part] = address
         for table in self._tables:
-            ctypes.c_uint64.from_address(_address_of(table) + _PLACE[part]).value = address
+            ctypes.c_uint64.from_address(_address_of(table) + 8 * _FIELDS.index(part)).value = address
 
     def open(
         self, name: str, doc: str, careful: Callable[..., Any], origin: Origin | None = None
@@ -127,9 +127,7 @@ class Door:
         numbers = len(self._inputs), len(self._outputs)
         address = function_address(lambda: _ir(*numbers), "call", f"{__name__} {numbers}", quickly=True)
         texts = name.encode(), doc.encode()
-        definition = [_address_of(texts[0]), address, _METH_FASTCALL | _METH_KEYWORDS, _address_of(texts[1])]
-        table = _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())
-        # The object of the function owns the table, and the table all that it points to.
+        table = _table(words, address, *map(_address_of, texts))
         table.keep = (careful, shapes, kinds, texts, np.empty, _OUT, _THREADS)
         table.origin = origin
         self._tables.append(table)
@@ -161,10 +159,18 @@ class RoutineDoor:
                  "kind": id(np.dtype(np.float64)), **_api()}  # fmt: skip
         words = [known[field] for field in _OF_ROUTINE]
         text = name.encode()
-        definition = [_address_of(text), address, _METH_FASTCALL | _METH_KEYWORDS, 0]
-        table = _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())
+        table = _table(words, address, _address_of(text), 0)
         table.keep, table.origin = (careful, text), None
         return _built_in(table, 8 * len(words))
+
+
+def _table(words: Sequence[int], address: int, name: int, doc: int) -> _Table:
+    """Return a table: what its function needs to know, and the definition of the function, by addresses.
+
+    The object of the function owns the table, and the table has to keep all that it points to.
+    """
+    definition = [name, address, _METH_FASTCALL | _METH_KEYWORDS, doc]
+    return _Table(np.array([*words, *definition], dtype=np.uint64).tobytes())
 
 
 def _built_in(table: _Table, definition: int) -> Callable[..., Any]:
@@ -210,11 +216,12 @@ def layout_is_known() -> bool:
 
 
 class _Text:
-    """The IR of one function."""
+    """The IR of one function, whose table has the given fields."""
 
-    def __init__(self) -> None:
+    def __init__(self, fields: Sequence[str]) -> None:
         self.lines: list[str] = []
         self._count = 0
+        self._fields = fields
 
     def let(self, expression: str) -> str:
         self._count += 1
@@ -231,7 +238,7 @@ class _Text:
         return self.let(f"load {kind}, ptr {self.at(pointer, offset)}")
 
     def known(self, name: str, kind: str = "ptr") -> str:
-        return self.load(kind, "%table", _PLACE[name])
+        return self.load(kind, "%table", 8 * self._fields.index(name))
 
     def of(self, array: int, name: str, kind: str = "i64") -> str:
         return self.load(kind, "%table", 8 * len(_FIELDS) + _STRIDE * array + 8 * _OF_ARRAY.index(name))
@@ -254,18 +261,30 @@ class _Text:
     def call(self, kind: str, function: str, *operands: str) -> str:
         return self.let(f"call {kind} {function}({', '.join(operands)})")
 
+    def begin(self, arrays: int) -> None:
+        """Begin a built-in function, which has room for the addresses of so many arrays."""
+        self.do("define ptr @call(ptr %self, ptr %args, i64 %nargs, ptr %names) nounwind {")
+        self.do("entry:")
+        self.do(f"%table = getelementptr i8, ptr %self, i64 {_BYTES_DATA}")
+        self.do(f"%arrays = alloca [{arrays} x ptr]")
+
+    def end(self) -> str:
+        """End it with what the careful function answers to the same arguments, and return all of it."""
+        self.do("careful:")
+        operands = f"ptr {self.known('careful')}", "ptr %args", "i64 %nargs", "ptr %names"
+        self.do(f"ret ptr {self.call('ptr', self.known('PyObject_Vectorcall'), *operands)}")
+        self.do("}")
+        return "\n".join([*self.lines, ""])
+
 
 @cache
 def _ir(inputs: int, outputs: int) -> str:
     """Return the IR of ``call``, with the signature of a built-in function, for so many arrays."""
-    text = _Text()
+    text = _Text(_FIELDS)
     every, ins, outs = range(inputs + outputs), range(inputs), range(inputs, inputs + outputs)
-    text.do("define ptr @call(ptr %self, ptr %args, i64 %nargs, ptr %names) nounwind {")
-    text.do("entry:")
-    text.do(f"%table = getelementptr i8, ptr %self, i64 {_BYTES_DATA}")
-    text.do(f"%arrays = alloca [{len(every)} x ptr]")
+    text.begin(len(every))
     text.do("%pair = alloca [2 x ptr]")
-    text.do("%none = load ptr, ptr " + text.at("%table", _PLACE["none"]))
+    text.do("%none = load ptr, ptr " + text.at("%table", 8 * _FIELDS.index("none")))
     text.unless(text.equal("%nargs", inputs, "i64"), "careful")
     text.do("br label %start")
     text.do("start:")
@@ -298,64 +317,51 @@ def _ir(inputs: int, outputs: int) -> str:
     text.unless(
         text.all([text.equal(text.load("ptr", x, _TYPE), text.known("array_type")) for x in objects]), "careful"
     )
-    text.unless(text.all([_is_plain(text, x, k, _READABLE) for k, x in enumerate(objects)]), "careful")
+    text.unless(
+        text.all([_is_plain(text, x, text.of(k, "kind", "ptr"), _READABLE) for k, x in enumerate(objects)]), "careful"
+    )
     axes = [text.let(f"sext i32 {text.load('i32', x, _AXES)} to i64") for x in objects]
     text.do(f"br i1 {text.equal(axes[0], text.of(0, 'axes'), 'i64')}, label %one, label %many")
     for many in (False, True):
         _case(text, objects, axes, ins, outs, many=many)
-    text.do("careful:")
-    call = text.known("PyObject_Vectorcall")
-    answer = text.call("ptr", call, f"ptr {text.known('careful')}", "ptr %args", "i64 %nargs", "ptr %names")
-    text.do(f"ret ptr {answer}")
-    text.do("}")
-    return "\n".join([*text.lines, ""])
+    return text.end()
 
 
 @cache
 def _ir_of_routine(axes: tuple[int, ...]) -> str:
     """Return the IR of ``call`` for arrays that have so many axes each."""
-    text = _Text()
-    text.do("define ptr @call(ptr %self, ptr %args, i64 %nargs, ptr %names) nounwind {")
-    text.do("entry:")
-    text.do(f"%table = getelementptr i8, ptr %self, i64 {_BYTES_DATA}")
-    text.do(f"%arrays = alloca [{len(axes)} x ptr]")
+    text = _Text(_OF_ROUTINE)
+    text.begin(len(axes))
     text.do(f"%lengths = alloca [{max(sum(axes), 1)} x i64]")
-    places = {name: 8 * i for i, name in enumerate(_OF_ROUTINE)}
-    known = {name: text.load("ptr", "%table", place) for name, place in places.items()}
+    array_type, kind = text.known("array_type"), text.known("kind")
     text.unless(text.equal("%nargs", len(axes), "i64"), "careful")
     text.unless(text.equal("%names", "null"), "careful")
     place = 0
     for k, count in enumerate(axes):
         x = text.load("ptr", "%args", 8 * k)
-        text.unless(text.equal(text.load("ptr", x, _TYPE), known["array_type"]), "careful")
-        flags = text.let(f"and i32 {text.load('i32', x, _FLAGS)}, {_READABLE}")
-        plain = [text.equal(flags, _READABLE, "i32"), text.equal(text.load("i32", x, _AXES), count, "i32")]
-        text.unless(text.all([*plain, text.equal(text.load("ptr", x, _KIND), known["kind"])]), "careful")
+        text.unless(text.equal(text.load("ptr", x, _TYPE), array_type), "careful")
+        same_axes = text.equal(text.load("i32", x, _AXES), count, "i32")
+        text.unless(text.all([_is_plain(text, x, kind, _READABLE), same_axes]), "careful")
         text.do(f"store ptr {text.load('ptr', x, _DATA)}, ptr {text.at('%arrays', 8 * k)}")
         found = text.load("ptr", x, _LENGTHS) if count else ""
         for i in range(count):
             text.do(f"store i64 {text.load('i64', found, 8 * i)}, ptr {text.at('%lengths', 8 * (place + i))}")
         place += count
-    memory = f"ptr {known['PyMem_RawMalloc']}", f"ptr {known['PyMem_RawFree']}"
+    memory = [f"ptr {text.known(name)}" for name in ("PyMem_RawMalloc", "PyMem_RawFree")]
     status = text.call("i64", "@routine", "ptr %arrays", "ptr %lengths", *memory)
     text.unless(text.equal(status, 0, "i64"), "careful")
-    text.do(f"call void {known['Py_IncRef']}(ptr {known['none']})")
-    text.do(f"ret ptr {known['none']}")
-    text.do("careful:")
-    operands = f"ptr {known['careful']}", "ptr %args", "i64 %nargs", "ptr %names"
-    text.do(f"ret ptr {text.call('ptr', known['PyObject_Vectorcall'], *operands)}")
-    text.do("}")
-    return "\n".join([*text.lines, ""])
+    none = text.known("none")
+    text.do(f"call void {text.known('Py_IncRef')}(ptr {none})")
+    text.do(f"ret ptr {none}")
+    return text.end()
 
 
-def _is_plain(text: _Text, array: str, k: int, flags: int) -> str:
+def _is_plain(text: _Text, array: str, kind: str, flags: int) -> str:
     found = text.let(f"and i32 {text.load('i32', array, _FLAGS)}, {flags}")
-    return text.all(
-        [text.equal(found, flags, "i32"), text.equal(text.load("ptr", array, _KIND), text.of(k, "kind", "ptr"))]
-    )
+    return text.all([text.equal(found, flags, "i32"), text.equal(text.load("ptr", array, _KIND), kind)])
 
 
-def _fits(text: _Text, array: str, k: int, many: bool, axes: str = "") -> list[str]:  # noqa: FBT001
+def _fits(text: _Text, array: str, k: int, axes: str = "", *, many: bool) -> list[str]:
     """Write whether the axes of an array are those of a value, behind that of the rows; checks how many first."""
     axes = axes or text.let(f"sext i32 {text.load('i32', array, _AXES)} to i64")
     own = text.of(k, "axes")
@@ -384,19 +390,19 @@ def _case(text: _Text, objects: Sequence[str], axes: Sequence[str], ins: range, 
         text.unless(text.equal(axes[0], text.let(f"add i64 {text.of(0, 'axes')}, 1"), "i64"), "careful")
         text.do("%rows = load i64, ptr " + text.load("ptr", objects[0], _LENGTHS))
         # The function in Python hears signals between parts of many rows.
-        most = text.let(f"select i1 %alone, i64 {_ROWS_ALONE}, i64 {text.known('few', 'i64')}")
+        most = text.let(f"select i1 %alone, i64 {ROWS_BETWEEN_SIGNALS}, i64 {text.known('few', 'i64')}")
         text.unless(text.let(f"icmp ult i64 %rows, {most}"), "careful")
     for k, x in zip(ins, objects, strict=True):
-        text.unless(text.all(_fits(text, x, k, many, axes[k])), "careful")
+        text.unless(text.all(_fits(text, x, k, axes[k], many=many)), "careful")
         text.do(f"store ptr {text.load('ptr', x, _DATA)}, ptr {text.at('%arrays', 8 * k)}")
     text.do(f"br i1 {text.equal('%out', '%none')}, label %{case}_new, label %{case}_given")
     text.do(f"{case}_new:")
     fresh: list[str] = []
     for k in outs:
-        x = _new_array(text, k, many, fresh, case)
+        x = _new_array(text, k, fresh, case, many=many)
         text.do(f"store ptr {text.load('ptr', x, _DATA)}, ptr {text.at('%arrays', 8 * k)}")
         fresh.append(x)
-    status = _status(text, many, f"{case}_new")
+    status = _status(text, f"{case}_new", many=many)
     text.do(f"br i1 {text.equal(status, 0, 'i64')}, label %{case}_made, label %{case}_drop")
     text.do(f"{case}_drop:")
     for x in fresh:
@@ -423,18 +429,19 @@ def _case(text: _Text, objects: Sequence[str], axes: Sequence[str], ins: range, 
         text.unless(text.equal(text.load("i64", "%out", _TUPLE_SIZE), len(outs), "i64"), "careful")
         given = [text.load("ptr", "%out", _TUPLE_ITEMS + 8 * i) for i in range(len(outs))]
     text.unless(text.all([text.equal(text.load("ptr", x, _TYPE), text.known("array_type")) for x in given]), "careful")
-    text.unless(text.all([_is_plain(text, x, k, _WRITABLE) for k, x in zip(outs, given, strict=True)]), "careful")
+    kinds = [text.of(k, "kind", "ptr") for k in outs]
+    text.unless(text.all([_is_plain(text, *pair, _WRITABLE) for pair in zip(given, kinds, strict=True)]), "careful")
     for k, x in zip(outs, given, strict=True):
-        text.unless(text.all(_fits(text, x, k, many)), "careful")
+        text.unless(text.all(_fits(text, x, k, many=many)), "careful")
         text.do(f"store ptr {text.load('ptr', x, _DATA)}, ptr {text.at('%arrays', 8 * k)}")
-    text.unless(text.all(_apart(text, many, ins, outs)), "careful")
-    status = _status(text, many, f"{case}_given")
+    text.unless(text.all(_apart(text, ins, outs, many=many)), "careful")
+    status = _status(text, f"{case}_given", many=many)
     text.unless(text.equal(status, 0, "i64"), "careful")
     text.do(f"call void {text.known('Py_IncRef')}(ptr %out)")
     text.do("ret ptr %out")
 
 
-def _apart(text: _Text, many: bool, ins: range, outs: range) -> list[str]:  # noqa: FBT001
+def _apart(text: _Text, ins: range, outs: range, *, many: bool) -> list[str]:
     """Write whether no array to fill shares memory with another array."""
     ends = {}
     for k in (*ins, *outs):
@@ -451,7 +458,7 @@ def _apart(text: _Text, many: bool, ins: range, outs: range) -> list[str]:  # no
     return apart
 
 
-def _new_array(text: _Text, k: int, many: bool, before: Sequence[str], case: str) -> str:  # noqa: FBT001
+def _new_array(text: _Text, k: int, before: Sequence[str], case: str, *, many: bool) -> str:
     """Write the making of an array; an error of that is the answer."""
     shape = text.of(k, "shape", "ptr")
     if many:
@@ -486,7 +493,7 @@ def _new_array(text: _Text, k: int, many: bool, before: Sequence[str], case: str
     return made
 
 
-def _status(text: _Text, many: bool, label: str) -> str:  # noqa: FBT001
+def _status(text: _Text, label: str, *, many: bool) -> str:
     """Write the call of the kernel; for many rows other threads of Python may run meanwhile."""
     if not many:
         return text.call("i64", text.known("single"), "ptr %arrays")

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from armwright.arrays import LARGEST, LARGEST_ANGLE, Array, ArrayLike, cores, floats, leading_axes
 from armwright.errors import InvalidValueError, ShapeError, shown
-from armwright.tracing.door import Door, Origin, Passed
+from armwright.tracing.door import ROWS_BETWEEN_SIGNALS, Door, Origin, Passed
 from armwright.tracing.emit import Emitted, Shape
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL
 from armwright.tracing.native import function_address, processor
@@ -30,8 +30,6 @@ CalledOff: TypeAlias = npt.NDArray[np.int64]
 
 # Below this many rows a second thread costs more than it saves.
 _ROWS_PER_THREAD = 4096
-# After so many rows, milliseconds of work, a signal is heard; a multiple of the lanes.
-_ROWS_BETWEEN_SIGNALS = 65536
 
 
 @attrs.frozen(kw_only=True, eq=False, slots=False)
@@ -201,9 +199,9 @@ class Kernel:
 
         def work(first: int, last: int) -> int:
             status = 0
-            for start in range(first, last, _ROWS_BETWEEN_SIGNALS):
+            for start in range(first, last, ROWS_BETWEEN_SIGNALS):
                 if not called_off:
-                    status |= run(start, min(start + _ROWS_BETWEEN_SIGNALS, last), addresses)
+                    status |= run(start, min(start + ROWS_BETWEEN_SIGNALS, last), addresses)
             return status
 
         parts = _parts(rows, threads, max(rows // _ROWS_PER_THREAD, 1))

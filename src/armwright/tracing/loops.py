@@ -18,7 +18,6 @@ import numpy as np
 
 from armwright.arrays import Array, Flags
 from armwright.tracing.door import RoutineDoor, layout_is_known
-from armwright.tracing.emit_loops import EmittedLoops
 from armwright.tracing.native import function_address
 from armwright.tracing.scalar import Scalar
 
@@ -156,6 +155,8 @@ def _function(routine: Routine, axes: tuple[int, ...]) -> Callable[..., None]:
     origin = f"routine {module} {name} {axes}" if known else ""
 
     def ir() -> str:
+        from armwright.tracing.emit_loops import EmittedLoops  # noqa: PLC0415 - not needed by later processes
+
         return EmittedLoops().module(routine, axes) + door.ir()
 
     if not layout_is_known():

@@ -66,8 +66,8 @@ def function_address(ir: str | Callable[[], str], name: str, origin: str = "", *
         name: of the function.
         origin: what the IR follows from, in surroundings that are the same: a process that finds the code by it does
             not ask for the IR. Empty where that cannot be said.
-        quickly: whether it is compiled with the least effort, in a third of the time: for code that runs so seldom
-            that its speed does not matter. The bits of its results are the same.
+        quickly: whether it is compiled with the least effort, in a third of the time: for code of which a call takes
+            so little that its speed does not matter. The bits of its results are the same.
     """
     reference = _reference(name, origin and f"{origin} {quickly}")
     if reference and (known := _REFERRED.get(reference)):
@@ -76,10 +76,10 @@ def function_address(ir: str | Callable[[], str], name: str, origin: str = "", *
     address = None if key is None else _loaded(key)
     if address is None:
         text = ir if isinstance(ir, str) else ir()
-        key = _key(text, name, quickly)
+        key = _key(text, name, quickly=quickly)
         address = _loaded(key)
         if address is None:
-            address = _made(key, text, name, quickly)
+            address = _made(key, text, name, quickly=quickly)
         if reference and sources_are_unchanged():
             user_store("compiled").put(reference, _REFERENCE + key.encode())
     if reference:
@@ -117,13 +117,13 @@ def _loaded(key: str) -> int | None:
     return _LOADED[key][0] if key in _LOADED else None
 
 
-def _made(key: str, ir: str, name: str, quickly: bool) -> int:  # noqa: FBT001
+def _made(key: str, ir: str, name: str, *, quickly: bool) -> int:
     store = user_store("compiled")
     # Others are waited for without the lock of this process, so that a fork does not wait for them.
     with store.locked(key):
         address = _loaded(key)  # another process may have made it meanwhile
         if address is None:
-            code = _compile(ir, quickly)
+            code = _compile(ir, quickly=quickly)
             image = linked(code, name)
             store.put(key, _OBJECT + name.encode() + b"\n" + code if image is None else _IMAGE + image)
             _LOADED[key] = _engine(code, name) if image is None else _placed(image)
@@ -141,7 +141,7 @@ def _placed(image: bytes) -> tuple[int, Any]:
         ) from error
 
 
-def _compile(ir: str, quickly: bool = False) -> bytes:  # noqa: FBT001, FBT002
+def _compile(ir: str, *, quickly: bool = False) -> bytes:
     import llvmlite.binding as llvm  # noqa: PLC0415
 
     lines, quotients = ir.count("\n"), ir.count(" fdiv ") + ir.count("@llvm.sqrt")
@@ -186,8 +186,8 @@ def _machine(effort: Literal[0, 1, 2] = 2) -> Any:
     )
 
 
-def _key(ir: str, name: str, quickly: bool) -> str:  # noqa: FBT001
-    """Name IR by itself, what compiles it, and the processor it is compiled for."""
+def _key(ir: str, name: str, *, quickly: bool) -> str:
+    """Name code by its IR and function, by what compiles it and how, and by the processor it is compiled for."""
     import llvmlite  # noqa: PLC0415
     import llvmlite.binding as llvm  # noqa: PLC0415
 
