@@ -22,6 +22,7 @@ from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.loops import Loops, Runner, Table
 from armwright.tracing.scalar import Scalar, larger, select, smaller, sqrt
+from armwright.tracing.vectors import Matrix, dot
 
 # What a bound may add to what is seen, in parts of what is allowed; samples are taken so densely that it does not
 # exceed it, but no fewer and no more on an interval than these.
@@ -169,21 +170,17 @@ def _even_samples(loops: Loops, *tables: Table) -> None:
     loops.fill([q], [m, samples, joints], position)
 
 
-def error_of(
-    samples: HandSamples, errors: Array, half: Array, *, orientation: Array | None = None, backward: float | None = None
-) -> TrackingError:
+def error_of(samples: HandSamples, errors: Array, half: Array) -> TrackingError:
     """Return the error from what is measured at the samples.
 
     Args:
         samples: of the tool, (m, k + 1).
         errors: (m, k + 1) distances from the path [m].
         half: (m,) the largest sines of half the angles from its orientation.
-        orientation: (m,) upper bound of the sine of half the angle; by the bounds of the samples when left out.
-        backward: how far the tool runs backwards [m].
     """
     between = samples.step**2 / 8
     largest = errors.max(axis=1)
-    bound = half + between * samples.bounds.orientation if orientation is None else orientation
+    bound = half + between * samples.bounds.orientation
     rounding = ROUNDINGS * (1.0 + float(np.abs(samples.poses[..., :3, 3]).max()))
     return TrackingError(
         position=largest + between * samples.bounds.position + rounding,
@@ -192,16 +189,21 @@ def error_of(
         sampled_orientation=2 * np.arcsin(np.minimum(half, 1.0)),
         times=samples.times[np.arange(len(largest)), errors.argmax(axis=1)],
         samples=errors.shape[1] - 1,
-        backward=backward,
     )
 
 
 def half_sines(R_A: Array, R_B: Array) -> Array:
     """Return sin(angle / 2) (...) of the rotations from rotations (..., 3, 3) to others, small ones to all digits."""
     Q = np.swapaxes(R_A, -1, -2) @ R_B
-    w = np.sqrt(np.maximum(1 + Q[..., 0, 0] + Q[..., 1, 1] + Q[..., 2, 2], 1e-12)) / 2
-    a, b, c = Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]
-    return np.asarray(np.sqrt(a * a + b * b + c * c) / (4 * w))
+    return np.asarray(half_sine([[Q[..., i, j] for j in range(3)] for i in range(3)]))
+
+
+def half_sine(Q: Matrix) -> Scalar:
+    """Return sin(angle / 2) of a rotation (3, 3), over abstract scalars; a small one to all digits."""
+    # Near half a turn the cosine of half the angle is lost in rounding, but not 0.
+    w = sqrt(larger(1 + Q[0][0] + Q[1][1] + Q[2][2], 1e-12)) / 2
+    v = [Q[2][1] - Q[1][2], Q[0][2] - Q[2][0], Q[1][0] - Q[0][1]]
+    return sqrt(dot(v, v)) / (4 * w)
 
 
 def spin_bound(spin: Scalar, spin_change: Scalar, change: Scalar, rate: Scalar) -> Scalar:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from functools import cache, partial, reduce
 from itertools import pairwise
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -170,70 +170,94 @@ def _composed_peaks(loops: Loops, *tables: Table) -> None:
         return found
 
     (lengths,) = loops.each([p], lambda i: [times[i + 1] - times[i]])
-    kept = []
-    for order in (0, 1):
-        peak = most.part(0, order)
-        ends, bound = loops.each([p, n], lambda i, j, order=order: _reach_of_terms(rate(order, i, j), lengths[i]), 2)
-        loops.fill([peak], [n], lambda j, ends=ends: [loops.largest(p, lambda i: ends[i, j])])
-        kept.append(_candidates(loops, lengths, peak, bound, partial(rate, order)))
+    peaks = [_Peaks(loops, lengths, partial(rate, order), most.part(0, order)) for order in (0, 1)]
+    candidates = [each.at_ends(p, n) for each in peaks]
     before: Scalar = 0
-    for order, ((pieces, joints), count) in enumerate(kept):
-        peak = most.part(0, order)
+    for order, (each, found) in enumerate(zip(peaks, candidates, strict=True)):
+        turns = each.raised(n, found)
+        before = before + _left(loops, left.behind(before, 1), order, found, turns)
+    facts[0] = before
 
-        def of_candidate(k: Scalar, order: int = order, pieces: Table = pieces, joints: Table = joints) -> list[Scalar]:
+
+class _Candidates(NamedTuple):
+    """Pieces and joints of a run whose polynomials may go beyond the largest value at an end; how many there are."""
+
+    pieces: Table
+    joints: Table
+    count: Scalar
+
+
+class _Peaks(NamedTuple):
+    """The largest speeds, or accelerations, of a run.
+
+    Attributes:
+        loops: of the routine.
+        lengths: (p,) of the pieces.
+        rate: returns the coefficients on a piece, of a joint.
+        peak: (n,) which are written.
+    """
+
+    loops: Loops
+    lengths: Table
+    rate: Callable[..., list[Scalar]]
+    peak: Table
+
+    def at_ends(self, p: Scalar, n: Scalar) -> _Candidates:
+        """Write the largest at the ends of p pieces; return where n joints may have larger ones between."""
+        loops, lengths, rate, peak = self
+        ends, bound = loops.each([p, n], lambda i, j: _reach_of_terms(rate(i, j), lengths[i]), 2)
+        loops.fill([peak], [n], lambda j: [loops.largest(p, lambda i: ends[i, j])])
+        (pieces, joints), count = loops.kept(bound.shape, lambda i, j: bound[i, j] > peak[j])
+
+        def closer(k: Scalar) -> list[Scalar]:
             i, j = loops.whole(pieces[k]), loops.whole(joints[k])
-            return list(_between(loops, rate(order, i, j), lengths[i]))
+            return [_reach(rate(i, j), [lengths[i]])[0][1] - peak[j]]
+
+        (beyond,) = loops.each([count], closer)
+        (places,), few = loops.kept([count], lambda k: beyond[k] > 0)
+        kept = loops.each([few], lambda k: [table[loops.whole(places[k])] for table in (pieces, joints)], 2)
+        return _Candidates(kept[0], kept[1], few)
+
+    def raised(self, n: Scalar, candidates: _Candidates) -> Table:
+        """Raise the peaks of n joints by the candidates; return how often the slope of each may change its sign."""
+        loops, lengths, rate, peak = self
+        pieces, joints, count = candidates
+
+        def of_candidate(k: Scalar) -> list[Scalar]:
+            i, j = loops.whole(pieces[k]), loops.whole(joints[k])
+            return list(_between(loops, rate(i, j), lengths[i]))
 
         sizes, turns = loops.each([count], of_candidate, 2)
 
-        def risen(
-            j: Scalar, sizes: Table = sizes, joints: Table = joints, count: Scalar = count, peak: Table = peak
-        ) -> list[Scalar]:
+        def risen(j: Scalar) -> list[Scalar]:
             number = loops.number(j)
             most_of = loops.largest(count, lambda k: select(abs(joints[k] - number) < 0.5, sizes[k], 0.0))
             return [larger(peak[j], most_of)]
 
         (peaks,) = loops.each([n], risen)
-        loops.fill([peak], [n], lambda j, peaks=peaks: [peaks[j]])
-        (several,), further = loops.kept([count], lambda k, turns=turns: turns[k] > 1.5)
-        rest = left.behind(before, 1)
-
-        def of_rest(
-            k: Scalar, order: int = order, pieces: Table = pieces, joints: Table = joints, several: Table = several
-        ) -> list[Scalar]:
-            at = loops.whole(several[k])
-            return [0.0 * several[k] + order, pieces[at], joints[at]]
-
-        loops.fill([rest.part(0, row) for row in range(3)], [further], of_rest)
-        before = before + further
-    facts[0] = before
+        loops.fill([peak], [n], lambda j: [peaks[j]])
+        return turns
 
 
-def _candidates(
-    loops: Loops, lengths: Table, peak: Table, bound: Table, rate: Callable[..., list[Scalar]]
-) -> tuple[list[Table], Scalar]:
-    """Return the pieces and joints where bounds, and those of Bernstein as well, are beyond the peaks of the joints."""
-    (pieces, joints), count = loops.kept(bound.shape, lambda i, j: bound[i, j] > peak[j])
+def _left(loops: Loops, rest: Table, order: int, candidates: _Candidates, turns: Table) -> Scalar:
+    """Write the candidates whose slope may change its sign several times; return how many there are."""
+    (several,), further = loops.kept([candidates.count], lambda k: turns[k] > 1.5)
 
-    def closer(k: Scalar) -> list[Scalar]:
-        i, j = loops.whole(pieces[k]), loops.whole(joints[k])
-        return [_reach(rate(i, j), [lengths[i]])[0][1] - peak[j]]
+    def of_rest(k: Scalar) -> list[Scalar]:
+        at = loops.whole(several[k])
+        return [0.0 * several[k] + order, candidates.pieces[at], candidates.joints[at]]
 
-    (beyond,) = loops.each([count], closer)
-    (places,), few = loops.kept([count], lambda k: beyond[k] > 0)
-    tables = loops.each([few], lambda k: [table[loops.whole(places[k])] for table in (pieces, joints)], 2)
-    return tables, few
+    loops.fill([rest.part(0, row) for row in range(3)], [further], of_rest)
+    return further
 
 
 def _reach_of_terms(terms: list[Scalar], length: Scalar) -> list[Scalar]:
     """Return the largest magnitude at an end of a polynomial, and a bound of that between: of the size of its terms."""
-    last, bound, power = terms[-1], abs(terms[0]), 1.0
+    bound, power = abs(terms[0]), 1.0
     for term in terms[1:]:
         power = power * length
         bound = bound + abs(term) * power
-    for term in terms[-2::-1]:
-        last = last * length + term
-    return [larger(abs(terms[0]), abs(last)), bound]
+    return [larger(abs(terms[0]), abs(_value(terms, length))), bound]
 
 
 def _between(loops: Loops, terms: list[Scalar], length: Scalar) -> tuple[Scalar, Scalar]:
@@ -241,15 +265,8 @@ def _between(loops: Loops, terms: list[Scalar], length: Scalar) -> tuple[Scalar,
 
     Where it may not be, the magnitude is that at another point; where it may be several times, at any of them.
     """
-    # By the part of the length that has passed, so that coefficients compare.
-    power, scaled = 1.0 + 0.0 * length, []
-    for term in slope(terms):
-        scaled.append(term * power)
-        power = power * length
-    control = [
-        sum((x * weight for x, weight in zip(scaled[1:], weights[1:], strict=True) if weight), scaled[0])
-        for weights in _bernstein(len(scaled) - 1).T.tolist()
-    ]
+    scaled = _by_part(slope(terms), length)
+    control = [_weighted(scaled, weights) for weights in _bernstein(len(scaled) - 1).T.tolist()]
     turns: Scalar = 0.0
     start: Scalar = 0.5
     for k, (low, high) in enumerate(pairwise(control)):
@@ -258,18 +275,8 @@ def _between(loops: Loops, terms: list[Scalar], length: Scalar) -> tuple[Scalar,
         start = select(change, (k + low / select(change, low - high, 1.0)) / (len(control) - 1), start)
     sign = select(control[0] < 0, 1.0, -1.0)
 
-    def value_and_rate(x: Scalar) -> tuple[Scalar, Scalar]:
-        value, rate = scaled[-1], 0.0 * x
-        for term in scaled[-2::-1]:
-            rate = rate * x + value
-            value = value * x + term
-        return value, rate
-
-    t = _crossed(loops, value_and_rate, sign, start) * length
-    value = terms[-1]
-    for term in terms[-2::-1]:
-        value = value * t + term
-    return abs(value), turns
+    t = _crossed(loops, partial(_value_and_slope, scaled), sign, start) * length
+    return abs(_value(terms, t)), turns
 
 
 def _rise_to_extremes(
@@ -282,18 +289,24 @@ def _rise_to_extremes(
 
 def _reach(terms: list[Scalar], length: list[Scalar]) -> list[list[Scalar]]:
     """Return the largest magnitude at an end of a polynomial, and a bound of that between: of its Bernstein terms."""
-    scaled, power, last = [], 1.0, terms[-1]
+    scaled = _by_part(terms, length[0])
+    ends = larger(abs(terms[0]), abs(_value(terms, length[0])))
+    control = [abs(_weighted(scaled, weights)) for weights in _bernstein(len(terms) - 1).T[1:-1].tolist()]
+    return [[ends, reduce(larger, control, ends)]]
+
+
+def _by_part(terms: list[Scalar], length: Scalar) -> list[Scalar]:
+    """Return the coefficients of a polynomial by the part of the length that has passed, so that they compare."""
+    scaled, power = [], 1.0
     for term in terms:
         scaled.append(term * power)
-        power = power * length[0]
-    for term in terms[-2::-1]:
-        last = last * length[0] + term
-    ends = larger(abs(terms[0]), abs(last))
-    control = [
-        abs(sum((x * weight for x, weight in zip(scaled[1:], weights[1:], strict=True) if weight), scaled[0]))
-        for weights in _bernstein(len(terms) - 1).T[1:-1].tolist()
-    ]
-    return [[ends, reduce(larger, control, ends)]]
+        power = power * length
+    return scaled
+
+
+def _weighted(scaled: list[Scalar], weights: list[float]) -> Scalar:
+    """Return a Bernstein coefficient of a polynomial, by weights of its coefficients of which the first is 1."""
+    return sum((x * weight for x, weight in zip(scaled[1:], weights[1:], strict=True) if weight), scaled[0])
 
 
 def turning_times(terms: Array, lengths: Array, rows: Evaluator = on_arrays, run: Runner = with_numpy) -> Array:
@@ -433,6 +446,13 @@ def _polished(root: list[Scalar], terms: list[Scalar]) -> list[list[Scalar]]:
         ahead = smaller(larger(x - select(rises, value / select(rises, rate, 1.0), 0.0), 0.0), 1.0)
         x = select(abs(_value_and_slope(terms, ahead)[0]) < abs(value), ahead, x)
     return [[x]]
+
+
+def _value(terms: list[Scalar], x: Scalar) -> Scalar:
+    value = terms[-1]
+    for term in terms[-2::-1]:
+        value = value * x + term
+    return value
 
 
 def _value_and_slope(terms: list[Scalar], x: Scalar) -> tuple[Scalar, Scalar]:

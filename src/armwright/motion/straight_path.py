@@ -18,6 +18,7 @@ from armwright.motion.deviation import (
     HandBounds,
     HandSamples,
     TrackingError,
+    half_sine,
     spin_bound,
 )
 from armwright.motion.knots import segments_at
@@ -318,11 +319,11 @@ def _seen(X: list[Scalar], segment: list[Scalar]) -> list[list[Scalar]]:
     away = [come[i] - inside * shift[i] for i in range(3)]
     # The orientation of the tool in the axes at the start.
     Q = [[R_A[i] * X[j] + R_A[3 + i] * X[4 + j] + R_A[6 + i] * X[8 + j] for j in range(3)] for i in range(3)]
-    halves = [_half_sine(axis, angle * fraction, Q) for fraction in (segment[20], along)]
+    halves = [_half_sine_from(axis, angle * fraction, Q) for fraction in (segment[20], along)]
     return [[sqrt(dot(away, away)), along, *halves]]
 
 
-def _half_sine(axis: list[Scalar], angle: Scalar, Q: list[list[Scalar]]) -> Scalar:
+def _half_sine_from(axis: list[Scalar], angle: Scalar, Q: list[list[Scalar]]) -> Scalar:
     """Return sin(angle / 2) of the rotation from that about an axis to another (3, 3), small ones to all digits."""
     x, y, z = axis
     sine, half = sin(angle), sin(angle / 2)
@@ -334,9 +335,7 @@ def _half_sine(axis: list[Scalar], angle: Scalar, Q: list[list[Scalar]]) -> Scal
         [xz - sine * y, yz + sine * x, 1 - versed * (x * x + y * y)],
     ]
     D = [[R[0][i] * Q[0][j] + R[1][i] * Q[1][j] + R[2][i] * Q[2][j] for j in range(3)] for i in range(3)]
-    w = sqrt(larger(1 + D[0][0] + D[1][1] + D[2][2], 1e-12)) / 2
-    v = [D[2][1] - D[1][2], D[0][2] - D[2][0], D[1][0] - D[0][1]]
-    return sqrt(dot(v, v)) / (4 * w)
+    return half_sine(D)
 
 
 def line(A: Array, B: Array, rotation: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:
