@@ -303,8 +303,8 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
     if (lowest < solver.arm.limits.lower).any() or (highest > solver.arm.limits.upper).any():
         return None
     eased = attrs.evolve(line, corners=times[[0, -1]], progress=xspline(times, fractions), near=np.inf)
-    hand = curve_bounds(solver, trajectory).hand
-    error = tracking_error(solver, eased, trajectory, hand, tolerance(_LOOKED_AT))
+    tool = curve_bounds(solver, trajectory).tool
+    error = tracking_error(solver, eased, trajectory, tool, tolerance(_LOOKED_AT))
     try:
         factor, _ = slowing_for_limits(arm, trajectory)
     except IncapableArmError:  # where gravity alone takes more than a joint may give there is no detour either

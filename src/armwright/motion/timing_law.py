@@ -43,14 +43,14 @@ _ROUNDS = 4
 # more, the fewer knots there are, so that there are some so many in all.
 _FINER, _ENOUGH = 4, 400
 # Parts of an interval where its bounds are kept, and parts of a piece where the limits are sampled.
-_PARTS, _SEEN = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
+_PARTS, _SAMPLED = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
 # Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed,
 # to this part of the piece.
 _SAME, _HALVINGS, _CONVERGED = 1e-10, 60, 1e-12
 # A position on the path is found in time to this part of a piece.
 _LOOKED_UP = 1001
 # So that rounding does not make a run too long that is just short enough.
-_HAIR = 1e-9
+_ROUNDING = 1e-9
 # A joint that uses this part of what the fullest limit uses binds.
 _BINDS = 0.95
 
@@ -253,7 +253,7 @@ def _smooth(grid: _Grid) -> _Run:
     for _ in range(_WINDOWS):
         runs.append(_averaged_within(grid, window))
         cost = runs[-1].duration - grid.shortest
-        if cost <= most + _HAIR * grid.shortest:
+        if cost <= most + _ROUNDING * grid.shortest:
             break
         window *= max(_LESS * most / cost, _LEAST_STEP)
     return min(runs, key=lambda run: run.duration)
@@ -265,7 +265,7 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
     tighter, runs, x = np.ones((len(lengths), 1)), [], grid.squares
     for _ in range(_ROUNDS):
         runs.append(_averaged(grid, x, window))
-        if runs[-1].duration <= (1 + _HAIR) * grid.allowed:
+        if runs[-1].duration <= (1 + _ROUNDING) * grid.allowed:
             break
         worst = np.ones(len(lengths))
         uses = np.maximum(runs[-1].along, runs[-1].of_joints.max(axis=1))
@@ -328,17 +328,17 @@ def _averaged_run(loops: Loops, *tables: Table) -> None:
 
     def samples(k: Scalar) -> list[Scalar]:
         length = parts[k + 1] - parts[k]
-        return [x for part in _SEEN for x in _along([laws[k, power] for power in range(4)], part * length)]
+        return [x for part in _SAMPLED for x in _along([laws[k, power] for power in range(4)], part * length)]
 
-    seen = loops.each([count], samples, 3 * len(_SEEN))
+    sampled = loops.each([count], samples, 3 * len(_SAMPLED))
 
     def of_path(k: Scalar) -> list[Scalar]:
-        return [reduce(larger, (rates[k] for rates in seen[1::3]), 0.0) / caps[loops.whole(intervals[k])]]
+        return [reduce(larger, (rates[k] for rates in sampled[1::3]), 0.0) / caps[loops.whole(intervals[k])]]
 
     def of_joint(k: Scalar, j: Scalar) -> list[Scalar]:
         at = loops.whole(intervals[k])
         cubic = [cubics[at, power, j] for power in range(4)]
-        fastest, hardest = _used(cubic, zip(*(iter([table[k] for table in seen]),) * 3, strict=True))
+        fastest, hardest = _used(cubic, zip(*(iter([table[k] for table in sampled]),) * 3, strict=True))
         return [fastest / speed[j], sqrt(hardest / acceleration[j])]
 
     loops.fill([along], [count], of_path)
@@ -403,12 +403,12 @@ def _cut(loops: Loops, starts: Table, breaks: Table, law: Table) -> tuple[Table,
     return _apart(loops, breaks, passed)
 
 
-def _used(cubic: list[Scalar], seen: Iterable[tuple[Scalar, ...]]) -> tuple[Scalar, Scalar]:
+def _used(cubic: list[Scalar], sampled: Iterable[tuple[Scalar, ...]]) -> tuple[Scalar, Scalar]:
     """Return the largest speed and the largest acceleration of a joint on a cubic q(s), given s, s' and s'' there."""
     _, c1, c2, c3 = cubic
     speed: Scalar = 0.0
     acceleration: Scalar = 0.0
-    for x, rate, bend in seen:
+    for x, rate, bend in sampled:
         slope, curve = (3 * c3 * x + 2 * c2) * x + c1, 6 * c3 * x + 2 * c2
         speed = larger(abs(slope * rate), speed)
         acceleration = larger(abs(curve * rate * rate + slope * bend), acceleration)

@@ -12,12 +12,12 @@ from armwright.arrays import Array, ArrayLike, floats
 from armwright.motion.blends import PEAK_ACCELERATION, BlendPlan, Ends, blend_plan, blended, rates_at_points
 from armwright.motion.deviation import (
     ErrorBounds,
-    HandBounds,
-    HandSamples,
+    ToolBounds,
+    ToolSamples,
     TrackingError,
     error_of,
+    half_angle_bound,
     half_sines,
-    spin_bound,
 )
 from armwright.motion.knots import divided, segments_at
 from armwright.motion.trajectory import Trajectory
@@ -66,16 +66,17 @@ class ToolPath:
         position, orientation = self.position.slowed(factor), self.orientation.slowed(factor)
         return ToolPath(position=position, orientation=orientation, times=self.times * factor)
 
-    def bounds(self, times: Array, hand: HandBounds, run: Runner) -> ErrorBounds:  # noqa: ARG002
+    def bounds(self, times: Array, tool: ToolBounds, run: Runner) -> ErrorBounds:  # noqa: ARG002
         """Return bounds of the error on the intervals between times: those of tool and path together."""
         middles = (times[1:] + times[:-1]) / 2
         piece = segments_at(self.knots, middles, len(self.knots) - 1)
         rate, change = (bound[piece] for bound in self.spin())
         return ErrorBounds(
-            hand.pull + self.acceleration()[piece], spin_bound(hand.spin, hand.spin_change, change, rate)
+            tool.acceleration + self.acceleration()[piece],
+            half_angle_bound(tool.angular_speed, tool.angular_acceleration, change, rate),
         )
 
-    def error(self, samples: HandSamples) -> TrackingError:
+    def error(self, samples: ToolSamples) -> TrackingError:
         """Return how far a sampled tool is from where it should be at the time."""
         planned = self(samples.times)
         distances = np.linalg.norm(samples.poses[..., :3, 3] - planned[..., :3, 3], axis=-1)

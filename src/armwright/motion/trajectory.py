@@ -18,7 +18,7 @@ from armwright.notebook import html_table
 # Nobody reads more samples than this; a shorter period is a slip of the unit.
 _MAX_SAMPLES = 100_000_000
 # The hair's breadth keeps a duration that is a whole number of ticks but for rounding from gaining one.
-_HAIR = 1e-9
+_ROUNDING = 1e-9
 
 
 def _times(value: ArrayLike) -> Array:
@@ -224,7 +224,7 @@ class Trajectory:
                 f"period: {period:g} s divides {self.duration:g} s into {self.duration / period:.3g} samples; "
                 f"at most {_MAX_SAMPLES:.0e} are allowed"
             )
-        before = max(math.ceil(self.duration / period - _HAIR), int(self.duration > 0))
+        before = max(math.ceil(self.duration / period - _ROUNDING), int(self.duration > 0))
         times = np.append(period * np.arange(before), self.duration)
         q, qd, qdd, jerk = (self(times, order) for order in range(4))
         return Samples(times=times, q=q, qd=qd, qdd=qdd, jerk=jerk)
@@ -348,4 +348,4 @@ def slowed_together(trajectories: Sequence[Trajectory], duration: float, period:
 
 def _ticks(duration: float, period: float) -> int:
     """Return how many servo periods a motion takes that lasts no shorter, one at least."""
-    return max(1, math.ceil(duration / period - _HAIR))
+    return max(1, math.ceil(duration / period - _ROUNDING))
