@@ -25,7 +25,7 @@ from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
 from armwright.motion.forward_backward import Bounds, Nothing, largest_squares, write_largest_squares
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import composed_peaks, shifted_terms
+from armwright.motion.polynomials import composed_peaks, crossing, shifted_terms
 from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.loops import Loops, Table
@@ -44,9 +44,8 @@ _ROUNDS = 4
 _FINER, _ENOUGH = 4, 400
 # Parts of an interval where its bounds are kept, and parts of a piece where the limits are sampled.
 _PARTS, _SAMPLED = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
-# Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed,
-# to this part of the piece.
-_SAME, _HALVINGS, _CONVERGED = 1e-10, 60, 1e-12
+# Two breaks nearer than this part of the duration are one; a knot is passed at a time found to this part of its piece.
+_SAME, _CONVERGED = 1e-10, 1e-12
 # A position on the path is found in time to this part of a piece.
 _LOOKED_UP = 1001
 # So that rounding does not make a run too long that is just short enough.
@@ -425,17 +424,10 @@ def _passed(loops: Loops, law: list[Scalar], length: Scalar, knot: Scalar) -> Sc
     """Return when a cubic s(t), which never falls, passes a knot, from 0 to ``length`` [s]."""
     start, slow, bend, jerk = law
 
-    def step(low: Scalar, high: Scalar, last: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
-        residual = ((jerk * last + bend) * last + slow) * last + start - knot
-        low, high = select(residual < 0, last, low), select(residual < 0, high, last)
-        rate = (3 * jerk * last + 2 * bend) * last + slow
-        # Newton's step where it stays between the bounds, else a halving.
-        ahead = last - residual / select(rate > 0, rate, math.inf)
-        stays = select(ahead >= low, select(high >= ahead, rate > 0, False), False)
-        t = select(stays, ahead, (low + high) / 2)
-        return abs(t - last) <= _CONVERGED * length, (low, high, t)
+    def value_and_rate(t: Scalar) -> tuple[Scalar, Scalar]:
+        return ((jerk * t + bend) * t + slow) * t + start - knot, (3 * jerk * t + 2 * bend) * t + slow
 
-    return loops.until(_HALVINGS, (0.0 * length, length, length / 2), step)[2]
+    return crossing(loops, value_and_rate, (0.0 * length, length), length / 2, tolerance=_CONVERGED * length)
 
 
 def _binding(joints: int, run: _Run) -> BindingLimit:
