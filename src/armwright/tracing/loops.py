@@ -18,7 +18,7 @@ import numpy as np
 
 from armwright.arrays import Array, Flags
 from armwright.tracing.door import RoutineDoor, layout_is_known
-from armwright.tracing.native import function_address
+from armwright.tracing.native import function_address, processor
 from armwright.tracing.scalar import Scalar
 
 # A table has a ``shape``, and its numbers are read and written by index, a tuple of them where it has several axes.
@@ -157,7 +157,7 @@ def _function(routine: Routine, axes: tuple[int, ...]) -> Callable[..., None]:
     def ir() -> str:
         from armwright.tracing.emit_loops import EmittedLoops  # noqa: PLC0415 - not needed by later processes
 
-        return EmittedLoops().module(routine, axes) + door.ir()
+        return EmittedLoops(processor().target.lanes).module(routine, axes) + door.ir()
 
     if not layout_is_known():
         return partial(_by_addresses, function_address(ir, "routine", origin))
