@@ -118,6 +118,9 @@ class ToolMotion(Protocol):
     def __call__(self, t: Array) -> Array:
         """Return the poses (k, 4, 4) at times (k,), from 0 to the end."""
 
+    def poses_for(self, solver: Solver, t: Array) -> Array:
+        """Return the same, evaluated as a solver evaluates equations."""
+
     def bounds(self, times: Array, tool: ToolBounds, run: Runner) -> ErrorBounds:
         """Return bounds of the error on the intervals between times (m + 1,), where the tool moves as described."""
 

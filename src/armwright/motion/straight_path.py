@@ -23,13 +23,15 @@ from armwright.motion.deviation import (
 )
 from armwright.motion.knots import segments_at
 from armwright.motion.path import NEGLIGIBLE, Path, place_knots
+from armwright.motion.rows import Evaluator, on_arrays
+from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.poses import position_text
 from armwright.spatial.rotations import rotation_vector
 from armwright.tracing.loops import Loops, Runner, Table
 from armwright.tracing.scalar import Scalar, larger, select, sin, smaller, sqrt
-from armwright.tracing.vectors import dot
+from armwright.tracing.vectors import Matrix, Vector, dot
 
 SegmentNumbers: TypeAlias = npt.NDArray[np.intp]
 
@@ -74,31 +76,20 @@ class StraightPath:
 
     def __call__(self, t: Array) -> Array:
         """Return the poses (k, 4, 4) at times (k,)."""
-        segment, fraction = self._along(t)
-        return self.at(segment, fraction)
+        return self.at(*self._along(t))
 
-    def at(self, segment: SegmentNumbers | int, fraction: Array) -> Array:
+    def poses_for(self, solver: Solver, t: Array) -> Array:
+        """Return the poses (k, 4, 4) at times (k,), evaluated as a solver evaluates equations."""
+        return self.at(*self._along(t), solver.rows)
+
+    def at(self, segment: SegmentNumbers | int, fraction: Array, rows: Evaluator = on_arrays) -> Array:
         """Return the poses (k, 4, 4) at fractions (k,) of segments (k,), or of one segment."""
-        R, skew, square = self._rotating
-        angle = self._angles[segment] * fraction
-        sine, half = np.sin(angle), np.sin(angle / 2)
+        where = np.empty((len(fraction), 21))
+        where[:, :20], where[:, 20] = self._segments[segment], fraction
         X = np.zeros((len(fraction), 4, 4))
-        X[:, :3, :3] = (
-            R[segment] + sine[:, None, None] * skew[segment] + (2 * half * half)[:, None, None] * square[segment]
-        )
-        X[:, :3, 3] = self.poses[segment, :3, 3] + fraction[:, None] * self.shifts[segment]
+        X[:, :3] = rows(_pose, [], [where])[0].reshape(-1, 3, 4)
         X[:, 3, 3] = 1.0
         return X
-
-    @cached_property
-    def _rotating(self) -> tuple[Array, Array, Array]:
-        """Return R, R K and R K² of every segment, of its first orientation R and K v = axis × v."""
-        R, (x, y, z) = self.poses[:-1, :3, :3], self._axes.T
-        K = np.zeros_like(R)
-        K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
-        K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
-        turned = R @ K
-        return R, turned, turned @ K
 
     @cached_property
     def _axes(self) -> Array:
@@ -151,25 +142,21 @@ class StraightPath:
         """Return the length of a line where orientations belong to positions on it, else 0."""
         return np.array([self._length if self._by_position else 0.0])
 
-    @property
+    @cached_property
     def _segments(self) -> Array:
-        """Return the segments as ``_tool_error`` takes them, (k, 20)."""
-        squares = np.einsum("ki,ki->k", self.shifts, self.shifts)[:, None]
-        R = self.poses[:-1, :3, :3].reshape(-1, 9)
-        parts = [
-            self.poses[:-1, :3, 3],
-            R,
-            self.shifts,
-            np.where(squares > 0, squares, 1.0),
-            self._axes,
-            self._angles[:, None],
-        ]
-        return np.concatenate(parts, axis=1)
+        """Return the segments as ``_pose`` and ``_tool_error`` take them, (k, 20)."""
+        segments = np.empty((len(self.shifts), 20))
+        squares = np.add.reduce(self.shifts * self.shifts, axis=1)
+        squares[squares == 0] = 1.0
+        segments[:, :3], segments[:, 3:12] = self.poses[:-1, :3, 3], self.poses[:-1, :3, :3].reshape(-1, 9)
+        segments[:, 12:15], segments[:, 15] = self.shifts, squares
+        segments[:, 16:19], segments[:, 19] = self._axes, self._angles
+        return segments
 
     @cached_property
     def _angles(self) -> Array:
         """Of the rotations on the segments, (k,) [rad]."""
-        return np.asarray(np.sqrt(np.einsum("ki,ki->k", self.rotations, self.rotations)))
+        return np.asarray(np.sqrt(np.add.reduce(self.rotations * self.rotations, axis=1)))
 
     @cached_property
     def _length(self) -> float:
@@ -298,6 +285,19 @@ def _backward(loops: Loops, travel: Table, between: Callable[[Scalar], Scalar], 
     return loops.largest(m, lambda i: backs[i])
 
 
+def _pose(where: list[Scalar]) -> list[list[Scalar]]:
+    """Return the first three rows of the pose (4, 4) at a fraction of a segment: see ``_tool_error``."""
+    start, R_A, shift, axis, angle, fraction = (
+        where[:3], where[3:12], where[12:15], where[16:19], where[19], where[20]
+    )  # fmt: skip
+    R = _rotation(axis, angle * fraction)
+    rows = [
+        [dot(R_A[3 * i : 3 * i + 3], [R[k][j] for k in range(3)]) for j in range(3)] + [start[i] + fraction * shift[i]]
+        for i in range(3)
+    ]
+    return [[x for row in rows for x in row]]
+
+
 def _tool_error(X: list[Scalar], segment: list[Scalar]) -> list[list[Scalar]]:
     """Return how far one pose of the tool is from a straight segment.
 
@@ -324,23 +324,26 @@ def _tool_error(X: list[Scalar], segment: list[Scalar]) -> list[list[Scalar]]:
     away = [come[i] - inside * shift[i] for i in range(3)]
     # The orientation of the tool in the axes at the start.
     Q = [[R_A[i] * X[j] + R_A[3 + i] * X[4 + j] + R_A[6 + i] * X[8 + j] for j in range(3)] for i in range(3)]
-    halves = [_half_sine_from(axis, angle * fraction, Q) for fraction in (segment[20], along)]
+    halves = [_half_sine_between(_rotation(axis, angle * fraction), Q) for fraction in (segment[20], along)]
     return [[sqrt(dot(away, away)), along, *halves]]
 
 
-def _half_sine_from(axis: list[Scalar], angle: Scalar, Q: list[list[Scalar]]) -> Scalar:
-    """Return sin(angle / 2) of the rotation from that about an axis to another (3, 3), small ones to all digits."""
+def _half_sine_between(R: Matrix, Q: Matrix) -> Scalar:
+    """Return sin(angle / 2) of the rotation from one orientation (3, 3) to another, small ones to all digits."""
+    return half_sine([[R[0][i] * Q[0][j] + R[1][i] * Q[1][j] + R[2][i] * Q[2][j] for j in range(3)] for i in range(3)])
+
+
+def _rotation(axis: Vector, angle: Scalar) -> Matrix:
+    """Return the rotation (3, 3) by an angle about an axis (Rodrigues), that by 0 without an axis."""
     x, y, z = axis
     sine, half = sin(angle), sin(angle / 2)
     versed = 2 * half * half
     xy, xz, yz = versed * x * y, versed * x * z, versed * y * z
-    R = [
+    return [
         [1 - versed * (y * y + z * z), xy - sine * z, xz + sine * y],
         [xy + sine * z, 1 - versed * (x * x + z * z), yz - sine * x],
         [xz - sine * y, yz + sine * x, 1 - versed * (x * x + y * y)],
     ]
-    D = [[R[0][i] * Q[0][j] + R[1][i] * Q[1][j] + R[2][i] * Q[2][j] for j in range(3)] for i in range(3)]
-    return half_sine(D)
 
 
 def line(A: Array, B: Array, rotation: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:

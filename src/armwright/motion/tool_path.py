@@ -20,6 +20,7 @@ from armwright.motion.deviation import (
     half_sines,
 )
 from armwright.motion.knots import divided, segments_at
+from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
 from armwright.spatial.poses import homogeneous, position_text
@@ -55,6 +56,10 @@ class ToolPath:
         """Return poses (..., 4, 4) at times (...)."""
         t = floats(t, "t")
         return homogeneous(self.orientation(t), self.position(t))
+
+    def poses_for(self, solver: Solver, t: Array) -> Array:  # noqa: ARG002 - of a tool path NumPy computes them
+        """Return the poses (k, 4, 4) at times (k,)."""
+        return self(t)
 
     def first_knots(self, step: float, fewest: int) -> Array:
         """Return the first times: so far apart [s], and so many at least in each blend and on each straight segment."""

@@ -199,7 +199,7 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
     """Put knots until the tool stays within the tolerance everywhere, near the configurations of a diagnosis if any."""
     arm, configurations = task.solver.arm, None if guide is None else guide.guide
     for _ in range(_ROUNDS):
-        X = task.motion(knots)
+        X = task.motion.poses_for(task.solver, knots)
         if configurations is None:
             q, failed = chain(task.solver, X, task.q_start)
         else:
