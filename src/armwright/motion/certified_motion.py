@@ -13,7 +13,6 @@ from armwright.motion.certificate import LIMITS, BindingLimit, Certificate, Limi
 from armwright.motion.deviation import TrackingError
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.timing_law import timed
 from armwright.motion.tolerance import Tolerance
@@ -87,6 +86,8 @@ def certificate_of(
     *,
     time: float | None = None,
     peaks: dict[LimitName, Array] | None = None,
+    factor: float = 1.0,
+    because: BindingLimit | None = None,
 ) -> Certificate:
     """Return the certificate of a motion, whatever its limits say.
 
@@ -97,6 +98,8 @@ def certificate_of(
         allowed: what it was asked to keep.
         time: when the tool is farthest off [s]; as ``error`` has it when left out.
         peaks: of speeds, accelerations and efforts, where they are known.
+        factor: how many times slower it is than the speed of the tool has it.
+        because: which limit, and which joint, that is for.
     """
     solver = solver_of(arm)
     time = error.worst_time if time is None else time
@@ -114,14 +117,16 @@ def certificate_of(
         samples=error.samples * len(error.position),
         peaks=limit_peaks(arm, trajectory) if peaks is None else peaks,
         backward=error.backward,
+        factor=factor,
+        because=because,
     )
 
 
 def _position(trajectory: Trajectory, t: float) -> Array:
     """Return where the joints (n,) are at a time from the start to the end of a trajectory."""
     k = segments_at(trajectory.times, t, len(trajectory.coefficients))
-    local = np.array([[t - trajectory.times[k]]])
-    return np.asarray(evaluate(trajectory.coefficients[k, None], local)[0])
+    terms = trajectory.coefficients[k]
+    return np.asarray((t - trajectory.times[k]) ** np.arange(len(terms)) @ terms)
 
 
 def fastest(
@@ -148,17 +153,17 @@ def fastest(
     Raises:
         IncapableArmError: gravity alone takes more than a joint may give, and ``weak`` is not set.
     """
-    path, error = tracking.trajectory, tracking.error
-    run = timed(solver_of(arm), path, np.ones(len(path.times) - 1))
+    solver, path, error = solver_of(arm), tracking.trajectory, tracking.error
+    run = timed(solver, path, np.ones(len(path.times) - 1))
     time = run.when(error.worst_time)
-    trajectory, efforts, slower = _inside_efforts(arm, run.trajectory, weak=weak)
+    trajectory, efforts, slower = _inside_efforts(solver, run.trajectory, weak=weak)
     stretch, factor = trajectory.duration / run.trajectory.duration, trajectory.duration / nominal
     peaks = stretched_peaks(run.speed, run.acceleration, efforts, stretch)
-    certificate = attrs.evolve(
-        certificate_of(arm, trajectory, error, allowed, time=time * trajectory.duration, peaks=peaks),
-        factor=max(1.0, factor),
-        because=None if factor <= 1 else run.because if slower is None else ("effort", slower),
-    )
+    because = None if factor <= 1 else run.because if slower is None else ("effort", slower)
+    certificate = certificate_of(
+        solver, trajectory, error, allowed, time=time * trajectory.duration, peaks=peaks, factor=max(1.0, factor),
+        because=because,
+    )  # fmt: skip
     motion = CertifiedMotion(trajectory=trajectory, certificate=certificate)
     return motion if period is None else motion.on_ticks(period)
 
@@ -169,9 +174,10 @@ def slowed_alike(arm: AnyArm, tracking: Tracking, allowed: Tolerance) -> Certifi
     factor, because = slowing(model, planned)
     trajectory, _, slower = _inside_efforts(arm, planned.slowed(factor), weak=True)
     factor = trajectory.duration / planned.duration
-    certificate = certificate_of(arm, trajectory, tracking.error, allowed, time=tracking.error.worst_time * factor)
     because = because if slower is None else ("effort", slower)
-    return CertifiedMotion(trajectory=trajectory, certificate=attrs.evolve(certificate, factor=factor, because=because))
+    time = tracking.error.worst_time * factor
+    certificate = certificate_of(arm, trajectory, tracking.error, allowed, time=time, factor=factor, because=because)
+    return CertifiedMotion(trajectory=trajectory, certificate=certificate)
 
 
 def standstill(solver: Solver, q: Array, allowed: Tolerance) -> CertifiedMotion:

@@ -19,8 +19,6 @@ from armwright.kinematics.inverse_kinematics.solve import inverse_branches
 from armwright.motion.rows import Evaluator, by_kernels, on_arrays
 from armwright.tracing.loops import Runner, compiled, with_numpy
 
-AnyArm: TypeAlias = Arm | CompiledArm
-
 
 class Solver(NamedTuple):
     """Functions of one arm.
@@ -42,8 +40,14 @@ class Solver(NamedTuple):
     run: Runner
 
 
+# A planner that has the functions of an arm hands them on.
+AnyArm: TypeAlias = Arm | CompiledArm | Solver
+
+
 def solver_of(arm: AnyArm) -> Solver:
     """Return the functions of an arm: kernels of a compiled one, else the plain functions, which compile nothing."""
+    if isinstance(arm, Solver):
+        return arm
     if isinstance(arm, CompiledArm):
         forward_, dynamics = partial(_by_kernel, arm, "forward", 1), partial(_by_kernel, arm, "inverse_dynamics", 1)
         branches_ = partial(_by_kernel, arm, "inverse_branches", 2)

@@ -109,7 +109,7 @@ def certified_line(
     tracked = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
     check_velocities(task, tracked)
     nominal = even / (1 - _RAMP)
-    return fastest(arm, tracked, allowed, nominal=nominal, period=period, weak=weak)
+    return fastest(solver, tracked, allowed, nominal=nominal, period=period, weak=weak)
 
 
 def coarse_line(arm: AnyArm, q_start: Array, X_goal: Array, *, deviation: float, speed: float) -> CertifiedMotion:

@@ -80,16 +80,18 @@ class StraightPath:
 
     def poses_for(self, solver: Solver, t: Array) -> Array:
         """Return the poses (k, 4, 4) at times (k,), evaluated as a solver evaluates equations."""
-        return self.at(*self._along(t), solver.rows)
+        return _poses(self._references(solver.run, t[:, None]), solver.rows)
 
-    def at(self, segment: SegmentNumbers | int, fraction: Array, rows: Evaluator = on_arrays) -> Array:
+    def at(self, segment: SegmentNumbers | int, fraction: Array) -> Array:
         """Return the poses (k, 4, 4) at fractions (k,) of segments (k,), or of one segment."""
-        where = np.empty((len(fraction), 21))
-        where[:, :20], where[:, 20] = self._segments[segment], fraction
-        X = np.zeros((len(fraction), 4, 4))
-        X[:, :3] = rows(_pose, [], [where])[0].reshape(-1, 3, 4)
-        X[:, 3, 3] = 1.0
-        return X
+        references = np.empty((len(fraction), 21))
+        references[:, :20], references[:, 20] = self._segments[segment], fraction
+        return _poses(references, on_arrays)
+
+    def _references(self, run: Runner, times: Array) -> Array:
+        """Return what ``_pose`` and ``_tool_error`` take of this path at times (m, k) on its segments, (m k, 21)."""
+        progress = [self.progress.times, self.progress.coefficients[:, :, 0]]
+        return run(_references, [times, self._segments, self.corners, *progress], (times.size, 21))[0]
 
     @cached_property
     def _axes(self) -> Array:
@@ -125,9 +127,7 @@ class StraightPath:
     def error(self, samples: ToolSamples) -> TrackingError:
         """Return how far a sampled tool is from its segments."""
         m, each = samples.times.shape
-        solver, progress = samples.solver, [self.progress.times, self.progress.coefficients[:, :, 0]]
-        segment = samples.bounds.progress[0]
-        (references,) = solver.run(_references, [samples.times, segment, self._segments, *progress], (m * each, 21))
+        solver, references = samples.solver, self._references(samples.solver.run, samples.times)
         sampled = solver.rows(_tool_error, [], [samples.poses.reshape(-1, 16), references])[0].reshape(m, each, 4)
         inputs = [samples.times, samples.poses, sampled, samples.step, *samples.tool, *samples.bounds.progress]
         position, angles, largest, times, facts = solver.run(
@@ -202,14 +202,22 @@ def _bounds(loops: Loops, *tables: Table) -> None:
 
 
 def _references(loops: Loops, *tables: Table) -> None:
-    """Write what ``_tool_error`` takes beside the poses: the segment and the progress at samples (m, k)."""
-    times, numbers, segments, starts, terms, references = tables
+    """Write the segment and the fraction of it at times (m, k), of which each row is on one segment and one cubic."""
+    times, segments, corners, starts, terms, references = tables
     m, each = times.shape
     rows = references.shaped(m, each, 21)
 
+    def of_row(i: Scalar) -> list[Scalar]:
+        middle = (times[i, 0] + times[i, each - 1]) / 2
+        segment = loops.segment(corners, middle, segments.shape[0])
+        return [loops.number(segment), loops.number(loops.segment(starts, middle, terms.shape[0]))]
+
+    numbers, pieces = loops.each([m], of_row, 2)
+
     def planned(i: Scalar, k: Scalar) -> list[Scalar]:
-        (c0, c1, c2, c3), start = _at(loops, starts, terms, (times[i, 0] + times[i, each - 1]) / 2)
-        t = times[i, k] - start
+        piece = loops.whole(pieces[i])
+        c0, c1, c2, c3 = (terms[piece, power] for power in range(4))
+        t = times[i, k] - starts[piece]
         return [((c3 * t + c2) * t + c1) * t + c0 - numbers[i]]
 
     loops.fill([rows], [m, each, 20], lambda i, k, c: [segments[loops.whole(numbers[i]), c] + 0.0 * times[i, k]])
@@ -283,6 +291,14 @@ def _backward(loops: Loops, travel: Table, between: Callable[[Scalar], Scalar], 
 
     (backs,) = loops.each([m], of_interval)
     return loops.largest(m, lambda i: backs[i])
+
+
+def _poses(references: Array, rows: Evaluator) -> Array:
+    """Return the poses (k, 4, 4) that belong to segments and fractions (k, 21)."""
+    X = np.zeros((len(references), 4, 4))
+    X[:, :3] = rows(_pose, [], [references])[0].reshape(-1, 3, 4)
+    X[:, 3, 3] = 1.0
+    return X
 
 
 def _pose(where: list[Scalar]) -> list[list[Scalar]]:
@@ -360,7 +376,7 @@ def line(A: Array, B: Array, rotation: Array, even: float, *, near: float, ramp:
     duration = even / (1 - ramp)
     even_progress = Trajectory.of_planner(np.array([0.0, duration]), np.array([[[0.0], [1 / duration], [0.0], [0.0]]]))
     return StraightPath(
-        poses=np.stack([A, B]),
+        poses=np.array([A, B]),
         rotations=rotation[None],
         corners=np.array([0.0, duration]),
         progress=s_curve(duration, ramp) if ramp else even_progress,
