@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
@@ -227,9 +227,14 @@ def _sampled_states(loops: Loops, *tables: Table) -> None:
     (spread,) = loops.each([even], lambda i: [duration * (loops.number(i) / (even - 1))])
     (middles,) = loops.each([m], lambda i: [(times[i + 1] + times[i]) / 2])
 
-    def written(first: Scalar, at: Table) -> None:
+    def written(first: Scalar, at: Table, segment: Callable[[Scalar], Scalar]) -> None:
         samples = at.shape[0]
-        pieces, local = loops.each([samples], lambda i: _place(loops, times, at[i], m), 2)
+
+        def where(i: Scalar) -> list[Scalar]:
+            piece = segment(i)
+            return [loops.number(piece), at[i] - times[piece]]
+
+        pieces, local = loops.each([samples], where, 2)
 
         def state(i: Scalar, j: Scalar) -> tuple[Scalar, ...]:
             piece, t = loops.whole(pieces[i]), local[i]
@@ -244,19 +249,13 @@ def _sampled_states(loops: Loops, *tables: Table) -> None:
 
         loops.fill([table.behind(first) for table in (q, qd, qdd)], [samples, n], state)
 
-    written(0, spread)
-    written(even, times)
-    written(even + m + 1, middles)
+    written(0, spread, lambda i: loops.segment(times, spread[i], m))
+    written(even, times, lambda i: loops.segment(times, times[i], m))
+    written(even + m + 1, middles, lambda i: i + 0)
     # The sign of the speed of a joint that stands is rounding, and would give it Coulomb friction.
     (top,) = loops.each([n], lambda j: [loops.largest(even + 2 * m + 1, lambda i: abs(qd[i, j]))])
     (moving,) = loops.each(qd.shape, lambda i, j: [select(abs(qd[i, j]) > _STANDS * top[j], qd[i, j], 0.0)])
     loops.fill([qd], qd.shape, lambda i, j: [moving[i, j]])
-
-
-def _place(loops: Loops, times: Table, t: Scalar, count: Scalar) -> list[Scalar]:
-    """Return which segment a time is in, and how long that has lasted."""
-    segment = loops.segment(times, t, count)
-    return [loops.number(segment), t - times[segment]]
 
 
 def _inside_efforts(arm: AnyArm, trajectory: Trajectory, *, weak: bool) -> tuple[Trajectory, Array, int | None]:

@@ -146,7 +146,8 @@ def tracking_error(
     h = trajectory.lengths
     bounds = motion.bounds(trajectory.times, tool, solver.run)
     needed = np.maximum(bounds.position / allowed.position, 2 * bounds.orientation / allowed.orientation)
-    count = int(min(max(math.ceil(float((np.sqrt(needed / (8 * _ADDED)) * h).max())), _SAMPLES[0]), _SAMPLES[1]))
+    count = math.ceil(float((np.sqrt(needed) * h).max()) / math.sqrt(8 * _ADDED))
+    count = min(max(count, _SAMPLES[0]), _SAMPLES[1])
     m, _, n = trajectory.coefficients.shape
     inputs = [trajectory.times, trajectory.coefficients]
     times, q = solver.run(_even_samples, inputs, (m, count + 1), (m, count + 1, n))
@@ -252,9 +253,8 @@ def curve_bounds(solver: Solver, trajectory: Trajectory) -> CurveBounds:
     """
     arm, terms = solver.arm, trajectory.coefficients
     m, _, n = terms.shape
-    lever = np.where(arm.revolute, _levers(arm, terms, trajectory.lengths), 1.0)
-    pairs = _pairs(tuple(arm.revolute.tolist()))
-    inputs = [trajectory.times, terms, arm.revolute, lever, pairs]
+    levers = _levers(arm, terms, trajectory.lengths)
+    inputs = [trajectory.times, terms, *_rotating(tuple(arm.revolute.tolist())), levers]
     speed, acceleration, turning, a_tool, omega, change = solver.run(
         _curve_bounds, inputs, (m, n), (m, n), (2, m, n), (m,), (m,), (m,)
     )
@@ -262,8 +262,8 @@ def curve_bounds(solver: Solver, trajectory: Trajectory) -> CurveBounds:
 
 
 def _curve_bounds(loops: Loops, *tables: Table) -> None:
-    """Write ``CurveBounds``, given times, cubics, which joints rotate, their levers, and ``_pairs`` of them."""
-    times, terms, rotates, lever, pairs, speed, acceleration, turning, a_tool, omega, alpha = tables
+    """Write ``CurveBounds``, given times, cubics, which joints rotate, alone and in pairs, and their levers."""
+    times, terms, rotates, pairs, lever, speed, acceleration, turning, a_tool, omega, alpha = tables
     m, _, n = terms.shape
 
     def of_joint(i: Scalar, j: Scalar) -> list[Scalar]:
@@ -295,10 +295,10 @@ def _curve_bounds(loops: Loops, *tables: Table) -> None:
 
 
 @cache
-def _pairs(turns: tuple[bool, ...]) -> Array:
-    """Return (4, n, n) of which pairs of joints both rotate.
+def _rotating(turns: tuple[bool, ...]) -> tuple[Array, Array]:
+    """Return (n,) which joints rotate, and (4, n, n) which pairs of them both do.
 
-    Those of which the second one is the later, those of which the first one is, where one carries a slide, and those
+    Pairs of which the second one is the later, those of which the first one is, where one carries a slide, and those
     that rotate once each.
     """
     rotates, n = np.array(turns), len(turns)
@@ -306,7 +306,8 @@ def _pairs(turns: tuple[bool, ...]) -> Array:
     both = rotates[:, None] & rotates
     # A slide is rotated by the joints before it; those beyond it do not change its direction.
     carried = rotates[np.minimum(rows, columns)] & ~rotates[np.maximum(rows, columns)] & (rows != columns)
-    return np.stack([np.triu(both), np.tril(both, -1), carried, np.triu(both, 1)]).astype(np.float64)
+    pairs = np.stack([np.triu(both), np.tril(both, -1), carried, np.triu(both, 1)])
+    return rotates.astype(np.float64), pairs.astype(np.float64)
 
 
 def _cubic_peaks(c: list[Scalar], h: Scalar) -> list[Scalar]:
@@ -343,11 +344,15 @@ def _turning_positions(c: list[Scalar], length: Scalar) -> list[Scalar]:
 
 
 def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:
-    """Return the largest distance (n,) of the tool from the frame before each joint, slides as far out as they go."""
+    """Return the largest distance (n,) of the tool from the frame before each joint that rotates; 1 for slides.
+
+    Slides are as far out as they go.
+    """
     if arm.revolute.all():
         return _distances(arm, (0.0,) * arm.n)
     farthest = evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
-    return _distances(arm, tuple(np.where(arm.revolute, 0.0, farthest).tolist()))
+    distances = _distances(arm, tuple(np.where(arm.revolute, 0.0, farthest).tolist()))
+    return np.where(arm.revolute, distances, 1.0)
 
 
 @lru_cache(maxsize=16)

@@ -121,19 +121,19 @@ def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
     return np.asarray(most)
 
 
-def composed_peaks(cubics: Array, law: Array, places: Indices, times: Array, run: Runner) -> tuple[Array, Array, Array]:
+def composed_peaks(cubics: Array, law: Array, places: Array, times: Array, run: Runner) -> tuple[Array, Array, Array]:
     """Return the coefficients (p, 10, n) of a run along cubics, and its largest speeds and accelerations (n,).
 
     Args:
         cubics: (m, 4, n) coefficients of the joint positions by a parameter.
         law: (p, 4) coefficients of the parameter on each piece of the run, by the time since that begins.
-        places: (p,) on which cubic each piece is.
+        places: (p,) the number of the cubic that each piece is on.
         times: (p + 1,) when the pieces begin, and the last one ends [s].
         run: runs routines.
     """
     p, n = len(law), cubics.shape[2]
     terms, most, places_left, facts = run(
-        _composed_peaks, [cubics, law, places.astype(np.float64), times], (p, 10, n), (2, n), (3, 2 * p * n), (1,)
+        _composed_peaks, [cubics, law, places, times], (p, 10, n), (2, n), (3, 2 * p * n), (1,)
     )
     left = int(facts[0])
     if left:

@@ -74,4 +74,6 @@ def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:
 
 def _repeated(x: Array, lead: tuple[int, ...]) -> Array:
     """Return an input (..., n) as rows, the same ones for what it lacks of the leading axes."""
-    return np.ascontiguousarray(np.broadcast_to(x, (*lead, x.shape[-1]))).reshape(-1, x.shape[-1])
+    rows = np.empty((*lead, x.shape[-1]))
+    rows[...] = x
+    return rows.reshape(-1, x.shape[-1])

@@ -170,7 +170,8 @@ def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
     """Return times to begin with, as many as the report's rule asks for."""
     A, B = motion.poses[:, :3, 3]
     count = math.ceil(math.dist(A, B) / report_step(arm, A, B, allowed.position)) + 2
-    return np.linspace(0.0, motion.duration, min(max(_MIN_KNOTS, count), _MAX_KNOTS))
+    last = min(max(_MIN_KNOTS, count), _MAX_KNOTS) - 1
+    return np.asarray(motion.duration * (np.arange(last + 1) / last))
 
 
 def _requested_time(even: float, t: Array) -> Array:

@@ -19,7 +19,6 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
@@ -46,8 +45,8 @@ _FINER, _ENOUGH = 4, 400
 _PARTS, _SAMPLED = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
 # Two breaks nearer than this part of the duration are one; a knot is passed at a time found to this part of its piece.
 _SAME, _CONVERGED = 1e-10, 1e-12
-# A position on the path is found in time to this part of a piece.
-_LOOKED_UP = 1001
+# Halvings of a piece to find when the run is at a position on the path.
+_HALVINGS = 20
 # So that rounding does not make a run too long that is just short enough.
 _ROUNDING = 1e-9
 # A joint that uses this part of what the fullest limit uses binds.
@@ -76,22 +75,15 @@ class TimedPath(NamedTuple):
     def when(self, s: float) -> float:
         """Return when the run is at ``s``, as a part of its duration."""
         run = self.run
-        begins = run.law[:, 0] + run.grid.times[run.intervals]
+        begins = run.law[:, 0] + run.grid.times[run.intervals.astype(np.intp)]
         k = int(segments_at(begins, s, len(begins)))
-        _, *law = run.law[k].tolist()
-        length = float(run.times[k + 1] - run.times[k])
-
-        def at(i: int) -> float:
-            t = i / (_LOOKED_UP - 1) * length
-            return float(((law[2] * t + law[1]) * t + law[0]) * t)
-
-        sought, low, high = s - float(begins[k]), 0, _LOOKED_UP - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (middle, high) if at(middle) <= sought else (low, middle)
-        rise = at(high) - at(low)
-        part = min(max((sought - at(low)) / rise, 0.0), 1.0) if rise > 0 else 0.0
-        return (float(run.times[k]) + (low + part) / (_LOOKED_UP - 1) * length) / float(run.times[-1])
+        (_, slow, bend, jerk), sought = run.law[k].tolist(), s - float(begins[k])
+        start, end = run.times[k : k + 2].tolist()
+        low, high = 0.0, end - start
+        for _ in range(_HALVINGS):
+            t = (low + high) / 2
+            low, high = (t, high) if ((jerk * t + bend) * t + slow) * t <= sought else (low, t)
+        return float((start + (low + high) / 2) / run.times[-1])
 
 
 class _Grid(NamedTuple):
@@ -131,7 +123,7 @@ class _Run(NamedTuple):
     Attributes:
         grid: the path.
         times: (p + 1,) when its p pieces begin, and the last one ends [s].
-        intervals: (p,) on which interval of the path each is.
+        intervals: (p,) the number of the interval of the path that each is on.
         law: (p, 4) coefficients of the path on that interval by the time since the piece began.
         along: (p,) the largest part that each piece uses of the speed on the path.
         of_joints: (p, 2 n) the same of the speeds and of the roots of the accelerations of the joints.
@@ -140,7 +132,7 @@ class _Run(NamedTuple):
 
     grid: _Grid
     times: Array
-    intervals: npt.NDArray[np.intp]
+    intervals: Array
     law: Array
     along: Array
     of_joints: Array
@@ -268,7 +260,7 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
             break
         worst = np.ones(len(lengths))
         uses = np.maximum(runs[-1].along, runs[-1].of_joints.max(axis=1))
-        np.maximum.at(worst, runs[-1].intervals, uses)
+        np.maximum.at(worst, runs[-1].intervals.astype(np.intp), uses)
         tighter = tighter * worst[:, None] ** 2
         bounds = Bounds(grid.a * tighter, grid.b * tighter, np.zeros_like(grid.a))
         x = largest_squares(bounds, lengths, (False, False), grid.solver.run)
@@ -295,7 +287,7 @@ def _averaged(grid: _Grid, squares: Array, window: float) -> _Run:
     return _Run(
         grid,
         times[: count + 1],
-        intervals[:count].astype(np.intp),
+        intervals[:count],
         law[:count],
         along[:count],
         of_joints[:count].reshape(count, -1),
@@ -433,9 +425,9 @@ def _passed(loops: Loops, law: list[Scalar], length: Scalar, knot: Scalar) -> Sc
 def _binding(joints: int, run: _Run) -> BindingLimit:
     """Return which limit of which joint binds for the longest time."""
     steps, of_joints = run.times[1:] - run.times[:-1], run.of_joints
-    fullest = of_joints.argmax(axis=1)
-    near = of_joints.max(axis=1) >= _BINDS * of_joints.max()
-    counts = np.bincount(fullest[near], weights=steps[near], minlength=2 * joints)
+    most = of_joints.max(axis=1)
+    long = np.where(most >= _BINDS * most.max(), steps, 0.0)
+    counts = np.bincount(of_joints.argmax(axis=1), weights=long, minlength=2 * joints)
     name, joint = divmod(int(counts.argmax()), joints)
     return ("acceleration" if name else "speed"), joint
 

@@ -219,8 +219,7 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
             # Between two knots that keep a limit the spline may pass it where a joint reverses.
-            first, second = bounds.turning
-            return beyond_limits(arm, first, knots) or beyond_limits(arm, second, knots) or tracking
+            return beyond_limits(arm, bounds.turning, knots) or tracking
         if task.report_spline:
             return tracking
         ratio = np.where((h < knots[-1] / _SHORT)[:, None], _velocity_ratios(task, trajectory, speed), 0.0)
