@@ -350,3 +350,16 @@ def test_one_function_to_another_process() -> None:
     fast = compile_arm(load_arm("stanford"))
 
     assert pickle.loads(pickle.dumps(fast.forward)) == fast.forward
+
+
+def test_little_effort(rng: np.random.Generator) -> None:
+    """An arm that was compiled with the least effort has the same bits; it stays such an arm in other processes."""
+    arm = random_arm(rng, 4)
+    q, qd, qdd = random_configurations(arm, rng, 9), *rng.normal(size=(2, 9, 4))
+    fast, quick = compile_arm(arm), compile_arm(arm, quickly=True)
+
+    assert quick is not fast
+    np.testing.assert_array_equal(quick.inverse_dynamics(q, qd, qdd), fast.inverse_dynamics(q, qd, qdd))
+    np.testing.assert_array_equal(quick.pose_and_jacobian(q)[1], fast.pose_and_jacobian(q)[1])
+    assert pickle.loads(pickle.dumps(quick)) == quick
+    assert pickle.loads(pickle.dumps(quick.forward)) == quick.forward

@@ -87,7 +87,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     deviation = within(0.1 if deviation_mm is None else deviation_mm, _DEVIATION_MM, "--deviation-mm") * 1e-3
     warn_of_stray(poses)
     model, file = load_arm(arm), read_poses(poses)
-    fast = compile_arm(model)
+    fast = compile_arm(model, quickly=True)
     start = None if near is None else joint_values(model, near, "--near")
     timed: dict[str, Any] = {"times": file.times, "blend": file.blend, "near": start, "ends": ends}
     if kind == "joint":

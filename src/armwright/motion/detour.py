@@ -162,7 +162,7 @@ def line_or_detour(
     if requested is None or (method == "damped" and obstacle.cause == "reach"):
         raise obstacle
     # So many poses are asked for in a search that it is worth compiling the arm for it.
-    arm = compile_arm(solver.arm)
+    arm = compile_arm(solver.arm) if isinstance(arm, Arm) else arm
     detour = _damped(arm, requested, q, damping, obstacle) if method == "damped" else None
     if method == "via":
         detour = _by_via(arm, requested, q, obstacle, allowed=allowed, speed=speed)

@@ -17,7 +17,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import inverse_branches
 from armwright.motion.rows import Evaluator, by_kernels, on_arrays
-from armwright.tracing.loops import Runner, compiled, with_numpy
+from armwright.tracing.loops import Runner, compiled, compiled_quickly, with_numpy
 
 
 class Solver(NamedTuple):
@@ -52,7 +52,8 @@ def solver_of(arm: AnyArm) -> Solver:
         forward_, dynamics = partial(_by_kernel, arm, "forward", 1), partial(_by_kernel, arm, "inverse_dynamics", 1)
         branches_ = partial(_by_kernel, arm, "inverse_branches", 2)
         closed = find_geometry(arm.arm) is not None
-        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels, compiled)
+        run = compiled_quickly if arm.quickly else compiled
+        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels, run)
     branches = partial(inverse_branches, arm) if find_geometry(known_arm(arm)) is not None else None
     return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches, on_arrays, with_numpy)
 

@@ -194,7 +194,9 @@ def _plan_stages(
     ]
     manner = Manner(speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
     try:
-        stages = plan(compile_arm(cell_arm.arm), machine.hardware.configuration(arm, machine.now), goals, manner)
+        stages = plan(
+            compile_arm(cell_arm.arm, quickly=True), machine.hardware.configuration(arm, machine.now), goals, manner
+        )
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except IncapableArmError as error:
