@@ -6,6 +6,7 @@
 from __future__ import annotations  # what help shows keeps the names of array types, which are long
 
 import os
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import cached_property, partial, wraps
@@ -19,6 +20,8 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.compiled.quantities import quantity_kernel
+from armwright.errors import CompilerWarning
+from armwright.tracing.image import CAN_BE_LINKED, can_be_placed
 from armwright.tracing.kernel import Kernel
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
@@ -59,6 +62,23 @@ def compile_arm(arm: Arm, *, device: str | None = None, quickly: bool = False) -
         if len(_COMPILED) > _MAX_ARMS:
             _COMPILED.popitem(last=False)
     return compiled
+
+
+def planning_arm(arm: Arm) -> CompiledArm | Arm:
+    """Return what to plan a short program of an arm with: the arm compiled quickly, or itself where nothing can be.
+
+    Warns:
+        CompilerWarning: the system refuses memory for compiled code.
+    """
+    if not CAN_BE_LINKED or can_be_placed():
+        return compile_arm(arm, quickly=True)
+    warnings.warn(
+        "this system refuses memory that can be executed (execmem of SELinux), so equations are not compiled; planning "
+        "takes ten times as long",
+        CompilerWarning,
+        stacklevel=2,
+    )
+    return arm
 
 
 def _new(arm: Arm, device: str | None, *, quickly: bool) -> CompiledArm:
