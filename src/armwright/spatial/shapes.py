@@ -1,0 +1,224 @@
+"""Solids: boxes, cylinders, spheres, capsules and closed meshes, each about its own origin."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import attrs
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arrays import Array, ArrayLike, exact_shape, floats, positive, read_only, reduce_by_fields
+from armwright.errors import InvalidValueError, KindError, ShapeError
+
+# No solid of a robot's surroundings is larger [m].
+LARGEST_SIZE = 1e3
+
+
+def _size(value: ArrayLike) -> Array:
+    size = exact_shape(value, (3,), "size", LARGEST_SIZE)
+    if not (size > 0).all():
+        raise InvalidValueError(f"size: expected three lengths above 0, got {size.tolist()}")
+    return size
+
+
+def _length(value: float, attribute: str) -> float:
+    length = positive(value, attribute, "m")
+    if length > LARGEST_SIZE:
+        raise InvalidValueError(f"{attribute}: expected no more than {LARGEST_SIZE:g} m, got {length:g}")
+    return length
+
+
+def _radius(value: float) -> float:
+    return _length(value, "radius")
+
+
+def _height(value: float) -> float:
+    return _length(value, "length")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Box:
+    """A box about its centre.
+
+    Attributes:
+        size: (3,) lengths along x, y and z [m].
+    """
+
+    size: Array = attrs.field(converter=_size)
+
+    __reduce__ = reduce_by_fields
+
+
+@attrs.frozen(kw_only=True)
+class Cylinder:
+    """A cylinder about its centre, its axis along z.
+
+    Attributes:
+        radius: [m].
+        length: along its axis [m].
+    """
+
+    radius: float = attrs.field(converter=_radius)
+    length: float = attrs.field(converter=_height)
+
+
+@attrs.frozen(kw_only=True)
+class Capsule:
+    """A cylinder about its centre, its axis along z, with half a sphere on either end.
+
+    Attributes:
+        radius: [m].
+        length: of the cylinder, without the ends [m].
+    """
+
+    radius: float = attrs.field(converter=_radius)
+    length: float = attrs.field(converter=_height)
+
+
+@attrs.frozen(kw_only=True)
+class Sphere:
+    """A sphere about its centre.
+
+    Attributes:
+        radius: [m].
+    """
+
+    radius: float = attrs.field(converter=_radius)
+
+
+def _vertices(value: ArrayLike) -> Array:
+    vertices = floats(value, "vertices", LARGEST_SIZE)
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or len(vertices) < 4:
+        raise ShapeError(f"vertices: expected at least 4 points (k, 3), got {vertices.shape}")
+    return read_only(vertices)
+
+
+def _faces(value: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    faces = np.array(value)
+    if faces.dtype.kind not in "iu":
+        raise KindError(f"faces: expected numbers of vertices, got {faces.dtype}")
+    if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) < 4:
+        raise ShapeError(f"faces: expected at least 4 triangles (m, 3), got {faces.shape}")
+    faces = faces.astype(np.int32)
+    faces.setflags(write=False)
+    return faces
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Mesh:
+    """A solid between triangles, each of which is seen counterclockwise from outside.
+
+    Attributes:
+        vertices: (k, 3) [m].
+        faces: (m, 3) the numbers of the vertices of each triangle, from 0.
+        name: of its file; empty where it has none.
+    """
+
+    vertices: Array = attrs.field(converter=_vertices)
+    faces: npt.NDArray[np.int32] = attrs.field(converter=_faces)
+    name: str = ""
+
+    __reduce__ = reduce_by_fields
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse triangles of vertices that there are not."""
+        if not (self.faces.min() >= 0 and self.faces.max() < len(self.vertices)):
+            raise InvalidValueError(
+                f"faces: expected numbers from 0 to {len(self.vertices) - 1}, the vertices there are"
+            )
+
+
+Shape: TypeAlias = Box | Cylinder | Capsule | Sphere | Mesh
+
+
+def is_closed(mesh: Mesh) -> bool:
+    """Whether the triangles of a mesh enclose a solid: every edge belongs to two of them, once in either direction."""
+    edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    there = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
+    back = edges[:, 1] * len(mesh.vertices) + edges[:, 0]
+    return len(np.unique(there)) == len(there) and bool(np.isin(back, there).all())
+
+
+def farthest(shape: Shape) -> float:
+    """Return the largest distance of a point of a solid from its origin [m]."""
+    match shape:
+        case Box(size=size):
+            return float(np.linalg.norm(size)) / 2
+        case Cylinder(radius=radius, length=length):
+            return math.hypot(radius, length / 2)
+        case Capsule(radius=radius, length=length):
+            return radius + length / 2
+        case Sphere(radius=radius):
+            return radius
+        case Mesh(vertices=vertices):
+            return float(np.linalg.norm(vertices, axis=1).max())
+
+
+def volume(shape: Shape) -> float:
+    """Return the volume of a solid [m³]; that of a mesh means something where it is closed."""
+    match shape:
+        case Box(size=size):
+            return float(np.prod(size))
+        case Cylinder(radius=radius, length=length):
+            return math.pi * radius**2 * length
+        case Capsule(radius=radius, length=length):
+            return math.pi * radius**2 * (length + 4 / 3 * radius)
+        case Sphere(radius=radius):
+            return 4 / 3 * math.pi * radius**3
+        case Mesh():
+            return float(_tetrahedra(shape)[0].sum())
+
+
+def centroid(shape: Shape) -> Array:
+    """Return the centre of mass (3,) of a solid of one density [m]."""
+    if not isinstance(shape, Mesh):
+        return np.zeros(3)
+    volumes, corners = _tetrahedra(shape)
+    return np.asarray(volumes @ corners.sum(axis=1) / 4 / volumes.sum())
+
+
+def inertia(shape: Shape) -> Array:
+    """Return the inertia tensor (3, 3) of a solid of 1 kg and one density about its centre of mass [m²].
+
+    Source:
+        Tonon (2004), Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates.
+    """
+    match shape:
+        case Box(size=size):
+            squares = size**2 / 12
+            return np.diag(squares.sum() - squares)
+        case Cylinder(radius=radius, length=length):
+            across = (3 * radius**2 + length**2) / 12
+            return np.diag([across, across, radius**2 / 2])
+        case Capsule(radius=radius, length=length):
+            return _of_capsule(radius, length)
+        case Sphere(radius=radius):
+            return np.eye(3) * (2 / 5 * radius**2)
+        case Mesh():
+            volumes, corners = _tetrahedra(shape)
+            corners = corners - centroid(shape)
+            total = corners.sum(axis=1)
+            second = (np.einsum("ka,kb->kab", total, total) + np.einsum("kia,kib->kab", corners, corners)) / 20
+            moments = np.einsum("k,kab->ab", volumes, second) / volumes.sum()
+            return np.asarray(np.trace(moments) * np.eye(3) - moments)
+
+
+def _of_capsule(radius: float, length: float) -> Array:
+    """Return the tensor of a capsule of 1 kg."""
+    tube, ball = length, 4 / 3 * radius  # their volumes by the area of the tube
+    along = tube * radius**2 / 2 + ball * 2 / 5 * radius**2
+    # Half a ball has its centre of mass 3/8 of the radius beyond the end of the tube.
+    beyond = length / 2 + 3 / 8 * radius
+    across = tube * (3 * radius**2 + length**2) / 12 + ball * (83 / 320 * radius**2 + beyond**2)
+    return np.diag([across, across, along]) / (tube + ball)
+
+
+def _tetrahedra(mesh: Mesh) -> tuple[Array, Array]:
+    """Return the signed volumes (m,) and the corners (m, 4, 3) of tetrahedra from a corner of a mesh to its faces."""
+    apex = mesh.vertices[0]
+    faces = mesh.vertices[mesh.faces]
+    a, b, c = np.moveaxis(faces - apex, 1, 0)
+    corners = np.concatenate([np.broadcast_to(apex, (len(faces), 1, 3)), faces], axis=1)
+    return np.einsum("ki,ki->k", a, np.cross(b, c)) / 6, corners
