@@ -125,9 +125,8 @@ class Mesh:
     def __attrs_post_init__(self) -> None:
         """Refuse triangles of vertices that there are not."""
         if not (self.faces.min() >= 0 and self.faces.max() < len(self.vertices)):
-            raise InvalidValueError(
-                f"faces: expected numbers from 0 to {len(self.vertices) - 1}, the vertices there are"
-            )
+            last = len(self.vertices) - 1
+            raise InvalidValueError(f"faces: expected numbers of vertices, from 0 to {last}, got {self.faces.max()}")
 
 
 Shape: TypeAlias = Box | Cylinder | Capsule | Sphere | Mesh
