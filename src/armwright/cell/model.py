@@ -10,6 +10,7 @@ from armwright.arm.gravity import in_world
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.frames import WORLD, FrameTree, Node
+from armwright.cell.scene import Fixture, Gripper, Part
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import one_pose
@@ -43,6 +44,7 @@ class CellArm:
         start: (n,) joint positions at the start.
         open_time: time in which the fingers open [s].
         grasp_time: time in which they close [s].
+        gripper: what it holds parts with; None where nothing is known of it.
     """
 
     arm: Arm
@@ -50,6 +52,7 @@ class CellArm:
     start: Array = attrs.field(converter=_as_configuration)
     open_time: float = 0.3
     grasp_time: float = 0.3
+    gripper: Gripper | None = None
 
     def __attrs_post_init__(self) -> None:
         """Refuse a start of another number of joints."""
@@ -81,7 +84,10 @@ class Cell:
         arms: by name, such as ``ARM_1``; the gravity of each model is that of the cell, along the axes of its base.
         gravity: (3,) acceleration of free fall along the axes of the world [m/s²].
         frames: by name, in upper case.
-        visions: answers of the camera by frame name, in order, (4, 4) relative to the camera.
+        fixtures: bodies that stand where they are, by name.
+        parts: bodies that grippers hold and move, by name.
+        seen_parts: by frame name, the part whose grasp pose the camera answers with.
+        visions: other answers of the camera by frame name, in order, (4, 4) relative to the camera.
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
         devices: names of the devices that can be operated; None allows any name.
@@ -99,6 +105,9 @@ class Cell:
     arms: Mapping[str, CellArm]
     gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_as_gravity)
     frames: Mapping[str, Node] = attrs.field(factory=dict)
+    fixtures: Mapping[str, Fixture] = attrs.field(factory=dict)
+    parts: Mapping[str, Part] = attrs.field(factory=dict)
+    seen_parts: Mapping[str, str] = attrs.field(factory=dict)
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False

@@ -1,8 +1,7 @@
 """Cell files: TOML for people, JSON for programs, with the same content."""
 
 import math
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import attrs
@@ -12,9 +11,11 @@ from armwright.arm.load import is_path, load_arm
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array
+from armwright.cell.entries import ARM_NAME, read_name, read_pose, refuse_too_many, to_pose
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane
 from armwright.cell.names import arm_name
+from armwright.cell.scene_reader import read_fixtures, read_gripper, read_parts
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
@@ -22,8 +23,7 @@ from armwright.files.inputs import file_path, regular_file
 from armwright.files.limits import limit, limit_message
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.spatial.poses import from_noap, homogeneous, inverse as inverse_pose
-from armwright.spatial.rotations import nearest_rotation, orthonormality_error
+from armwright.spatial.poses import inverse as inverse_pose
 
 # Smallest distance of the bases of two arms [m].
 _MIN_BASE_DISTANCE = 0.01
@@ -31,10 +31,6 @@ _MIN_BASE_DISTANCE = 0.01
 _MIN_JOINTS = 6
 # The arm of a cell whose file names none: that of the report.
 _DEFAULT_ARM = "stanford"
-_ARM_NAME = re.compile(r"ARM[-_]([0-9]+)", re.IGNORECASE | re.ASCII)
-_NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
-# Orthonormality error of a rotation: two digits deviate by up to 0.018 and are made exact; more is a mistake.
-_MAX_ROTATION_ERROR = 2e-2
 # Servo periods [ms]: a shorter one fills the disk, a longer one controls nothing.
 SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
@@ -65,13 +61,18 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
+    fixtures, parts = read_fixtures(top.table("scene")), read_parts(top.table("parts"))
+    seen_parts, visions = _read_visions(top.table("visions"), parts)
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
         gravity=_read_gravity(top),
         frames=_read_frames(top.table("frames"), arms),
-        visions=_read_visions(top.table("visions")),
-        camera=_read_pose(camera, "pose", default=np.eye(4)),
+        fixtures=fixtures,
+        parts=parts,
+        seen_parts=seen_parts,
+        visions=visions,
+        camera=read_pose(camera, "pose", default=np.eye(4)),
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
         devices=_read_devices(top.table("devices")) if "devices" in top else None,
@@ -112,9 +113,9 @@ def _optional_number(
 
 def _read_arms(table: Table, folder: Path) -> dict[str, CellArm]:
     arms: dict[str, CellArm] = {}
-    _refuse_too_many(table, "arms")
+    refuse_too_many(table, "arms")
     for key in table:
-        match = _ARM_NAME.fullmatch(key)
+        match = ARM_NAME.fullmatch(key)
         if match is None:
             raise table.error(key, "expected the name of an arm, such as ARM_1")
         name = arm_name(match[1])
@@ -150,15 +151,17 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         weighed(arm)
     except ArmwrightError as error:
         raise table.error("model", f"{error}, but the motions of a program are computed with efforts") from error
-    arm = attrs.evolve(arm, tool=_read_pose(table, "tool", default=arm.tool))
-    base = _read_pose(table, "base", default=np.eye(4))
+    arm = attrs.evolve(arm, tool=read_pose(table, "tool", default=arm.tool))
+    base = read_pose(table, "base", default=np.eye(4))
     table.allow("hand", "joint_positions")
     start = _read_start(table, arm, base)
     open_time, grasp_time = (
         table.number(key, default=0.3, lower=0.0, upper=_MAX_DURATION) for key in ("open_s", "grasp_s")
     )
+    gripper = read_gripper(table.table("gripper")) if "gripper" in table else None
+    table.allow("gripper")
     table.refuse_unknown_keys()
-    return CellArm(arm=arm, base=base, start=start, open_time=open_time, grasp_time=grasp_time)
+    return CellArm(arm=arm, base=base, start=start, open_time=open_time, grasp_time=grasp_time, gripper=gripper)
 
 
 def _read_start(table: Table, arm: Arm, base: Array) -> Array:
@@ -174,25 +177,25 @@ def _read_start(table: Table, arm: Arm, base: Array) -> Array:
         return q
     if "hand" not in table:
         raise table.error("hand", "missing; specify the initial pose of the gripper, or the joints as joint_positions")
-    solution = inverse(arm, inverse_pose(base) @ _read_pose(table, "hand"))
+    solution = inverse(arm, inverse_pose(base) @ read_pose(table, "hand"))
     if not solution.allowed:
         raise table.error("hand", solution.explain())
     return solution.best.q
 
 
 def _read_frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
-    _refuse_too_many(table, "frames")
+    refuse_too_many(table, "frames")
     frames: dict[str, Node] = {}
     entries: dict[str, Table] = {}
     for key in table:
-        name = _read_name(table, key, frames)
+        name = read_name(table, key, frames)
         if table.is_table(key):
             entry = entries[name] = table.table(key)
-            parent = _read_name(entry, "on", (), entry.text("on", default=WORLD))
-            frames[name] = Node(parent=parent, relation=_read_pose(entry, "at"))
+            parent = read_name(entry, "on", (), entry.text("on", default=WORLD))
+            frames[name] = Node(parent=parent, relation=read_pose(entry, "at"))
             entry.refuse_unknown_keys()
         else:
-            frames[name] = Node(parent=WORLD, relation=_read_pose(table, key))
+            frames[name] = Node(parent=WORLD, relation=read_pose(table, key))
     known = {WORLD, "STATION", *arms, *frames}
     max_depth = limit("hanging")
     for name, entry in entries.items():
@@ -219,60 +222,31 @@ def _path_to_root(name: str, frames: Mapping[str, Node], max_depth: int) -> list
     return list(path)
 
 
-def _refuse_too_many(table: Table, bound: str) -> None:
-    """Refuse a table with more keys than a limit."""
-    got = sum(1 for _ in table)
-    if got > limit(bound):
-        raise table.error(None, f"too many: {limit_message(bound, got)}")
-
-
-def _read_visions(table: Table) -> dict[str, tuple[Array, ...]]:
-    _refuse_too_many(table, "entries")
+def _read_visions(table: Table, parts: Collection[str]) -> tuple[dict[str, str], dict[str, tuple[Array, ...]]]:
+    """Read what the camera answers by frame: the part that it finds, or a list of poses."""
+    refuse_too_many(table, "entries")
+    seen: dict[str, str] = {}
     visions: dict[str, tuple[Array, ...]] = {}
     for key in table:
-        name = _read_name(table, key, visions)
-        poses = enumerate(table.vectors(key, 12))
-        visions[name] = tuple(_to_pose(table, key, numbers, index) for index, numbers in poses)
-    return visions
+        name = read_name(table, key, {*seen, *visions})
+        if table.is_table(key):
+            entry = table.table(key)
+            part = seen[name] = entry.text("part").upper()
+            if part not in parts:
+                near = closest(part, parts)
+                hint = f"; did you mean {near}?" if near else ""
+                raise entry.error("part", f"{part} is not a part of the cell{hint}")
+            entry.refuse_unknown_keys()
+        else:
+            poses = enumerate(table.vectors(key, 12))
+            visions[name] = tuple(to_pose(table, key, numbers, index) for index, numbers in poses)
+    return seen, visions
 
 
 def _read_devices(table: Table) -> frozenset[str]:
-    _refuse_too_many(table, "entries")
+    refuse_too_many(table, "entries")
     devices: set[str] = set()
     for key in table:
-        devices.add(_read_name(table, key, devices))
+        devices.add(read_name(table, key, devices))
         table.table(key).refuse_unknown_keys()
     return frozenset(devices)
-
-
-def _read_name(table: Table, key: str, taken: Iterable[str], text: str | None = None) -> str:
-    """Return a name in the form in which the language compares it: in upper case, and valid in a program."""
-    written = key if text is None else text
-    name, match = written.upper(), _ARM_NAME.fullmatch(written)
-    if text is not None and match:
-        return arm_name(match[1])
-    if not _NAME.fullmatch(written) or (text is None and (name == WORLD or match)):
-        raise table.error(
-            key, f"{written!r} cannot name a frame or device: letters A to Z, digits and _, not WORLD or an arm"
-        )
-    if name in taken:
-        raise table.error(key, f"{name} occurs twice; case does not distinguish names")
-    return name
-
-
-def _read_pose(table: Table, key: str, default: Array | None = None) -> Array:
-    if default is not None and key not in table:
-        table.allow(key)
-        return default
-    return _to_pose(table, key, table.vector(key, 12))
-
-
-def _to_pose(table: Table, key: str, numbers: Array, index: int | None = None) -> Array:
-    X = from_noap(numbers)
-    error = float(orthonormality_error(X[:3, :3]))
-    if error > _MAX_ROTATION_ERROR:
-        by_rows = np.linalg.norm(numbers.reshape(3, 4)[:, :3], axis=-1)
-        rows = np.allclose(by_rows, 1.0, atol=_MAX_ROTATION_ERROR)
-        hint = "; they look like rows: write the columns n, o, a, p" if rows else ""
-        raise table.error(key, f"the first nine numbers are not a rotation (error {error:.2g}){hint}", index)
-    return homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import NamedTuple
-
 import numpy as np
 
-from armwright.arm.units import ANGLE, LENGTH, number_in
-from armwright.arrays import Array
+from armwright.cell.entries import read_name, read_pose, refuse_too_many
 from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, Spread, table
 from armwright.errors import ArmwrightError
 from armwright.files.document import Table
-from armwright.files.limits import limit, limit_message
 from armwright.spatial.shapes import LARGEST_SIZE, Box, Cylinder, Shape, Sphere
 
 # A coefficient of friction beyond this is that of glue.
@@ -26,19 +20,7 @@ _MAX_SYMMETRY = 360
 _SHAPES = ("box", "cylinder", "sphere")
 
 
-class Poses(NamedTuple):
-    """How a cell file reads poses and names.
-
-    Attributes:
-        pose: reads twelve numbers under a key as a pose; the default where the key is missing.
-        name: returns the name under a key in the form in which programs compare it.
-    """
-
-    pose: Callable[[Table, str, Array | None], Array]
-    name: Callable[[Table, str], str]
-
-
-def read_fixtures(scene: Table, read: Poses) -> dict[str, Fixture]:
+def read_fixtures(scene: Table) -> dict[str, Fixture]:
     """Read the bodies that stand where they are, by name.
 
     Raises:
@@ -50,13 +32,11 @@ def read_fixtures(scene: Table, read: Poses) -> dict[str, Fixture]:
     scene.allow("table")
     for kind in ("boxes", "cylinders", "spheres"):
         for entry in scene.tables(kind) if kind in scene else ():
-            name = read.name(entry, "name")
-            if name in fixtures:
-                raise entry.error("name", f"{name} occurs twice in the scene")
+            name = read_name(entry, "name", fixtures, entry.text("name"))
             fixtures[name] = Fixture(
                 name=name,
                 shape=_shape(entry, {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere"}[kind]),
-                pose=read.pose(entry, "at", None),
+                pose=read_pose(entry, "at"),
                 friction=_friction(entry),
             )
             entry.refuse_unknown_keys()
@@ -83,7 +63,7 @@ def _table(entry: Table) -> Fixture:
     return result
 
 
-def read_parts(parts: Table, read: Poses) -> dict[str, Part]:
+def read_parts(parts: Table) -> dict[str, Part]:
     """Read the parts, by name.
 
     Raises:
@@ -91,28 +71,27 @@ def read_parts(parts: Table, read: Poses) -> dict[str, Part]:
     """
     result: dict[str, Part] = {}
     numbers: dict[int, str] = {}
-    if (got := sum(1 for _ in parts)) > limit("entries"):
-        raise parts.error(None, f"too many: {limit_message('entries', got)}")
+    refuse_too_many(parts, "entries")
     for key in parts:
         entry = parts.table(key)
-        name = read.name(parts, key)
-        if name in result:
-            raise parts.error(key, f"{name} occurs twice; case does not distinguish names")
-        marker = _marker(entry.table("marker"), read) if "marker" in entry else None
+        name = read_name(parts, key, result)
+        marker = _marker(entry.table("marker")) if "marker" in entry else None
         if marker is not None and (other := numbers.setdefault(marker.number, name)) != name:
-            raise entry.table("marker").error("id", f"the parts {other} and {name} have the same marker {marker.number}")
+            raise entry.table("marker").error(
+                "id", f"the parts {other} and {name} have the same marker {marker.number}"
+            )
         entry.allow("marker")
         result[name] = Part(
             name=name,
             shape=_shape(entry, entry.choice("shape", _SHAPES, default="box")),
             mass=entry.number("mass_kg", lower=1e-6, upper=_MAX_MASS),
             friction=_friction(entry),
-            pose=read.pose(entry, "at", None),
+            pose=read_pose(entry, "at"),
             spread=Spread(
                 position=entry.number("spread_mm", default=0.0, lower=0.0, upper=1e6) * 1e-3,
                 yaw=np.radians(entry.number("spread_deg", default=0.0, lower=0.0, upper=180.0)),
             ),
-            grasp=read.pose(entry, "grasp", np.eye(4)),
+            grasp=read_pose(entry, "grasp", np.eye(4)),
             marker=marker,
             symmetry=_whole(entry, "symmetry", 1, _MAX_SYMMETRY, default=1),
         )
@@ -120,11 +99,11 @@ def read_parts(parts: Table, read: Poses) -> dict[str, Part]:
     return result
 
 
-def _marker(entry: Table, read: Poses) -> Marker:
+def _marker(entry: Table) -> Marker:
     marker = Marker(
         number=_whole(entry, "id", 0, _MARKERS - 1),
         size=entry.number("size_mm", lower=1.0, upper=1e4) * 1e-3,
-        pose=read.pose(entry, "at", np.eye(4)),
+        pose=read_pose(entry, "at", np.eye(4)),
     )
     entry.refuse_unknown_keys()
     return marker
@@ -153,7 +132,11 @@ def _shape(entry: Table, kind: str) -> Shape:
         if kind == "box":
             return Box(size=entry.vector("size_mm", 3) * 1e-3)
         radius = entry.positive("diameter_mm") * 0.5e-3
-        return Sphere(radius=radius) if kind == "sphere" else Cylinder(radius=radius, length=entry.positive("height_mm") * 1e-3)
+        return (
+            Sphere(radius=radius)
+            if kind == "sphere"
+            else Cylinder(radius=radius, length=entry.positive("height_mm") * 1e-3)
+        )
     except ArmwrightError as error:
         raise error if hasattr(error, "path") else entry.error(None, str(error)) from error
 
@@ -164,8 +147,10 @@ def _friction(entry: Table, default: float = 0.8) -> float:
 
 def _whole(entry: Table, key: str, least: int, most: int, *, default: int | None = None) -> int:
     """Read a whole number."""
-    number = entry.number(key, lower=least, upper=most) if default is None else entry.number(
-        key, default=default, lower=least, upper=most
+    number = (
+        entry.number(key, lower=least, upper=most)
+        if default is None
+        else entry.number(key, default=default, lower=least, upper=most)
     )
     if number != round(number):
         raise entry.error(key, f"expected a whole number, got {number:g}")
