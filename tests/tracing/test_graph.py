@@ -1,6 +1,7 @@
 """The graph of traced equations."""
 
 import math
+from collections.abc import Callable
 
 import hypothesis.strategies as st
 import numpy as np
@@ -11,7 +12,7 @@ from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.kinematics.jacobians import jacobian_columns
 from armwright.tracing.graph import Graph, Traced, operation_count, reachable
-from armwright.tracing.scalar import Scalar, atan2, cos, select, sin, sqrt
+from armwright.tracing.scalar import Scalar, atan2, cos, round_half_even, select, sin, sqrt
 from oracles.arms import random_arm
 from oracles.graphs import evaluate
 
@@ -145,6 +146,18 @@ def test_sine_and_cosine_are_taken_once() -> None:
 
     assert count["sin"] <= 5
     assert count["cos"] <= 5
+
+
+@pytest.mark.parametrize("function", [sin, cos, round_half_even])
+def test_no_number_is_a_constant_too(function: Callable[[Scalar], Scalar]) -> None:
+    """A function of a constant that is infinite or no number has a value, and does not stop the tracing."""
+    (x,) = Graph().inputs(1)
+    infinite, nan = 1.0 / (0.0 * x), 0.0 * x / (0.0 * x)
+
+    values = [x.graph.value(function(constant).node) for constant in (nan, infinite, -infinite)]
+
+    expected = [math.nan, math.inf, -math.inf] if function is round_half_even else [math.nan] * 3
+    np.testing.assert_array_equal(values, expected)
 
 
 def test_signed_zero_and_negative_constants() -> None:

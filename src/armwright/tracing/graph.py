@@ -286,25 +286,25 @@ def operation_count(graph: Graph, outputs: Iterable[int]) -> dict[str, int]:
     return dict(sorted(count.items()))
 
 
-def _ratio(a: float, b: float) -> float:
+def _quotient(a: float, b: float) -> float:
     """Divide as the processor does: by 0 too."""
     if b:
         return a / b
-    return math.copysign(math.inf, a) * math.copysign(1.0, b) if a and a == a else math.nan  # noqa: PLR0124
+    return math.nan if a == 0 or math.isnan(a) else math.copysign(math.inf, a) * math.copysign(1.0, b)
 
 
 _FOLD: dict[str, Callable[..., float]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
     "multiply": lambda a, b: a * b,
-    "divide": _ratio,
+    "divide": _quotient,
     "negate": lambda a: -a,
-    "sin": math.sin,
-    "cos": math.cos,
+    "sin": lambda a: math.sin(a) if math.isfinite(a) else math.nan,
+    "cos": lambda a: math.cos(a) if math.isfinite(a) else math.nan,
     "sqrt": lambda a: math.sqrt(max(a, 0.0)),
     "atan2": math.atan2,
     "absolute": abs,
-    "round": lambda a: float(round(a)),
+    "round": lambda a: float(round(a)) if math.isfinite(a) else a,
     "less": lambda a, b: float(a < b),
     "less_equal": lambda a, b: float(a <= b),
     "select": lambda c, a, b: a if c else b,
