@@ -16,13 +16,13 @@ from armwright.tracing.vectors import Matrix
 
 _OF_LINK = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _OF_DRIVE = ("rotor", "viscous", "forward", "backward")
-# Motions of which the structure is found; each gives an equation per joint.
+# States at which the regressor is evaluated to find its structure; each gives an equation per joint.
 _MOTIONS = 100
 # A column that is no longer than this part of the longest has no effect.
 _NO_EFFECT = 1e-12
-# What is left of a column behind others that it is a combination of, as a part of it: rounding leaves 1e-13.
+# A column of which no longer part is orthogonal to others is a combination of them: rounding leaves 1e-13.
 _DEPENDENT = 1e-10
-# A share of one column in another that is no more than rounding.
+# A coefficient of one column in another that is no more than rounding.
 _NO_SHARE = 1e-11
 
 
@@ -72,8 +72,9 @@ def base_parameters(arm: Arm) -> BaseParameters:
     Source:
         Gautier (1991), Numerical calculation of the base inertial parameters of robots.
     """
-    found = _base_parameters(weighed(arm))
-    return found._replace(combinations=found.combinations.copy())
+    parameters = _base_parameters(weighed(arm))
+    # The caller may write into its array; that of the cache stays as it is.
+    return parameters._replace(combinations=parameters.combinations.copy())
 
 
 def base_regressor(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -116,7 +117,7 @@ def _base_parameters(arm: Arm) -> BaseParameters:
     Y = Y.reshape(-1, (OF_LINK + OF_DRIVE) * n)
     lengths = np.linalg.norm(Y, axis=0)
     has_effect = lengths > _NO_EFFECT * lengths.max()
-    # As many rows as columns tell the same.
+    # The factor R has the same dependences between columns, in as many rows as columns.
     units = np.array(np.linalg.qr(np.where(has_effect, Y / np.where(has_effect, lengths, 1.0), 0.0), mode="r"))
     of_links = [OF_LINK * i + k for i in range(n) for k in (*range(1, OF_LINK), 0)]
     columns = _independent(units, [*of_links, *range(OF_LINK * n, len(lengths))])
@@ -129,7 +130,11 @@ def _base_parameters(arm: Arm) -> BaseParameters:
 
 
 def _independent(units: Array, order: Sequence[int]) -> list[int]:
-    """Return which columns, of length 1 or 0, are no combination of those before them in an order."""
+    """Return which columns, of length 1 or 0, are no combination of those before them in an order.
+
+    Source:
+        Gram-Schmidt orthogonalisation, done twice: Giraud et al. (2005).
+    """
     basis = np.zeros((len(units), len(order)))
     columns: list[int] = []
     for k in order:
