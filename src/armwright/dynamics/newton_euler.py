@@ -133,9 +133,7 @@ class JointMotion(NamedTuple):
     U: Matrix
 
 
-def joint_motions(
-    arm: Arm, steps: Sequence[JointStep], qd: Scalars, qdd: Scalars, base_acceleration: Scalars = _STILL
-) -> list[JointMotion]:
+def joint_motions(arm: Arm, steps: Sequence[JointStep], qd: Scalars, qdd: Scalars) -> list[JointMotion]:
     """Return the motion of each link, from the base outward.
 
     Args:
@@ -143,14 +141,13 @@ def joint_motions(
         steps: the steps from joint to joint.
         qd: n joint velocities.
         qdd: n joint accelerations.
-        base_acceleration: of the base, along its own axes.
     """
 
     def step_outward(motion: JointMotion, *of_joint: Any) -> tuple[JointMotion, JointMotion]:
         motion = _next_motion(motion, *of_joint)
         return motion, motion
 
-    return scan(step_outward, _base_motion(arm, base_acceleration), steps, qd, qdd)[1]
+    return scan(step_outward, _base_motion(arm, _STILL), steps, qd, qdd)[1]
 
 
 def _base_motion(arm: Arm, base_acceleration: Scalars) -> JointMotion:
