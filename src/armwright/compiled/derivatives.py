@@ -17,7 +17,6 @@ from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import mirrored
 
-
 # Numbers of one input at most: each is a node of the graph, and code is written for it.
 _MAX_NUMBERS = 10_000
 
