@@ -3,7 +3,7 @@
 Each link with all links beyond it, their joints free to move, reacts to a force at its own joint like a body whose
 inertia depends on the direction. That inertia, and the force without acceleration, are passed inward from the last
 link; accelerations are passed back outward. Accelerations here are those of material points, not spatial ones, so
-linear speeds never appear.
+linear velocities never appear.
 """
 
 from __future__ import annotations

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
@@ -218,20 +216,6 @@ def tool_wrench(arm: Arm, steps: Sequence[JointStep], wrench: Scalars) -> tuple[
 def _along_next_axes(vectors: tuple[Vector, Vector], step: JointStep) -> tuple[tuple[Vector, Vector], tuple[()]]:
     a, b = vectors
     return (step.inward_axes(a), step.inward_axes(b)), ()
-
-
-def coulomb_friction(arm: Arm, qd: Array) -> Array:
-    """Return the Coulomb friction of joints that move, 0 of a joint at rest.
-
-    Args:
-        arm: the arm, with n joints.
-        qd: (..., n) joint velocities.
-
-    Returns:
-        (..., n) the efforts that overcome it [N m] or [N], positive in the direction of q.
-    """
-    forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
-    return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
 
 
 def inverse_dynamics(

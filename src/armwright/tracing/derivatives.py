@@ -6,8 +6,8 @@ share with it or with each other are one node, and what is 0 disappears.
 
 Where an operation has no derivative, the one here is
 
-- 0 for ``round`` and for comparisons, and so for what a choice gains by changing over: dry friction, as a function of
-  the speed, has the derivative 0 at rest, too. A choice has the derivative of the branch that is chosen.
+- 0 for ``round`` and for comparisons, and so for what a choice gains by changing over: Coulomb friction, as a
+  function of the velocity, has the derivative 0 at rest, too. A choice has the derivative of the branch that is chosen.
 - 0 for the absolute value at 0, and for the angle of the point (0, 0).
 - 0 for a root at 0 and below, where ``sqrt`` itself is 0.
 
