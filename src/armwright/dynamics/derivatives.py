@@ -158,7 +158,7 @@ def acceleration_partials(
     """Return the derivatives of the accelerations by positions, velocities and efforts, over traced scalars.
 
     The efforts are differentiated at constant accelerations, which are inputs at first; the accelerations that the
-    efforts cause are put in their place afterwards.
+    efforts cause replace them afterwards.
 
     Args:
         arm: the arm, with n joints.

@@ -20,8 +20,8 @@ from armwright.tracing.machine import MachineCode, with_results
 # What a kernel returns beside 0: some configuration is without meaning, or unusual.
 MEANINGLESS, UNUSUAL = 1, 2
 
-# Blocks of rows of more bytes than this do not stay in the nearest cache: they are written from front to back, and not
-# asked for before.
+# Blocks with rows of more bytes than this do not stay in the nearest cache: they are written from front to back, and
+# not fetched before.
 _LONG_ROW = 2048
 
 
@@ -227,7 +227,7 @@ def _write_with_stores(
     stores: Sequence[_Store],
     lines: Sequence[tuple[str, int]],
 ) -> None:
-    """Write operations, results as soon as they are known, and what asks for the lines of memory that these take."""
+    """Write operations, stores of results as soon as they are known, and prefetches of the lines that these write."""
     interval, waiting = max(1, len(order) // max(1, len(lines))), iter(lines)
     for count, (i, complete) in enumerate(order, 1):
         operations.write(i)

@@ -173,7 +173,7 @@ class Builder:
         self.do(f"call void @copy(ptr {to}, ptr {source}, i64 {size})")
 
     def prefetch(self, start: str, offset: int, *, is_written: bool) -> None:
-        """Ask for a line of memory, to read or to write it."""
+        """Fetch a line of memory into the cache, to read or to write it."""
         self.declare("void @llvm.prefetch.p0(ptr, i32, i32, i32)")
         address = self.address(start, offset, "i8")
         self.do(f"call void @llvm.prefetch.p0(ptr {address}, i32 {int(is_written)}, i32 3, i32 1)")

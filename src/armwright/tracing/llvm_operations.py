@@ -39,7 +39,7 @@ class Block(NamedTuple):
 
 
 class Prefetch(NamedTuple):
-    """Memory of the next block of rows, and the loop during which it is asked for, a part at each link."""
+    """Memory of the next block of rows, and the loop during which it is fetched, a part at each link."""
 
     loop: Loop
     blocks: Sequence[Block]
@@ -74,7 +74,7 @@ class Operations:
             graph: whose operations they are.
             read: gives an input by its number.
             inputs: the address of all inputs on the stack, if they are there.
-            prefetch: what to ask for during one of the loops.
+            prefetch: memory that is fetched during one of the loops.
         """
         self._builder, self._graph, self._read = builder, graph, read
         self._inputs, self._prefetch = inputs, prefetch
@@ -175,7 +175,7 @@ class Operations:
         for x, begin in zip(state, start, strict=True):
             b.do(f"{x} = phi {b.number} [{begin}, %{before}], [{x}_next, %{name}_end]")
         if self._prefetch is not None and loop is self._prefetch.loop:
-            self._ask_for_part(self._prefetch.blocks, link, n)
+            self._fetch_part(self._prefetch.blocks, link, n)
         row = b.let(f"mul i64 {link}, {width}")
         labels = [f"{name}_kind{kind}" for kind in range(len(loop.steps))]
         self._branch_to_kind(loop, link, labels)
@@ -230,8 +230,8 @@ class Operations:
             yield names[: loop.carried]
             b.do(f"br label %{end}")
 
-    def _ask_for_part(self, blocks: Sequence[Block], link: str, links: int) -> None:
-        """Ask for the part of blocks that is due at a link."""
+    def _fetch_part(self, blocks: Sequence[Block], link: str, links: int) -> None:
+        """Fetch the part of blocks that is due at a link."""
         b = self._builder
         for block in blocks:
             lines = -(-block.size // (CACHE_LINE * links))

@@ -35,18 +35,18 @@ _SUMS = frozenset({"add", "subtract"})
 # What the library of a language has for each type of numbers.
 _OF_A_LIBRARY = frozenset({"sin", "cos", "atan2", "round"})
 
-# No angle beyond has a sine: what an equation computes of its inputs may be one.
+# Larger angles, which an equation may compute of its inputs, have no sine: it is NaN.
 _LARGEST_REDUCED = 1e15
 
 
 class Watched(NamedTuple):
-    """What makes a configuration valid, and what makes it unusual, by the numbers of nodes.
+    """The conditions that make a configuration valid, and those that make it unusual, by the numbers of nodes.
 
     Attributes:
         angles: inputs whose sine is taken, which must be finite and no larger than ``LARGEST_ANGLE``.
         others: inputs that must be finite and no larger than ``LARGEST``.
         positive: nodes that must be above 0.
-        bounds: by node, beyond what it is unusual.
+        bounds: magnitudes beyond which nodes are unusual.
     """
 
     angles: Sequence[int] = ()
@@ -60,8 +60,8 @@ class MachineCode(NamedTuple):
 
     Attributes:
         graph: its nodes, each behind its operands.
-        order: the nodes in use.
-        outputs: the nodes of the values asked for; numbers, but for those of flags.
+        order: the nodes that the outputs and conditions need.
+        outputs: the nodes of the outputs; numbers, but for flags, which are truth values.
         invalid: the truth value that a configuration has no meaning; None where none is watched.
         unusual: the truth value that an input is beyond its bound; None where there are no bounds.
         joined: how many additions take in a multiplication.
@@ -87,7 +87,7 @@ def machine_code(
 
     Args:
         graph: the graph of an equation.
-        outputs: the nodes whose values are asked for.
+        outputs: the nodes of the outputs.
         watched: what is watched, if anything.
         flags: which outputs, by their numbers, are truth values.
         any_type: whether it is for any type of numbers, not for double alone.
@@ -107,8 +107,8 @@ def with_results(
 ) -> list[tuple[int, list[int]]]:
     """Return the nodes in use in an order in which results are complete early, each with those it completes.
 
-    What is written as soon as it is known is not in the way until the end. Conditions, too, stand right behind what
-    they are about: at the end they would keep all inputs until then.
+    A result that is written as soon as it is known is not live until the end, and takes no register there. Conditions,
+    too, stand right behind what they are about: at the end they would keep all inputs live.
 
     Args:
         code: operations.
@@ -116,7 +116,7 @@ def with_results(
         in_turn: whether the groups are to be complete one after the other; otherwise the nodes stay in their order.
 
     Returns:
-        Of each node its number, and the numbers of the groups of which it is the last.
+        The nodes, each with the numbers of the groups that are complete with it.
     """
     rank: dict[int, int] = {i: i for i in reachable(code.graph, code.outputs)} if not in_turn else {}
     for k, nodes in enumerate(groups if in_turn else ()):
@@ -308,7 +308,7 @@ class _Target:
     def verdicts(self, watched: Watched, new: Mapping[int, int]) -> tuple[int | None, int | None]:
         """Return whether a configuration is invalid, and whether it is unusual."""
         valid: list[int] = []
-        # One sum of squares tells of many: it is not a number, infinite or too large where one of them is.
+        # One sum of squares for all: it is NaN, infinite or too large where one of the inputs is.
         for inputs, largest in ((watched.angles, LARGEST_ANGLE), (watched.others, LARGEST)):
             if inputs:
                 first, *others = (new[i] for i in inputs)
@@ -379,7 +379,7 @@ def fused(graph: Graph, order: Iterable[int], outputs: Iterable[int]) -> dict[in
     Args:
         graph: the graph.
         order: the nodes in use.
-        outputs: the nodes whose values are asked for.
+        outputs: the nodes of the outputs.
     """
     users: dict[int, list[int]] = {}
     for i in order:

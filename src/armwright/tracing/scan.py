@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 from armwright.tracing.graph import Graph, Loop, LoopStep, Node, Traced
 
-# A scalar, or lists, tuples and named tuples of trees. What is no number (a truth value) tells kinds of links apart.
+# A scalar, or lists, tuples and named tuples of trees. Leaves that are no numbers, such as truth values, are part of
+# the kind of a link.
 Tree = Any
 
 
