@@ -273,4 +273,4 @@ def _plain(value: ArrayLike, what: str) -> Array:
 
 def _is_real(entry: object) -> bool:
     """Whether an object is a real number, such as a fraction, and not a boolean."""
-    return isinstance(entry, Real | Decimal) and not isinstance(entry, bool)
+    return type(entry) is float or (isinstance(entry, Real | Decimal) and not isinstance(entry, bool))

@@ -163,6 +163,10 @@ class IncompleteRowsWarning(UserWarning):
     """Rows of a table with empty cells were omitted on request."""
 
 
+class CompilerWarning(UserWarning):
+    """The system allows no compiled code; equations are evaluated with NumPy, and plans take ten times as long."""
+
+
 class CacheWarning(UserWarning):
     """The cache folder is not private and is not used; every start compiles again."""
 

@@ -38,7 +38,19 @@ def test_program_that_tests_itself(tmp_path: Path) -> None:
     program = build("gcc", (tmp_path / "ur5.c").read_text(encoding="ascii"), tmp_path / "program")
     ran = subprocess.run([program], capture_output=True, text=True, check=False)
     assert ran.returncode == 0
-    assert [line.partition(":")[0] for line in ran.stdout.splitlines()] == ["ur5_inverse_dynamics", "ur5_mass_matrix"]
+    assert [line.partition(":")[0] for line in ran.stdout.splitlines()] == [
+        "ur5_inverse_dynamics_float",
+        "ur5_mass_matrix_float",
+    ]
+
+
+def test_output_to_a_dash(tmp_path: Path) -> None:
+    """A dash is no file name: the message names what is."""
+    done = armwright("kernel", "ur5", "forward", "-o", "-", cwd=tmp_path)
+
+    assert done.returncode != 0
+    assert "cannot write '-': expected the name of a file, or /dev/stdout for the standard output" in done.stderr
+    assert not list(tmp_path.iterdir())
 
 
 def test_llvm_to_a_file(tmp_path: Path) -> None:

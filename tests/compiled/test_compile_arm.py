@@ -14,7 +14,7 @@ from numba import njit
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
-from armwright.compiled.arm import CompiledArm, compile_arm
+from armwright.compiled.arm import CompiledArm, compile_arm, planning_arm
 from armwright.compiled.quantities import emit_quantity, quantity_names
 from armwright.dynamics.accelerations import forward_dynamics
 from armwright.dynamics.derivatives import forward_dynamics_derivatives, inverse_dynamics_derivatives
@@ -24,10 +24,11 @@ from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.regressors import regressor
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
-from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
+from armwright.errors import CompilerWarning, InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
 from armwright.kinematics.jacobians import jacobian
+from armwright.tracing.image import CAN_BE_LINKED, can_be_placed
 from oracles.arms import random_arm, random_configurations
 from samples import WHOLE, Sample
 
@@ -350,3 +351,28 @@ def test_one_function_to_another_process() -> None:
     fast = compile_arm(load_arm("stanford"))
 
     assert pickle.loads(pickle.dumps(fast.forward)) == fast.forward
+
+
+def test_little_effort(rng: np.random.Generator) -> None:
+    """An arm that was compiled with the least effort has the same bits; it stays such an arm in other processes."""
+    arm = random_arm(rng, 4)
+    q, qd, qdd = random_configurations(arm, rng, 9), *rng.normal(size=(2, 9, 4))
+    fast, quick = compile_arm(arm), compile_arm(arm, quickly=True)
+
+    assert quick is not fast
+    np.testing.assert_array_equal(quick.inverse_dynamics(q, qd, qdd), fast.inverse_dynamics(q, qd, qdd))
+    np.testing.assert_array_equal(quick.pose_and_jacobian(q)[1], fast.pose_and_jacobian(q)[1])
+    assert pickle.loads(pickle.dumps(quick)) == quick
+    assert pickle.loads(pickle.dumps(quick.forward)) == quick.forward
+
+
+def test_without_memory_for_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the system refuses memory for code, a program plans with the arm itself, and a warning says so."""
+    arm = load_arm("stanford")
+    assert planning_arm(arm) is compile_arm(arm, quickly=True)
+
+    monkeypatch.setattr("armwright.tracing.image._protect", lambda: lambda *_: -1)
+    monkeypatch.setattr("armwright.compiled.arm.can_be_placed", can_be_placed.__wrapped__)
+    if CAN_BE_LINKED:
+        with pytest.warns(CompilerWarning, match="refuses memory that can be executed"):
+            assert planning_arm(arm) is arm

@@ -134,7 +134,7 @@ class Compiled:
     ) -> None:
         """Compile them."""
         self._real = real
-        self._functions = dict(zip(quantities, arm_functions(arm, quantities, language), strict=True))
+        self._functions = dict(zip(quantities, arm_functions(arm, quantities, language, real), strict=True))
         text = source_text(arm, quantities, language, real)
         loops = "\n".join(_loop(each, language, real, compiler) for each in self._functions.values())
         before = _DEVICE if language == "cuda" else ""

@@ -212,6 +212,21 @@ def test_float(name: str, tmp_path: Path, sample: Sample) -> None:
     sample.record(f"efforts in float, {name}", len(tau), 0, error=float(error))
 
 
+def very_heavy(arm: Arm) -> Arm:
+    """The arm with masses near the end of the range of float."""
+    return attrs.evolve(arm, links=[attrs.evolve(link, mass=link.mass * 1e30) for link in arm.links])
+
+
+def test_both_types_in_one_program(tmp_path: Path) -> None:
+    """The headers of double and float may be included in one program, beside headers with macros for old pointers."""
+    arm, real = load_arm("ur5"), ("double", "float")
+    headers = [source_text(arm, ["inverse_dynamics", "forward"], "c", x) for x in real]
+    headers.append(source_text(arm, ["inverse_branches"], "c"))
+    text = "\n".join(["#define near", "#define far", "#define small char", *headers])
+
+    assert build("gcc", f"{text}\nint f(void);\nint f(void) {{ return 0; }}\n", tmp_path / "both.o").exists()
+
+
 def test_float_knows_its_range(tmp_path: Path) -> None:
     """Inputs whose squares float cannot hold have no meaning there, nor have a number of the arm beyond it."""
     arm = load_arm("ur5")
@@ -220,6 +235,15 @@ def test_float_knows_its_range(tmp_path: Path) -> None:
     inputs[1][0, 3], inputs[2][1, 0], inputs[0][2, 0] = 1.1e15, np.nan, 1.1e12
 
     assert of_arm("inverse_dynamics", *inputs)[1].tolist() == [1, 1, 1, 0]
+    inputs = [np.zeros((2, 6)) for _ in range(3)]
+    inputs[1][0] = 9e14
+    folder = tmp_path / "heavy"
+    folder.mkdir()
+    of_heavy = Compiled(very_heavy(arm), ["inverse_dynamics"], folder, real="float")
+    (tau,), status = of_heavy("inverse_dynamics", *inputs)
+    assert not np.isfinite(tau[0]).all()
+    assert np.isfinite(tau[1]).all()
+    assert status.tolist() == [1, 0]
     with pytest.raises(InvalidValueError, match="real: expected double for inverse_branches, got float"):
         source_text(arm, ["inverse_branches"], "c", "float")
     heavy = attrs.evolve(arm, links=[attrs.evolve(link, mass=link.mass * 1e40) for link in arm.links])
@@ -358,12 +382,18 @@ def test_output_in_the_place_of_an_input(tmp_path: Path) -> None:
     assert shared.tolist() == expected.tolist()
 
 
+def call_of_puma(real: Real) -> str:
+    """Text of a function that calls the inverse dynamics of a Puma."""
+    name = "puma560_inverse_dynamics" + "_float" * (real == "float")
+    return f"int f({real} *x);\nint f({real} *x) {{ return {name}(x, x + 6, x + 12, x); }}\n"
+
+
 def test_cortex_m7(tmp_path: Path) -> None:
     """Inverse dynamics of a Puma takes at most 6 KB of a microcontroller's flash, and none of its memory."""
     sizes: dict[Real, int] = {"double": 6 * 1024, "float": 4 * 1024}
     for real, largest in sizes.items():
         text = source_text(load_arm("puma560"), ["inverse_dynamics"], "c", real)
-        call = f"int f({real} *x);\nint f({real} *x) {{ return puma560_inverse_dynamics(x, x + 6, x + 12, x); }}\n"
+        call = call_of_puma(real)
         size, *of_data = sizes_on_cortex_m7(text + call, tmp_path)
         assert 1000 < size <= largest
         assert of_data == [0, 0]
@@ -386,7 +416,7 @@ def test_strict_projects(compiler: str, language: Language, tmp_path: Path) -> N
 def test_cortex_m7_without_a_library(real: Real, tmp_path: Path) -> None:
     """A joined multiplication is an instruction for a microcontroller without an operating system, too: no call."""
     text = source_text(load_arm("puma560"), ["inverse_dynamics"], "c", real)
-    call = f"int f({real} *x);\nint f({real} *x) {{ return puma560_inverse_dynamics(x, x + 6, x + 12, x); }}\n"
+    call = call_of_puma(real)
 
     called = called_on_cortex_m7(text + call, tmp_path)
 

@@ -1,6 +1,8 @@
 """Routines do the same with NumPy and as machine code."""
 
-from ctypes import CFUNCTYPE, addressof, c_int64, c_void_p, cast, create_string_buffer
+import mmap
+import sys
+from ctypes import CDLL, CFUNCTYPE, addressof, c_int64, c_void_p, cast, create_string_buffer
 
 import numpy as np
 import pytest
@@ -231,7 +233,7 @@ def test_other_axes_are_refused() -> None:
 def test_memory_is_given_back(tables: int) -> None:
     """Where memory is short a routine says so, and frees what it has taken."""
     routine = CFUNCTYPE(c_int64, *[c_void_p] * 4)(
-        function_address(EmittedLoops().module(_two, [2, 1, 2, 1]), "routine")
+        function_address(EmittedLoops(4).module(_two, [2, 1, 2, 1]), "routine")
     )
     taken, freed = list[int](), list[int]()
 
@@ -265,7 +267,7 @@ def test_no_table_within_a_loop() -> None:
         loops.walk(x.shape[0], (), step)
 
     with pytest.raises(TypeError, match="within a loop"):
-        EmittedLoops().module(routine, [1])
+        EmittedLoops(4).module(routine, [1])
 
 
 def test_kinds_of_scalars() -> None:
@@ -275,4 +277,83 @@ def test_kinds_of_scalars() -> None:
         x[0] = select(x[0], 1.0, 2.0)
 
     with pytest.raises(TypeError, match="double where i1"):
-        EmittedLoops().module(routine, [1])
+        EmittedLoops(4).module(routine, [1])
+
+
+def _side_by_side(loops: Loops, terms: Table, x: Table, *results: Table) -> None:
+    values, chosen, numbers, later = results
+    powers, n = terms.shape
+    rows = x.shape[0]
+
+    def value(i: Scalar, j: Scalar) -> list[Scalar]:
+        t, zero = x[i], 0.0 * x[i]
+        (sum_,) = loops.walk(powers, (zero,), lambda p, sum_: (sum_ * t + terms[p, j],), reverse=True)
+        return [sum_, select(terms[0, j] < t, sqrt(abs(sum_)), t) + loops.largest(powers, lambda p: terms[p, j])]
+
+    loops.fill([values, chosen], [rows, n], value)
+    loops.fill([numbers], [rows], lambda i: [select(x[i] < 0.5, loops.number(i) / x[i], 2.0)])
+    loops.fill([later], [rows - 1], lambda i: [x[i + 1] - x[i + 2 - 2]])
+
+
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+def test_vectors_of_numbers(lanes: int, rng: np.random.Generator) -> None:
+    """Innermost loops take vectors of any width, with the bits of NumPy, and neither read nor write beyond the end."""
+    ir = EmittedLoops(lanes).module(_side_by_side, [2, 1, 2, 2, 1, 1])
+    routine = function_address(ir, "routine")
+
+    assert ir.count("call void @llvm.masked.store") == 4
+    for n in (0, 1, lanes - 1, lanes, lanes + 1, 3 * lanes + 1):
+        inputs = [rng.normal(size=(5, n)), rng.uniform(size=n + 1)]
+        shapes = (n + 1, n), (n + 1, n), (n + 1,), (n,)
+        around = [np.full(int(np.prod(shape)) + lanes, -7.0) for shape in shapes]
+        results = [x[: int(np.prod(shape))].reshape(shape) for x, shape in zip(around, shapes, strict=True)]
+
+        loops._by_addresses(routine, *inputs, *results)
+
+        for got, expected in zip(results, with_numpy(_side_by_side, inputs, *shapes), strict=True):
+            np.testing.assert_array_equal(got, expected)
+        assert all((x[-lanes:] == -7.0).all() for x in around)
+
+
+def _scattered(loops: Loops, x: Table, y: Table, *results: Table) -> None:
+    turned, picked, found, halved = results
+    rows, columns = x.shape
+    loops.fill([turned], [columns, rows], lambda j, i: [x[i, j]])
+    loops.fill([picked], [rows], lambda i: [y[loops.whole(y[i])]])
+    loops.fill([found], [rows], lambda i: [loops.number(loops.segment(y, x[i, 0], rows))])
+    loops.fill([halved], [rows], lambda i: [loops.until(9, (y[i],), lambda t: (t < 1.0, (t / 2,)))[0]])
+
+
+def test_numbers_that_are_not_side_by_side(rng: np.random.Generator) -> None:
+    """Numbers along another axis, from anywhere, and steps until each is done are taken one by one."""
+    ir = EmittedLoops(4).module(_scattered, [2, 1, 2, 1, 1, 1])
+    x, y = rng.uniform(0, 6, (7, 3)), np.arange(7.0)
+
+    turned, picked, found, halved = compiled(_scattered, [x, y], (3, 7), (7,), (7,), (7,))
+
+    assert "call void @llvm.masked.store" not in ir
+    np.testing.assert_array_equal(turned, x.T)
+    np.testing.assert_array_equal(picked, y)
+    np.testing.assert_array_equal(found, np.floor(x[:, 0]))
+    np.testing.assert_array_equal(halved, [0, 0.25, 0.25, 0.375, 0.25, 0.3125, 0.375])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is protected by a function of Linux")
+def test_memory_behind_the_end_is_not_touched() -> None:
+    """A vector that is half behind the end of an array does not read there."""
+    routine = function_address(EmittedLoops(8).module(_side_by_side, [2, 1, 2, 2, 1, 1]), "routine")
+    size, n = mmap.PAGESIZE, 3
+    pages = mmap.mmap(-1, 2 * size)
+    memory = np.frombuffer(pages, dtype=np.float64)
+    behind = memory.ctypes.data + size
+    assert CDLL(None).mprotect(c_void_p(behind), size, 0) == 0
+    terms = memory[size // 8 - 5 * n : size // 8].reshape(5, n)
+    terms[:] = np.arange(5.0 * n).reshape(5, n)
+    x = np.array([0.25, 0.5, 0.75, 1.0])
+
+    results = [np.empty((4, n)), np.empty((4, n)), np.empty(4), np.empty(3)]
+    loops._by_addresses(routine, terms, x, *results)
+
+    expected = [np.polynomial.polynomial.polyval(t, terms) for t in x]
+    np.testing.assert_allclose(results[0], expected, rtol=1e-15)
+    assert CDLL(None).mprotect(c_void_p(behind), size, 3) == 0

@@ -8,16 +8,19 @@ import sys
 from pathlib import Path
 
 import attrs
+import numpy as np
 import pytest
 
 import armwright
 from armwright.arm.load import load_arm
+from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
 from armwright.errors import ArmwrightError
 from armwright.tracing import native, surroundings
 from armwright.tracing.emit import emit
 from armwright.tracing.image import CAN_BE_LINKED, linked, placed
 from armwright.tracing.kernel import Kernel
+from armwright.tracing.scalar import sin
 
 ROOT = Path(armwright.__file__).parent
 _FORWARD = """
@@ -81,6 +84,34 @@ def test_later_processes_plan_a_line_without_a_compiler(tmp_path: Path) -> None:
     assert int(first[1]) > 0
     assert first[2] == "1"
     assert second == [first[0], "0", "0"]
+
+
+@pytest.mark.skipif(not CAN_BE_LINKED, reason="LLVM loads objects of other forms")
+def test_code_of_little_effort(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Code that was compiled with the least effort has the same bits; where better code is known, it is taken."""
+    monkeypatch.setenv("ARMWRIGHT_CACHE", str(tmp_path))
+    efforts, compile_ = list[bool](), native._compile
+
+    def counted(ir: str, *, quickly: bool = False) -> bytes:
+        efforts.append(quickly)
+        return compile_(ir, quickly=quickly)
+
+    monkeypatch.setattr(native, "_compile", counted)
+    x = np.linspace(-3, 3, 12).reshape(4, 3)
+
+    def value(name: str, *, quickly: bool) -> Array:
+        emitted = emit("sum", lambda x: [[sin(x[0]) * x[1] + x[2] / 7]], {"x": 3}, shapes=[(1,)], origin=name)
+        result: Array = Kernel(emitted=emitted, quickly=quickly)(x)
+        return result
+
+    quick, careful = value("a sum", quickly=True), value("a sum", quickly=False)
+    assert efforts == [True, False]
+    np.testing.assert_array_equal(quick, careful)
+
+    np.testing.assert_array_equal(value("the same sum", quickly=False), careful)
+    monkeypatch.setattr(native, "_REFERRED", {})
+    np.testing.assert_array_equal(value("the same sum", quickly=True), careful)
+    assert efforts == [True, False]
 
 
 @pytest.mark.parametrize("name", ["tracing/graph.py", "kinematics/inverse_kinematics/branches.py", "arrays.py"])

@@ -69,7 +69,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
-    from armwright.compiled.arm import compile_arm
+    from armwright.compiled.arm import planning_arm
     from armwright.motion.certificate import slower
     from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
     from armwright.motion.move_assessment import MoveAssessment
@@ -87,7 +87,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     deviation = within(0.1 if deviation_mm is None else deviation_mm, _DEVIATION_MM, "--deviation-mm") * 1e-3
     warn_of_stray(poses)
     model, file = load_arm(arm), read_poses(poses)
-    fast = compile_arm(model)
+    fast = planning_arm(model)
     start = None if near is None else joint_values(model, near, "--near")
     timed: dict[str, Any] = {"times": file.times, "blend": file.blend, "near": start, "ends": ends}
     if kind == "joint":

@@ -6,9 +6,10 @@
 from __future__ import annotations  # what help shows keeps the names of array types, which are long
 
 import os
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable
-from functools import cached_property, wraps
+from functools import cached_property, partial, wraps
 from threading import RLock
 from typing import Any, TypeVar, cast
 
@@ -19,6 +20,8 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.compiled.quantities import quantity_kernel
+from armwright.errors import CompilerWarning
+from armwright.tracing.image import CAN_BE_LINKED, can_be_placed
 from armwright.tracing.kernel import Kernel
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
@@ -33,7 +36,7 @@ os.register_at_fork(
 )
 
 
-def compile_arm(arm: Arm, *, device: str | None = None) -> CompiledArm:
+def compile_arm(arm: Arm, *, device: str | None = None, quickly: bool = False) -> CompiledArm:
     """Return an arm whose quantities are compiled, each when it is first asked for.
 
     A first compilation takes hundredths to tenths of a second and is kept on disk: see
@@ -43,6 +46,8 @@ def compile_arm(arm: Arm, *, device: str | None = None) -> CompiledArm:
     Args:
         arm: the arm, with n joints.
         device: ``cuda`` or ``cuda:1``, a device that computes the quantities (extra ``cuda``); the processor when None.
+        quickly: whether it is compiled for this processor with the least effort, in a third of the time: for a short
+            program, which computes little. The results have the same bits; what was compiled before stays as fast.
 
     Raises:
         KindError: ``arm`` is no arm.
@@ -50,18 +55,35 @@ def compile_arm(arm: Arm, *, device: str | None = None) -> CompiledArm:
         MissingExtraError: the libraries of CUDA are not installed.
         DeviceError: there is no such device.
     """
-    key = (_bits(known_arm(arm)), device)
+    key = (_bits(known_arm(arm)), device, quickly)
     with _COMPILED_LOCK:
-        compiled = _COMPILED.pop(key, None) or _new(arm, device)
+        compiled = _COMPILED.pop(key, None) or _new(arm, device, quickly=quickly)
         _COMPILED[key] = compiled
         if len(_COMPILED) > _MAX_ARMS:
             _COMPILED.popitem(last=False)
     return compiled
 
 
-def _new(arm: Arm, device: str | None) -> CompiledArm:
+def planning_arm(arm: Arm) -> CompiledArm | Arm:
+    """Return what to plan a short program of an arm with: the arm compiled quickly, or itself where nothing can be.
+
+    Warns:
+        CompilerWarning: the system refuses memory for compiled code.
+    """
+    if not CAN_BE_LINKED or can_be_placed():
+        return compile_arm(arm, quickly=True)
+    warnings.warn(
+        "this system refuses memory that can be executed (execmem of SELinux), so equations are not compiled; planning "
+        "takes ten times as long",
+        CompilerWarning,
+        stacklevel=2,
+    )
+    return arm
+
+
+def _new(arm: Arm, device: str | None, *, quickly: bool) -> CompiledArm:
     if device is None:
-        return CompiledArm(arm=arm)
+        return CompiledArm(arm=arm, quickly=quickly)
     from armwright.compiled.device_arm import DeviceArm, device_number  # noqa: PLC0415 - only where it is asked for
     from armwright.tracing.cuda_device import CudaDevice  # noqa: PLC0415
 
@@ -117,9 +139,11 @@ class CompiledArm:
 
     Attributes:
         arm: the arm, with n joints.
+        quickly: whether they are compiled with the least effort.
     """
 
     arm: Arm
+    quickly: bool = False
     _kernels: dict[str, Kernel] = attrs.field(factory=dict, init=False, eq=False, repr=False)
 
     @_kernel_method
@@ -517,7 +541,7 @@ class CompiledArm:
             UnsupportedArmError: the arm has no such function.
         """
         if quantity not in self._kernels:
-            self._kernels[quantity] = quantity_kernel(self.arm, quantity, self._origin)
+            self._kernels[quantity] = quantity_kernel(self.arm, quantity, self._origin, quickly=self.quickly)
         return self._kernels[quantity]
 
     @cached_property
@@ -526,4 +550,4 @@ class CompiledArm:
 
     def __reduce__(self) -> tuple[Callable[[Arm], CompiledArm], tuple[Arm]]:
         """Let another process compile for itself: it finds the kernels on disk."""
-        return compile_arm, (self.arm,)
+        return partial(compile_arm, quickly=self.quickly), (self.arm,)

@@ -76,13 +76,14 @@ def emit_quantity(arm: Arm, name: str, *, loops: bool | None = None, origin: str
     )
 
 
-def quantity_kernel(arm: Arm, name: str, origin: str = "") -> Kernel:
+def quantity_kernel(arm: Arm, name: str, origin: str = "", *, quickly: bool = False) -> Kernel:
     """Return the kernel of a quantity, with the errors and the warnings of the plain function; compiled when called.
 
     Args:
         arm: the arm.
         name: of a quantity of ``CompiledArm``.
         origin: all that the arm is: see ``tracing.emit``.
+        quickly: whether it is compiled with the least effort: see ``tracing.native.function_address``.
 
     Raises:
         UnknownNameError: no such quantity.
@@ -90,7 +91,7 @@ def quantity_kernel(arm: Arm, name: str, origin: str = "") -> Kernel:
     """
     emitted = emit_quantity(arm, name, origin=origin)
     plain, remark = _QUANTITIES[name].plain, partial(_ask_for_degrees, arm, emitted.inputs)
-    return Kernel(emitted=emitted, raise_for_invalid=plain and partial(plain, arm), remark=remark)
+    return Kernel(emitted=emitted, raise_for_invalid=plain and partial(plain, arm), remark=remark, quickly=quickly)
 
 
 def evaluate_quantity(arm: Arm, name: str, *inputs: Sequence[float]) -> Rows:

@@ -80,7 +80,9 @@ def arm_functions(arm: Arm, quantities: Sequence[str], language: Language, real:
                 f"real: expected double for {name}, got float, whose digits do not tell what is in reach"
             )
     prefix = identifier(arm.name, otherwise="arm")
-    return [_function(arm, name, f"{prefix}_{name}", language) for name in quantities]
+    # Both types may be included in one program of C, where functions of one name cannot differ in their arguments.
+    suffix = "_float" if real == "float" and language == "c" else ""
+    return [_function(arm, name, f"{prefix}_{name}{suffix}", language) for name in quantities]
 
 
 def _function(arm: Arm, quantity: str, name: str, language: Language) -> Function:

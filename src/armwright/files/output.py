@@ -89,6 +89,8 @@ def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> 
     if (number := descriptor(path)) is not None:
         _write_to_descriptor(number, path, text)
         return
+    if path == Path("-"):
+        raise OutputError("cannot write '-': expected the name of a file, or /dev/stdout for the standard output")
     named, path = path, _resolve(path)
     if not back and is_source(path):
         raise OutputError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
@@ -13,7 +13,6 @@ from armwright.motion.certificate import LIMITS, BindingLimit, Certificate, Limi
 from armwright.motion.deviation import TrackingError
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.timing_law import timed
 from armwright.motion.tolerance import Tolerance
@@ -87,6 +86,8 @@ def certificate_of(
     *,
     time: float | None = None,
     peaks: dict[LimitName, Array] | None = None,
+    factor: float = 1.0,
+    because: BindingLimit | None = None,
 ) -> Certificate:
     """Return the certificate of a motion, whatever its limits say.
 
@@ -97,6 +98,8 @@ def certificate_of(
         allowed: what it was asked to keep.
         time: when the tool is farthest off [s]; as ``error`` has it when left out.
         peaks: of speeds, accelerations and efforts, where they are known.
+        factor: how many times slower it is than the speed of the tool has it.
+        because: which limit, and which joint, that is for.
     """
     solver = solver_of(arm)
     time = error.worst_time if time is None else time
@@ -114,14 +117,16 @@ def certificate_of(
         samples=error.samples * len(error.position),
         peaks=limit_peaks(arm, trajectory) if peaks is None else peaks,
         backward=error.backward,
+        factor=factor,
+        because=because,
     )
 
 
 def _position(trajectory: Trajectory, t: float) -> Array:
     """Return where the joints (n,) are at a time from the start to the end of a trajectory."""
     k = segments_at(trajectory.times, t, len(trajectory.coefficients))
-    local = np.array([[t - trajectory.times[k]]])
-    return np.asarray(evaluate(trajectory.coefficients[k, None], local)[0])
+    terms = trajectory.coefficients[k]
+    return np.asarray((t - trajectory.times[k]) ** np.arange(len(terms)) @ terms)
 
 
 def fastest(
@@ -148,17 +153,17 @@ def fastest(
     Raises:
         IncapableArmError: gravity alone takes more than a joint may give, and ``weak`` is not set.
     """
-    path, error = tracking.trajectory, tracking.error
-    run = timed(solver_of(arm), path, np.ones(len(path.times) - 1))
+    solver, path, error = solver_of(arm), tracking.trajectory, tracking.error
+    run = timed(solver, path, np.ones(len(path.times) - 1))
     time = run.when(error.worst_time)
-    trajectory, efforts, slower = _inside_efforts(arm, run.trajectory, weak=weak)
+    trajectory, efforts, slower = _inside_efforts(solver, run.trajectory, weak=weak)
     stretch, factor = trajectory.duration / run.trajectory.duration, trajectory.duration / nominal
     peaks = stretched_peaks(run.speed, run.acceleration, efforts, stretch)
-    certificate = attrs.evolve(
-        certificate_of(arm, trajectory, error, allowed, time=time * trajectory.duration, peaks=peaks),
-        factor=max(1.0, factor),
-        because=None if factor <= 1 else run.because if slower is None else ("effort", slower),
-    )
+    because = None if factor <= 1 else run.because if slower is None else ("effort", slower)
+    certificate = certificate_of(
+        solver, trajectory, error, allowed, time=time * trajectory.duration, peaks=peaks, factor=max(1.0, factor),
+        because=because,
+    )  # fmt: skip
     motion = CertifiedMotion(trajectory=trajectory, certificate=certificate)
     return motion if period is None else motion.on_ticks(period)
 
@@ -169,9 +174,10 @@ def slowed_alike(arm: AnyArm, tracking: Tracking, allowed: Tolerance) -> Certifi
     factor, because = slowing(model, planned)
     trajectory, _, slower = _inside_efforts(arm, planned.slowed(factor), weak=True)
     factor = trajectory.duration / planned.duration
-    certificate = certificate_of(arm, trajectory, tracking.error, allowed, time=tracking.error.worst_time * factor)
     because = because if slower is None else ("effort", slower)
-    return CertifiedMotion(trajectory=trajectory, certificate=attrs.evolve(certificate, factor=factor, because=because))
+    time = tracking.error.worst_time * factor
+    certificate = certificate_of(arm, trajectory, tracking.error, allowed, time=time, factor=factor, because=because)
+    return CertifiedMotion(trajectory=trajectory, certificate=certificate)
 
 
 def standstill(solver: Solver, q: Array, allowed: Tolerance) -> CertifiedMotion:
@@ -221,9 +227,14 @@ def _sampled_states(loops: Loops, *tables: Table) -> None:
     (spread,) = loops.each([even], lambda i: [duration * (loops.number(i) / (even - 1))])
     (middles,) = loops.each([m], lambda i: [(times[i + 1] + times[i]) / 2])
 
-    def written(first: Scalar, at: Table) -> None:
+    def written(first: Scalar, at: Table, segment: Callable[[Scalar], Scalar]) -> None:
         samples = at.shape[0]
-        pieces, local = loops.each([samples], lambda i: _place(loops, times, at[i], m), 2)
+
+        def where(i: Scalar) -> list[Scalar]:
+            piece = segment(i)
+            return [loops.number(piece), at[i] - times[piece]]
+
+        pieces, local = loops.each([samples], where, 2)
 
         def state(i: Scalar, j: Scalar) -> tuple[Scalar, ...]:
             piece, t = loops.whole(pieces[i]), local[i]
@@ -238,19 +249,13 @@ def _sampled_states(loops: Loops, *tables: Table) -> None:
 
         loops.fill([table.behind(first) for table in (q, qd, qdd)], [samples, n], state)
 
-    written(0, spread)
-    written(even, times)
-    written(even + m + 1, middles)
+    written(0, spread, lambda i: loops.segment(times, spread[i], m))
+    written(even, times, lambda i: loops.segment(times, times[i], m))
+    written(even + m + 1, middles, lambda i: i + 0)
     # The sign of the speed of a joint that stands is rounding, and would give it Coulomb friction.
     (top,) = loops.each([n], lambda j: [loops.largest(even + 2 * m + 1, lambda i: abs(qd[i, j]))])
     (moving,) = loops.each(qd.shape, lambda i, j: [select(abs(qd[i, j]) > _STANDS * top[j], qd[i, j], 0.0)])
     loops.fill([qd], qd.shape, lambda i, j: [moving[i, j]])
-
-
-def _place(loops: Loops, times: Table, t: Scalar, count: Scalar) -> list[Scalar]:
-    """Return which segment a time is in, and how long that has lasted."""
-    segment = loops.segment(times, t, count)
-    return [loops.number(segment), t - times[segment]]
 
 
 def _inside_efforts(arm: AnyArm, trajectory: Trajectory, *, weak: bool) -> tuple[Trajectory, Array, int | None]:

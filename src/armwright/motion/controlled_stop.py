@@ -32,7 +32,7 @@ _MARGIN = 5e-4
 # What a stop may exceed a limit by: rounding.
 _ROUNDING = 1e-6
 # A time this part of a period behind a tick is on it.
-_HAIR = 1e-9
+_ROUNDING = 1e-9
 # Steps are halved so often before the motion is run to its own end instead.
 _HALVINGS = 6
 # Positions on each step at which accelerations are sampled.
@@ -217,7 +217,7 @@ def _until_a_tick(stop: Trajectory, period: float | None) -> Trajectory:
     """Return a stop with rest behind it until the next tick of the servo."""
     if period is None:
         return stop
-    end = math.ceil(stop.duration / period - _HAIR) * period
+    end = math.ceil(stop.duration / period - _ROUNDING) * period
     standstill = np.zeros_like(stop.coefficients[:1])
     standstill[0, 0] = stop(stop.duration)
     times = np.append(stop.times, max(end, stop.duration))

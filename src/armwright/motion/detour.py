@@ -162,7 +162,7 @@ def line_or_detour(
     if requested is None or (method == "damped" and obstacle.cause == "reach"):
         raise obstacle
     # So many poses are asked for in a search that it is worth compiling the arm for it.
-    arm = compile_arm(solver.arm)
+    arm = compile_arm(solver.arm) if isinstance(arm, Arm) else arm
     detour = _damped(arm, requested, q, damping, obstacle) if method == "damped" else None
     if method == "via":
         detour = _by_via(arm, requested, q, obstacle, allowed=allowed, speed=speed)
@@ -303,8 +303,8 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
     if (lowest < solver.arm.limits.lower).any() or (highest > solver.arm.limits.upper).any():
         return None
     eased = attrs.evolve(line, corners=times[[0, -1]], progress=xspline(times, fractions), near=np.inf)
-    hand = curve_bounds(solver, trajectory).hand
-    error = tracking_error(solver, eased, trajectory, hand, tolerance(_LOOKED_AT))
+    tool = curve_bounds(solver, trajectory).tool
+    error = tracking_error(solver, eased, trajectory, tool, tolerance(_LOOKED_AT))
     try:
         factor, _ = slowing_for_limits(arm, trajectory)
     except IncapableArmError:  # where gravity alone takes more than a joint may give there is no detour either

@@ -37,18 +37,18 @@ _SMALL = 1e-9
 ROUNDINGS = 64 * float(np.finfo(np.float64).eps)
 
 
-class HandBounds(NamedTuple):
+class ToolBounds(NamedTuple):
     """Upper bounds of how the tool moves on m intervals, (m,) each.
 
     Attributes:
-        pull: acceleration [m/s²].
-        spin: angular speed [rad/s].
-        spin_change: angular acceleration [rad/s²].
+        acceleration: of its origin [m/s²].
+        angular_speed: of the tool [rad/s].
+        angular_acceleration: of the tool [rad/s²].
     """
 
-    pull: Array
-    spin: Array
-    spin_change: Array
+    acceleration: Array
+    angular_speed: Array
+    angular_acceleration: Array
 
 
 class ErrorBounds(NamedTuple):
@@ -65,14 +65,14 @@ class ErrorBounds(NamedTuple):
     progress: Any = None
 
 
-class HandSamples(NamedTuple):
+class ToolSamples(NamedTuple):
     """Where the tool is, k + 1 times on each of m intervals.
 
     Attributes:
         times: (m, k + 1) [s].
         poses: (m, k + 1, 4, 4).
         step: (m,) between two of them [s].
-        hand: how the tool moves on the intervals.
+        tool: how the tool moves on the intervals.
         bounds: of the error between samples.
         solver: evaluates equations of many samples, and runs routines.
     """
@@ -80,7 +80,7 @@ class HandSamples(NamedTuple):
     times: Array
     poses: Array
     step: Array
-    hand: HandBounds
+    tool: ToolBounds
     bounds: ErrorBounds
     solver: Solver
 
@@ -112,16 +112,19 @@ class TrackingError(NamedTuple):
         return float(self.times[self.sampled_position.argmax()])
 
 
-class HandMotion(Protocol):
+class ToolMotion(Protocol):
     """A motion of the tool that the joints are to follow."""
 
     def __call__(self, t: Array) -> Array:
         """Return the poses (k, 4, 4) at times (k,), from 0 to the end."""
 
-    def bounds(self, times: Array, hand: HandBounds, run: Runner) -> ErrorBounds:
+    def poses_for(self, solver: Solver, t: Array) -> Array:
+        """Return the same, evaluated as a solver evaluates equations."""
+
+    def bounds(self, times: Array, tool: ToolBounds, run: Runner) -> ErrorBounds:
         """Return bounds of the error on the intervals between times (m + 1,), where the tool moves as described."""
 
-    def error(self, samples: HandSamples) -> TrackingError:
+    def error(self, samples: ToolSamples) -> TrackingError:
         """Return how far a sampled tool is from this motion."""
 
     def where(self, t: float) -> tuple[int, float, str]:
@@ -129,7 +132,7 @@ class HandMotion(Protocol):
 
 
 def tracking_error(
-    solver: Solver, motion: HandMotion, trajectory: Trajectory, hand: HandBounds, allowed: Tolerance
+    solver: Solver, motion: ToolMotion, trajectory: Trajectory, tool: ToolBounds, allowed: Tolerance
 ) -> TrackingError:
     """Return how far a motion of the joints leaves the motion of the tool that it follows.
 
@@ -137,17 +140,18 @@ def tracking_error(
         solver: the arm, with n joints.
         motion: where the tool should be.
         trajectory: where the joints are, cubics on m segments.
-        hand: how the tool moves on them at most.
+        tool: how the tool moves on them at most.
         allowed: the errors that matter; they decide how often the tool is sampled.
     """
     h = trajectory.lengths
-    bounds = motion.bounds(trajectory.times, hand, solver.run)
+    bounds = motion.bounds(trajectory.times, tool, solver.run)
     needed = np.maximum(bounds.position / allowed.position, 2 * bounds.orientation / allowed.orientation)
-    count = int(min(max(math.ceil(float((np.sqrt(needed / (8 * _ADDED)) * h).max())), _SAMPLES[0]), _SAMPLES[1]))
+    count = math.ceil(float((np.sqrt(needed) * h).max()) / math.sqrt(8 * _ADDED))
+    count = min(max(count, _SAMPLES[0]), _SAMPLES[1])
     m, _, n = trajectory.coefficients.shape
     inputs = [trajectory.times, trajectory.coefficients]
     times, q = solver.run(_even_samples, inputs, (m, count + 1), (m, count + 1, n))
-    return motion.error(HandSamples(times, np.asarray(solver.forward(q)), h / count, hand, bounds, solver))
+    return motion.error(ToolSamples(times, np.asarray(solver.forward(q)), h / count, tool, bounds, solver))
 
 
 def _even_samples(loops: Loops, *tables: Table) -> None:
@@ -170,7 +174,7 @@ def _even_samples(loops: Loops, *tables: Table) -> None:
     loops.fill([q], [m, samples, joints], position)
 
 
-def error_of(samples: HandSamples, errors: Array, half: Array) -> TrackingError:
+def error_of(samples: ToolSamples, errors: Array, half: Array) -> TrackingError:
     """Return the error from what is measured at the samples.
 
     Args:
@@ -206,19 +210,19 @@ def half_sine(Q: Matrix) -> Scalar:
     return sqrt(dot(v, v)) / (4 * w)
 
 
-def spin_bound(spin: Scalar, spin_change: Scalar, change: Scalar, rate: Scalar) -> Scalar:
+def half_angle_bound(omega: Scalar, alpha: Scalar, change: Scalar, rate: Scalar) -> Scalar:
     """Return an upper bound of the acceleration of half the rotation between the tool and a rotating orientation.
 
     This rotation is a unit quaternion; the second derivative of its vector part is at most half the angular
     acceleration and a quarter of the squared angular speed.
 
     Args:
-        spin: the largest angular speed of the tool [rad/s].
-        spin_change: its largest angular acceleration [rad/s²].
+        omega: the largest angular speed of the tool [rad/s].
+        alpha: its largest angular acceleration [rad/s²].
         change: angular acceleration of that orientation, at most [rad/s²].
         rate: its angular speed, at most [rad/s].
     """
-    return (spin_change + change + spin * rate) / 2 + (spin + rate) * (spin + rate) / 4
+    return (alpha + change + omega * rate) / 2 + (omega + rate) * (omega + rate) / 4
 
 
 class CurveBounds(NamedTuple):
@@ -228,13 +232,13 @@ class CurveBounds(NamedTuple):
         speed: (m, n) the largest speeds of the joints.
         acceleration: (m, n) their largest accelerations.
         turning: (2, m, n) positions where they reverse; at an end of an interval where they do not.
-        hand: upper bounds of how the tool moves.
+        tool: upper bounds of how the tool moves.
     """
 
     speed: Array
     acceleration: Array
     turning: Array
-    hand: HandBounds
+    tool: ToolBounds
 
 
 def curve_bounds(solver: Solver, trajectory: Trajectory) -> CurveBounds:
@@ -249,18 +253,17 @@ def curve_bounds(solver: Solver, trajectory: Trajectory) -> CurveBounds:
     """
     arm, terms = solver.arm, trajectory.coefficients
     m, _, n = terms.shape
-    lever = np.where(arm.revolute, _levers(arm, terms, trajectory.lengths), 1.0)
-    pairs = _pairs(tuple(arm.revolute.tolist()))
-    inputs = [trajectory.times, terms, arm.revolute, lever, pairs]
-    speed, acceleration, turning, pull, spin, change = solver.run(
+    levers = _levers(arm, terms, trajectory.lengths)
+    inputs = [trajectory.times, terms, *_rotating(tuple(arm.revolute.tolist())), levers]
+    speed, acceleration, turning, a_tool, omega, change = solver.run(
         _curve_bounds, inputs, (m, n), (m, n), (2, m, n), (m,), (m,), (m,)
     )
-    return CurveBounds(speed, acceleration, turning, HandBounds(pull, spin, change))
+    return CurveBounds(speed, acceleration, turning, ToolBounds(a_tool, omega, change))
 
 
 def _curve_bounds(loops: Loops, *tables: Table) -> None:
-    """Write ``CurveBounds``, given times, cubics, which joints rotate, their levers, and ``_pairs`` of them."""
-    times, terms, rotates, lever, pairs, speed, acceleration, turning, pull, spin, spin_change = tables
+    """Write ``CurveBounds``, given times, cubics, which joints rotate, alone and in pairs, and their levers."""
+    times, terms, rotates, pairs, lever, speed, acceleration, turning, a_tool, omega, alpha = tables
     m, _, n = terms.shape
 
     def of_joint(i: Scalar, j: Scalar) -> list[Scalar]:
@@ -274,28 +277,28 @@ def _curve_bounds(loops: Loops, *tables: Table) -> None:
     )
 
     def of_pairs(i: Scalar, k: Scalar) -> list[Scalar]:
-        pulls = loops.total(n, lambda j: speed[i, j] * together[j, k])
-        return [pulls, loops.total(n, lambda j: speed[i, j] * pairs[3, j, k])]
+        products = loops.total(n, lambda j: speed[i, j] * together[j, k])
+        return [products, loops.total(n, lambda j: speed[i, j] * pairs[3, j, k])]
 
-    pulls, spins = loops.each([m, n], of_pairs, 2)
+    products, rotation_products = loops.each([m, n], of_pairs, 2)
 
-    def of_hand(i: Scalar) -> list[Scalar]:
+    def of_tool(i: Scalar) -> list[Scalar]:
         return [
             loops.total(n, lambda j: acceleration[i, j] * lever[j])
-            + loops.total(n, lambda j: pulls[i, j] * speed[i, j]),
+            + loops.total(n, lambda j: products[i, j] * speed[i, j]),
             loops.total(n, lambda j: speed[i, j] * rotates[j]),
             loops.total(n, lambda j: acceleration[i, j] * rotates[j])
-            + loops.total(n, lambda j: spins[i, j] * speed[i, j]),
+            + loops.total(n, lambda j: rotation_products[i, j] * speed[i, j]),
         ]
 
-    loops.fill([pull, spin, spin_change], [m], of_hand)
+    loops.fill([a_tool, omega, alpha], [m], of_tool)
 
 
 @cache
-def _pairs(turns: tuple[bool, ...]) -> Array:
-    """Return (4, n, n) of which pairs of joints both rotate.
+def _rotating(turns: tuple[bool, ...]) -> tuple[Array, Array]:
+    """Return (n,) which joints rotate, and (4, n, n) which pairs of them both do.
 
-    Those of which the second one is the later, those of which the first one is, where one carries a slide, and those
+    Pairs of which the second one is the later, those of which the first one is, where one carries a slide, and those
     that rotate once each.
     """
     rotates, n = np.array(turns), len(turns)
@@ -303,7 +306,8 @@ def _pairs(turns: tuple[bool, ...]) -> Array:
     both = rotates[:, None] & rotates
     # A slide is rotated by the joints before it; those beyond it do not change its direction.
     carried = rotates[np.minimum(rows, columns)] & ~rotates[np.maximum(rows, columns)] & (rows != columns)
-    return np.stack([np.triu(both), np.tril(both, -1), carried, np.triu(both, 1)]).astype(np.float64)
+    pairs = np.stack([np.triu(both), np.tril(both, -1), carried, np.triu(both, 1)])
+    return rotates.astype(np.float64), pairs.astype(np.float64)
 
 
 def _cubic_peaks(c: list[Scalar], h: Scalar) -> list[Scalar]:
@@ -340,11 +344,15 @@ def _turning_positions(c: list[Scalar], length: Scalar) -> list[Scalar]:
 
 
 def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:
-    """Return the largest distance (n,) of the tool from the frame before each joint, slides as far out as they go."""
+    """Return the largest distance (n,) of the tool from the frame before each joint that rotates; 1 for slides.
+
+    Slides are as far out as they go.
+    """
     if arm.revolute.all():
         return _distances(arm, (0.0,) * arm.n)
     farthest = evaluate(np.abs(joints), lengths[:, None]).max(axis=0)
-    return _distances(arm, tuple(np.where(arm.revolute, 0.0, farthest).tolist()))
+    distances = _distances(arm, tuple(np.where(arm.revolute, 0.0, farthest).tolist()))
+    return np.where(arm.revolute, distances, 1.0)
 
 
 @lru_cache(maxsize=16)
@@ -384,7 +392,7 @@ def farthest_from_legs(solver: Solver, trajectory: Trajectory, positions: Array,
         times: (k,) when the trajectory passes them [s].
     """
     h = trajectory.lengths
-    hand = curve_bounds(solver, trajectory).hand
+    tool = curve_bounds(solver, trajectory).tool
     middles_of_legs = (times[1:] + times[:-1]) / 2
     leg = np.searchsorted(middles_of_legs[1:-1], (trajectory.times[1:] + trajectory.times[:-1]) / 2)
     samples = _LEG_SAMPLES
@@ -392,7 +400,7 @@ def farthest_from_legs(solver: Solver, trajectory: Trajectory, positions: Array,
         part = (np.arange(samples + 1) / samples)[:, None]
         q = np.stack([evaluate(trajectory.coefficients, (p * h)[:, None]) for p in part])
         distance = _chord_distances(solver.forward(q)[..., :3, 3], positions, leg)
-        bound = float((distance + (h / samples) ** 2 / 8 * hand.pull).max())
+        bound = float((distance + (h / samples) ** 2 / 8 * tool.acceleration).max())
         if samples == _MAX_LEG_SAMPLES or bound <= (1 + _LEG_ADDED) * float(distance.max()) + _SMALL:
             worst = int(distance.max(axis=0).argmax())
             return LegDistance(bound, float(distance.max()), float(trajectory.times[worst]))

@@ -48,7 +48,7 @@ def two_ends(q_start: ArrayLike, q_goal: ArrayLike) -> tuple[Array, Array]:
     return start, one_per_joint(q_goal, len(start), "q_goal")
 
 
-def joint_vector(value: ArrayLike, what: str = "way") -> Array:
+def joint_vector(value: ArrayLike, what: str = "displacement") -> Array:
     """Return one number per joint (n,), at least one.
 
     Raises:
@@ -56,10 +56,10 @@ def joint_vector(value: ArrayLike, what: str = "way") -> Array:
         ShapeError: it is not (n,).
         InvalidValueError: a number is NaN or infinite.
     """
-    way = floats(value, what, LARGEST)
-    if way.ndim != 1 or not way.size:
-        raise ShapeError(f"{what}: expected shape (n,), got {way.shape}")
-    return way
+    displacement = floats(value, what, LARGEST)
+    if displacement.ndim != 1 or not displacement.size:
+        raise ShapeError(f"{what}: expected shape (n,), got {displacement.shape}")
+    return displacement
 
 
 def check_duration(duration: float) -> float:

@@ -180,15 +180,15 @@ def cartesian_move(
     one_of("orientation", orientation, ("geodesic", "zyz"))
     solver, X = solver_of(arm), exact_poses(poses)
     t, b = _timing(_tool_times(solver.arm, X) if times is None else times, blend, len(X))
-    hand = tool_path(X, t, b, ends=ends, orientation=orientation)
-    move = along(arm, X, hand, t, b, near=near, ends=ends, deviation=deviation)
+    path = tool_path(X, t, b, ends=ends, orientation=orientation)
+    move = along(arm, X, path, t, b, near=near, ends=ends, deviation=deviation)
     return move if times is not None else _inside_limits(arm, move)
 
 
 def along(
     arm: AnyArm,
     X: Array,
-    hand: ToolPath,
+    path: ToolPath,
     times: Array,
     blend: ArrayLike,
     *,
@@ -198,7 +198,7 @@ def along(
 ) -> Move:
     """Return the move along a path of the tool, with its certificate; arguments and errors as of ``cartesian_move``."""
     solver, allowed = solver_of(arm), tolerance(deviation)
-    label, tracked = _followed(solver, hand, _near(solver.arm, near), allowed, rest=ends == "rest")
+    label, tracked = _followed(solver, path, _near(solver.arm, near), allowed, rest=ends == "rest")
     certificate = certificate_of(arm, tracked.trajectory, tracked.error, allowed)
     return Move(
         arm=solver.arm,
@@ -208,8 +208,8 @@ def along(
         label=label,
         trajectory=tracked.trajectory,
         passing_distances=via_distances(times, X[:, :3, 3], blend, ends=ends),
-        tool_path=hand,
-        certificate=attrs.evolve(certificate, worst_position=hand(certificate.worst_time)[:3, 3]),
+        tool_path=path,
+        certificate=attrs.evolve(certificate, worst_position=path(certificate.worst_time)[:3, 3]),
     )
 
 
@@ -313,7 +313,7 @@ def _inside_limits(arm: AnyArm, move: Move) -> Move:
     return move if factor == 1 else move.slowed(factor, because)
 
 
-def _followed(solver: Solver, hand: ToolPath, near: Array, allowed: Tolerance, *, rest: bool) -> tuple[str, Tracking]:
+def _followed(solver: Solver, path: ToolPath, near: Array, allowed: Tolerance, *, rest: bool) -> tuple[str, Tracking]:
     """Return a branch, and the joints that follow a path of the tool on it.
 
     The branch is chosen once and kept: of the configurations inside the limits at the start the nearest that leads to
@@ -322,14 +322,14 @@ def _followed(solver: Solver, hand: ToolPath, near: Array, allowed: Tolerance, *
     Raises:
         PathError: no branch does: what stops each of them, where.
     """
-    arm, X = solver.arm, hand(0.0)
+    arm, X = solver.arm, path(0.0)
     solution = inverse(arm, X, near)
     if not solution.allowed:
         raise PathError(cause_of(solution), 0, 0.0, f"pose 1: {solution.explain()}")
-    knots = hand.first_knots(_STEP, _MIN_KNOTS)
+    knots = path.first_knots(_STEP, _MIN_KNOTS)
     errors: dict[str, PathError] = {}
     for branch in sorted(solution.allowed, key=lambda branch: joint_distance(arm, near, branch.q)):
-        task = Task(solver, hand, branch.q, allowed, allowed, rest=rest, whole_turns=True, max_knots=_MAX_KNOTS)
+        task = Task(solver, path, branch.q, allowed, allowed, rest=rest, whole_turns=True, max_knots=_MAX_KNOTS)
         try:
             return branch.label, track(task, knots)
         except PathError as error:

@@ -149,13 +149,13 @@ def unmet(arm: Arm, X: Array, before: Array, time: float, time_before: float) ->
 
 
 def beyond_limits(arm: Arm, q: Array, times: Array) -> Obstruction | None:
-    """Return the first joint limit that configurations (k, n) at times (k,) pass; None where they keep them."""
+    """Return the first joint limit that configurations (..., k, n) at times (k,) pass; None where they keep them."""
     if (q >= arm.limits.lower).all() and (q <= arm.limits.upper).all():
         return None
-    outside = ((q < arm.limits.lower) | (q > arm.limits.upper)).any(axis=1)
-    for k in np.flatnonzero(outside):
-        for violation in violations(arm, q[k]):
-            return Obstruction("limits", float(times[k]), violation.joint, str(violation))
+    outside = ((q < arm.limits.lower) | (q > arm.limits.upper)).any(axis=-1)
+    for index in np.argwhere(outside):
+        for violation in violations(arm, q[tuple(index)]):
+            return Obstruction("limits", float(times[index[-1]]), violation.joint, str(violation))
     return None
 
 

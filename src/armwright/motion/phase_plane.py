@@ -36,7 +36,7 @@ _FLOOR = 1e-6
 # Between those parts a limit may be passed. There the bounds are drawn tighter by as much as is seen at these parts,
 # and all is solved again: so many times at most, until no limit is passed by more than this and the time stays. Efforts
 # cost more and are seen at every fourth.
-_SEEN = np.linspace(0.0, 1.0, 33)
+_SAMPLED = np.linspace(0.0, 1.0, 33)
 _EVERY = 4
 _ROUNDS, _PASSED, _SETTLED = 8, 1e-4, 1e-5
 # More than this part of a limit taken by gravity and dry friction is all of it.
@@ -124,7 +124,7 @@ def _use(solver: Solver, grid: Grid, x: Array, *, efforts: bool) -> Array:
     u = np.diff(x) / (2 * grid.lengths)
     x = x[:-1]
     use = np.zeros(len(x))
-    for number, part in enumerate(_SEEN):
+    for number, part in enumerate(_SAMPLED):
         there = np.maximum(x + 2 * part * grid.lengths * u, 0.0)[:, None]
         rate, bend = grid.at(part, 1), grid.at(part, 2)
         qd, qdd = rate * np.sqrt(there), rate * u[:, None] + bend * there

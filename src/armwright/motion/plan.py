@@ -236,7 +236,7 @@ def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -
     return PlannedStage(
         kind=goal.kind,
         trajectory=motion.trajectory,
-        length=_length(path.poses) if goal.kind == "LINE" else hand_length(arm, motion.trajectory),
+        length=_length(path.poses) if goal.kind == "LINE" else tool_path_length(arm, motion.trajectory),
         certificate=motion.certificate,
         deviation=motion.certificate.deviation,
         slowed=stops or motion.certificate.slowed,
@@ -282,7 +282,7 @@ def _bypass(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle: Ob
     return PlannedStage(
         kind="LINE",
         trajectory=trajectory,
-        length=_length(np.stack(corners)) if legs else hand_length(arm, trajectory),
+        length=_length(np.stack(corners)) if legs else tool_path_length(arm, trajectory),
         certificate=None if legs is None else legs.certificate,
         # The via pose is as far from the line as any position of the legs that meet in it.
         deviation=detour.price.distance + (deviation if taken else 0.0),
@@ -297,7 +297,7 @@ def _length(poses: Array) -> float:
     return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1).sum())
 
 
-def hand_length(arm: AnyArm, trajectory: Trajectory) -> float:
+def tool_path_length(arm: AnyArm, trajectory: Trajectory) -> float:
     """Return the length of the path of the tool, sampled often enough for a smooth one [m]."""
     return _length(solver_of(arm).forward(trajectory(np.linspace(0.0, trajectory.duration, _LOOKS))))
 
@@ -312,4 +312,4 @@ def _configurations(arm: AnyArm, X: Array, q: Array, number: int) -> list[Array]
 
 def _direct(arm: AnyArm, q: Array, goal: Array, manner: Manner) -> PlannedStage:
     motion = point_to_point(solver_of(arm).arm, q, goal, manner.speed)
-    return PlannedStage(kind="PTP", trajectory=whole_ticks(motion, manner.period), length=hand_length(arm, motion))
+    return PlannedStage(kind="PTP", trajectory=whole_ticks(motion, manner.period), length=tool_path_length(arm, motion))

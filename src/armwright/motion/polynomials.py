@@ -23,7 +23,7 @@ Indices: TypeAlias = npt.NDArray[np.intp]
 
 # A leading coefficient below this part of the largest is left out to find where roots are; Newton's method, on the
 # whole polynomial, then puts them right.
-_FADED = 1e-12
+_NEGLIGIBLE = 1e-12
 _POLISHES = 3
 # A parabola has so many coefficients; its roots need no search.
 _PARABOLA = 3
@@ -121,19 +121,19 @@ def peaks(terms: Array, lengths: Array, rows: Evaluator = on_arrays) -> Array:
     return np.asarray(most)
 
 
-def composed_peaks(cubics: Array, law: Array, places: Indices, times: Array, run: Runner) -> tuple[Array, Array, Array]:
+def composed_peaks(cubics: Array, law: Array, places: Array, times: Array, run: Runner) -> tuple[Array, Array, Array]:
     """Return the coefficients (p, 10, n) of a run along cubics, and its largest speeds and accelerations (n,).
 
     Args:
         cubics: (m, 4, n) coefficients of the joint positions by a parameter.
         law: (p, 4) coefficients of the parameter on each piece of the run, by the time since that begins.
-        places: (p,) on which cubic each piece is.
+        places: (p,) the number of the cubic that each piece is on.
         times: (p + 1,) when the pieces begin, and the last one ends [s].
         run: runs routines.
     """
     p, n = len(law), cubics.shape[2]
     terms, most, places_left, facts = run(
-        _composed_peaks, [cubics, law, places.astype(np.float64), times], (p, 10, n), (2, n), (3, 2 * p * n), (1,)
+        _composed_peaks, [cubics, law, places, times], (p, 10, n), (2, n), (3, 2 * p * n), (1,)
     )
     left = int(facts[0])
     if left:
@@ -275,8 +275,9 @@ def _between(loops: Loops, terms: list[Scalar], length: Scalar) -> tuple[Scalar,
         start = select(change, (k + low / select(change, low - high, 1.0)) / (len(control) - 1), start)
     sign = select(control[0] < 0, 1.0, -1.0)
 
-    t = _crossed(loops, partial(_value_and_slope, scaled), sign, start) * length
-    return abs(_value(terms, t)), turns
+    low, start = 0.0 * sign, start + 0.0 * sign
+    part = crossing(loops, partial(_value_and_slope, scaled), (low, low + 1.0), start, tolerance=_NEAR, sign=sign)
+    return abs(_value(terms, part * length)), turns
 
 
 def _rise_to_extremes(
@@ -363,29 +364,46 @@ def _crossing(loops: Loops, terms: Table, signs: Table, starts: Table, roots: Ta
                 count, (zero, zero), lambda p, value, rate: (value * x + terms[i, p], rate * x + value), reverse=True
             )
 
-        return (_crossed(loops, value_and_rate, signs[i], starts[i]),)
+        low = 0.0 * starts[i]
+        return (crossing(loops, value_and_rate, (low, low + 1.0), starts[i], tolerance=_NEAR, sign=signs[i]),)
 
     loops.fill([roots], [rows], of_row)
 
 
-def _crossed(
-    loops: Loops, value_and_rate: Callable[[Scalar], tuple[Scalar, ...]], sign: Scalar, start: Scalar
+def crossing(
+    loops: Loops,
+    value_and_rate: Callable[[Scalar], tuple[Scalar, ...]],
+    bracket: tuple[Scalar, Scalar],
+    start: Scalar,
+    *,
+    tolerance: Scalar,
+    sign: Scalar = 1.0,
 ) -> Scalar:
-    """Return the root in [0, 1] of a function that has one there, with the sign of its slope, from a start."""
+    """Return the root of a function in a bracket, by Newton's method safeguarded by bisection.
+
+    Args:
+        loops: of the routine.
+        value_and_rate: returns the function and its derivative.
+        bracket: the interval in which there is one root.
+        start: a point of it.
+        tolerance: the length of the last step.
+        sign: of the slope at the root.
+
+    Source:
+        Press et al., Numerical Recipes, 3rd ed., section 9.4.
+    """
 
     def step(low: Scalar, high: Scalar, x: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
         value, rate = value_and_rate(x)
         before = value * sign < 0
         low, high = select(before, x, low), select(before, high, x)
-        # Newton's step where it stays between the bounds, else a halving.
         rises = abs(rate) > 0
-        ahead = x - value / select(rises, rate, 1.0)
-        stays = select(rises, select(low <= ahead, ahead <= high, False), False)
-        following = select(stays, ahead, (low + high) / 2)
-        return abs(following - x) <= _NEAR, (low, high, following)
+        newton = x - value / select(rises, rate, 1.0)
+        inside = select(rises, select(low <= newton, newton <= high, False), False)
+        following = select(inside, newton, (low + high) / 2)
+        return abs(following - x) <= tolerance, (low, high, following)
 
-    low = 0.0 * sign
-    return loops.until(_HALVINGS, (low, low + 1.0, start + 0.0 * sign), step)[2]
+    return loops.until(_HALVINGS, (*bracket, start), step)[2]
 
 
 def _powers(lengths: Array, count: int) -> Array:
@@ -404,7 +422,7 @@ def _bernstein(degree: int) -> Array:
 def _roots(slopes: Array, rows: Evaluator) -> Array:
     """Return points (r, d) of [0, 1] among which are all roots there of the polynomials (r, d + 1) of degree d."""
     roots = np.zeros((len(slopes), slopes.shape[1] - 1))
-    significant = np.abs(slopes) > _FADED
+    significant = np.abs(slopes) > _NEGLIGIBLE
     degrees = slopes.shape[1] - 1 - significant[:, ::-1].argmax(axis=1)
     for degree in set(degrees.tolist()):
         of = np.flatnonzero(degrees == degree)

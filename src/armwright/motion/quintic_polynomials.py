@@ -39,18 +39,18 @@ def quintic(q_start: ArrayLike, q_goal: ArrayLike, duration: float) -> Trajector
     """
     duration = check_duration(duration)
     start, goal = two_ends(q_start, q_goal)
-    way = goal - start
+    displacement = goal - start
     powers = np.array((0.0, 0.0, 0.0, 10 / duration**3, -15 / duration**4, 6 / duration**5))
-    coefficients = powers[:, None] * way
+    coefficients = powers[:, None] * displacement
     coefficients[0] += start
     return Trajectory(times=(0.0, duration), coefficients=coefficients[None])
 
 
-def shortest_duration(arm: Arm, way: ArrayLike) -> float:
-    """Return the shortest time of a quintic over ``way`` (n,) inside the speed and acceleration limits [s]."""
-    way = np.abs(joint_array(way, arm.n, "way"))
-    by_speed: Array = PEAK_SPEED * way / arm.limits.speed
-    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * way / arm.limits.acceleration)
+def shortest_duration(arm: Arm, displacement: ArrayLike) -> float:
+    """Return the shortest time of a quintic over ``displacement`` (n,) inside the speed and acceleration limits [s]."""
+    displacement = np.abs(joint_array(displacement, arm.n, "displacement"))
+    by_speed: Array = PEAK_SPEED * displacement / arm.limits.speed
+    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * displacement / arm.limits.acceleration)
     return float(max(by_speed.max(), by_acceleration.max()))
 
 
@@ -74,10 +74,10 @@ def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float
     """
     speed = check_speed(speed)
     start, goal = single_configuration(arm, q_start, "q_start"), single_configuration(arm, q_goal, "q_goal")
-    way = goal - start
-    if np.abs(way).max() <= NOWHERE:
+    displacement = goal - start
+    if np.abs(displacement).max() <= NOWHERE:
         return hold(start, 0.0)
-    shortest = shortest_duration(arm, way)
+    shortest = shortest_duration(arm, displacement)
     if shortest == 0:
         raise IncapableArmError(
             f"arm '{arm.name}': no moving joint has a limit of speed or acceleration, so the duration of the move "

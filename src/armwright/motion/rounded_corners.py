@@ -54,7 +54,7 @@ _WITH_STOPS = "with a stop at every frame: {}"
 # Knots to begin with: so far apart [s], and so many in each blend and on each leg.
 _STEP, _MIN_KNOTS = 0.1, 8
 # So that rounding does not carry what is just allowed beyond it.
-_HAIR = 1e-9
+_ROUNDING = 1e-9
 # A blend needs some width before and after each pose; nothing is rounded at the ends.
 _NO_BLEND = 1.0
 
@@ -257,7 +257,7 @@ def _blend_widths(legs: _Legs, half: Array, corner: float, line_deviation: float
     """
     change = np.maximum(legs.bend, legs.twist / ROTATION_PER_METRE)
     with np.errstate(divide="ignore"):
-        widths = np.minimum(half, (1 - _HAIR) * max(corner - line_deviation, corner / 2) / (MISS * change))
+        widths = np.minimum(half, (1 - _ROUNDING) * max(corner - line_deviation, corner / 2) / (MISS * change))
     # From the beginning of a blend of half-width r on, the path leaves its leg as u³ / 4 r² - u⁴ / 16 r³.
     allowed = min(_MIDDLE, _MIDDLE_PART * corner) / 2
     thirds = np.stack([legs.lengths[:-1], legs.lengths[1:]]) / 3
@@ -312,11 +312,11 @@ def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, TimedPath]:
     legs, solver = task.legs, solver_of(task.arm)
     top, times = float(legs.speeds.max()), legs.times
     blends = np.concatenate([[_NO_BLEND], widths / top, [_NO_BLEND]])
-    hand = tool_path(legs.poses, times, blends, ends="running", orientation="geodesic")
+    rounded = tool_path(legs.poses, times, blends, ends="running", orientation="geodesic")
     close, wide = tolerance(task.closer), tolerance(_CLOSER * task.closer)
-    following = Task(solver, hand, task.q_start, close, wide, rest=False, max_slowdown=most)
+    following = Task(solver, rounded, task.q_start, close, wide, rest=False, max_slowdown=most)
     try:
-        tracked = track(following, hand.first_knots(_STEP, _MIN_KNOTS))
+        tracked = track(following, rounded.first_knots(_STEP, _MIN_KNOTS))
     except PathError as error:
         raise error.restated(legs.numbers[error.segment + 1] - 1, str(error)) from None
     caps = _caps(tracked.trajectory.times, times, widths / top, legs.speeds / top)
@@ -355,7 +355,7 @@ def _shortest_with_stops(task: _Task) -> float:
     q, failed = chain(solver, task.legs.poses, task.q_start)
     if failed is not None or not np.isfinite(limits[1]).all():
         return 0.0
-    by_joints = [shortest_trapezoid(way, *limits) for way in np.diff(q, axis=0)]
+    by_joints = [shortest_trapezoid(displacement, *limits) for displacement in np.diff(q, axis=0)]
     return float(np.maximum(task.legs.lengths / task.legs.speeds, by_joints).sum())
 
 

@@ -17,9 +17,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import inverse_branches
 from armwright.motion.rows import Evaluator, by_kernels, on_arrays
-from armwright.tracing.loops import Runner, compiled, with_numpy
-
-AnyArm: TypeAlias = Arm | CompiledArm
+from armwright.tracing.loops import Runner, compiled, compiled_quickly, with_numpy
 
 
 class Solver(NamedTuple):
@@ -42,13 +40,20 @@ class Solver(NamedTuple):
     run: Runner
 
 
+# A planner that has the functions of an arm hands them on.
+AnyArm: TypeAlias = Arm | CompiledArm | Solver
+
+
 def solver_of(arm: AnyArm) -> Solver:
     """Return the functions of an arm: kernels of a compiled one, else the plain functions, which compile nothing."""
+    if isinstance(arm, Solver):
+        return arm
     if isinstance(arm, CompiledArm):
         forward_, dynamics = partial(_by_kernel, arm, "forward", 1), partial(_by_kernel, arm, "inverse_dynamics", 1)
         branches_ = partial(_by_kernel, arm, "inverse_branches", 2)
         closed = find_geometry(arm.arm) is not None
-        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels, compiled)
+        run = compiled_quickly if arm.quickly else compiled
+        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels, run)
     branches = partial(inverse_branches, arm) if find_geometry(known_arm(arm)) is not None else None
     return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches, on_arrays, with_numpy)
 
@@ -70,4 +75,6 @@ def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:
 
 def _repeated(x: Array, lead: tuple[int, ...]) -> Array:
     """Return an input (..., n) as rows, the same ones for what it lacks of the leading axes."""
-    return np.ascontiguousarray(np.broadcast_to(x, (*lead, x.shape[-1]))).reshape(-1, x.shape[-1])
+    rows = np.empty((*lead, x.shape[-1]))
+    rows[...] = x
+    return rows.reshape(-1, x.shape[-1])

@@ -109,7 +109,7 @@ def certified_line(
     tracked = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
     check_velocities(task, tracked)
     nominal = even / (1 - _RAMP)
-    return fastest(arm, tracked, allowed, nominal=nominal, period=period, weak=weak)
+    return fastest(solver, tracked, allowed, nominal=nominal, period=period, weak=weak)
 
 
 def coarse_line(arm: AnyArm, q_start: Array, X_goal: Array, *, deviation: float, speed: float) -> CertifiedMotion:
@@ -170,7 +170,8 @@ def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
     """Return times to begin with, as many as the report's rule asks for."""
     A, B = motion.poses[:, :3, 3]
     count = math.ceil(math.dist(A, B) / report_step(arm, A, B, allowed.position)) + 2
-    return np.linspace(0.0, motion.duration, min(max(_MIN_KNOTS, count), _MAX_KNOTS))
+    last = min(max(_MIN_KNOTS, count), _MAX_KNOTS) - 1
+    return np.asarray(motion.duration * (np.arange(last + 1) / last))
 
 
 def _requested_time(even: float, t: Array) -> Array:

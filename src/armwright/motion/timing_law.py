@@ -19,13 +19,12 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
 from armwright.motion.forward_backward import Bounds, Nothing, largest_squares, write_largest_squares
 from armwright.motion.knots import segments_at
-from armwright.motion.polynomials import composed_peaks, shifted_terms
+from armwright.motion.polynomials import composed_peaks, crossing, shifted_terms
 from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.loops import Loops, Table
@@ -43,14 +42,13 @@ _ROUNDS = 4
 # more, the fewer knots there are, so that there are some so many in all.
 _FINER, _ENOUGH = 4, 400
 # Parts of an interval where its bounds are kept, and parts of a piece where the limits are sampled.
-_PARTS, _SEEN = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
-# Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed,
-# to this part of the piece.
-_SAME, _HALVINGS, _CONVERGED = 1e-10, 60, 1e-12
-# A position on the path is found in time to this part of a piece.
-_LOOKED_UP = 1001
+_PARTS, _SAMPLED = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
+# Two breaks nearer than this part of the duration are one; a knot is passed at a time found to this part of its piece.
+_SAME, _CONVERGED = 1e-10, 1e-12
+# Halvings of a piece to find when the run is at a position on the path.
+_HALVINGS = 20
 # So that rounding does not make a run too long that is just short enough.
-_HAIR = 1e-9
+_ROUNDING = 1e-9
 # A joint that uses this part of what the fullest limit uses binds.
 _BINDS = 0.95
 
@@ -77,22 +75,15 @@ class TimedPath(NamedTuple):
     def when(self, s: float) -> float:
         """Return when the run is at ``s``, as a part of its duration."""
         run = self.run
-        begins = run.law[:, 0] + run.grid.times[run.intervals]
+        begins = run.law[:, 0] + run.grid.times[run.intervals.astype(np.intp)]
         k = int(segments_at(begins, s, len(begins)))
-        _, *law = run.law[k].tolist()
-        length = float(run.times[k + 1] - run.times[k])
-
-        def at(i: int) -> float:
-            t = i / (_LOOKED_UP - 1) * length
-            return float(((law[2] * t + law[1]) * t + law[0]) * t)
-
-        sought, low, high = s - float(begins[k]), 0, _LOOKED_UP - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (middle, high) if at(middle) <= sought else (low, middle)
-        rise = at(high) - at(low)
-        part = min(max((sought - at(low)) / rise, 0.0), 1.0) if rise > 0 else 0.0
-        return (float(run.times[k]) + (low + part) / (_LOOKED_UP - 1) * length) / float(run.times[-1])
+        (_, slow, bend, jerk), sought = run.law[k].tolist(), s - float(begins[k])
+        start, end = run.times[k : k + 2].tolist()
+        low, high = 0.0, end - start
+        for _ in range(_HALVINGS):
+            t = (low + high) / 2
+            low, high = (t, high) if ((jerk * t + bend) * t + slow) * t <= sought else (low, t)
+        return float((start + (low + high) / 2) / run.times[-1])
 
 
 class _Grid(NamedTuple):
@@ -132,7 +123,7 @@ class _Run(NamedTuple):
     Attributes:
         grid: the path.
         times: (p + 1,) when its p pieces begin, and the last one ends [s].
-        intervals: (p,) on which interval of the path each is.
+        intervals: (p,) the number of the interval of the path that each is on.
         law: (p, 4) coefficients of the path on that interval by the time since the piece began.
         along: (p,) the largest part that each piece uses of the speed on the path.
         of_joints: (p, 2 n) the same of the speeds and of the roots of the accelerations of the joints.
@@ -141,7 +132,7 @@ class _Run(NamedTuple):
 
     grid: _Grid
     times: Array
-    intervals: npt.NDArray[np.intp]
+    intervals: Array
     law: Array
     along: Array
     of_joints: Array
@@ -253,7 +244,7 @@ def _smooth(grid: _Grid) -> _Run:
     for _ in range(_WINDOWS):
         runs.append(_averaged_within(grid, window))
         cost = runs[-1].duration - grid.shortest
-        if cost <= most + _HAIR * grid.shortest:
+        if cost <= most + _ROUNDING * grid.shortest:
             break
         window *= max(_LESS * most / cost, _LEAST_STEP)
     return min(runs, key=lambda run: run.duration)
@@ -265,11 +256,11 @@ def _averaged_within(grid: _Grid, window: float) -> _Run:
     tighter, runs, x = np.ones((len(lengths), 1)), [], grid.squares
     for _ in range(_ROUNDS):
         runs.append(_averaged(grid, x, window))
-        if runs[-1].duration <= (1 + _HAIR) * grid.allowed:
+        if runs[-1].duration <= (1 + _ROUNDING) * grid.allowed:
             break
         worst = np.ones(len(lengths))
         uses = np.maximum(runs[-1].along, runs[-1].of_joints.max(axis=1))
-        np.maximum.at(worst, runs[-1].intervals, uses)
+        np.maximum.at(worst, runs[-1].intervals.astype(np.intp), uses)
         tighter = tighter * worst[:, None] ** 2
         bounds = Bounds(grid.a * tighter, grid.b * tighter, np.zeros_like(grid.a))
         x = largest_squares(bounds, lengths, (False, False), grid.solver.run)
@@ -296,7 +287,7 @@ def _averaged(grid: _Grid, squares: Array, window: float) -> _Run:
     return _Run(
         grid,
         times[: count + 1],
-        intervals[:count].astype(np.intp),
+        intervals[:count],
         law[:count],
         along[:count],
         of_joints[:count].reshape(count, -1),
@@ -328,17 +319,17 @@ def _averaged_run(loops: Loops, *tables: Table) -> None:
 
     def samples(k: Scalar) -> list[Scalar]:
         length = parts[k + 1] - parts[k]
-        return [x for part in _SEEN for x in _along([laws[k, power] for power in range(4)], part * length)]
+        return [x for part in _SAMPLED for x in _along([laws[k, power] for power in range(4)], part * length)]
 
-    seen = loops.each([count], samples, 3 * len(_SEEN))
+    sampled = loops.each([count], samples, 3 * len(_SAMPLED))
 
     def of_path(k: Scalar) -> list[Scalar]:
-        return [reduce(larger, (rates[k] for rates in seen[1::3]), 0.0) / caps[loops.whole(intervals[k])]]
+        return [reduce(larger, (rates[k] for rates in sampled[1::3]), 0.0) / caps[loops.whole(intervals[k])]]
 
     def of_joint(k: Scalar, j: Scalar) -> list[Scalar]:
         at = loops.whole(intervals[k])
         cubic = [cubics[at, power, j] for power in range(4)]
-        fastest, hardest = _used(cubic, zip(*(iter([table[k] for table in seen]),) * 3, strict=True))
+        fastest, hardest = _used(cubic, zip(*(iter([table[k] for table in sampled]),) * 3, strict=True))
         return [fastest / speed[j], sqrt(hardest / acceleration[j])]
 
     loops.fill([along], [count], of_path)
@@ -403,12 +394,12 @@ def _cut(loops: Loops, starts: Table, breaks: Table, law: Table) -> tuple[Table,
     return _apart(loops, breaks, passed)
 
 
-def _used(cubic: list[Scalar], seen: Iterable[tuple[Scalar, ...]]) -> tuple[Scalar, Scalar]:
+def _used(cubic: list[Scalar], sampled: Iterable[tuple[Scalar, ...]]) -> tuple[Scalar, Scalar]:
     """Return the largest speed and the largest acceleration of a joint on a cubic q(s), given s, s' and s'' there."""
     _, c1, c2, c3 = cubic
     speed: Scalar = 0.0
     acceleration: Scalar = 0.0
-    for x, rate, bend in seen:
+    for x, rate, bend in sampled:
         slope, curve = (3 * c3 * x + 2 * c2) * x + c1, 6 * c3 * x + 2 * c2
         speed = larger(abs(slope * rate), speed)
         acceleration = larger(abs(curve * rate * rate + slope * bend), acceleration)
@@ -425,25 +416,18 @@ def _passed(loops: Loops, law: list[Scalar], length: Scalar, knot: Scalar) -> Sc
     """Return when a cubic s(t), which never falls, passes a knot, from 0 to ``length`` [s]."""
     start, slow, bend, jerk = law
 
-    def step(low: Scalar, high: Scalar, last: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
-        residual = ((jerk * last + bend) * last + slow) * last + start - knot
-        low, high = select(residual < 0, last, low), select(residual < 0, high, last)
-        rate = (3 * jerk * last + 2 * bend) * last + slow
-        # Newton's step where it stays between the bounds, else a halving.
-        ahead = last - residual / select(rate > 0, rate, math.inf)
-        stays = select(ahead >= low, select(high >= ahead, rate > 0, False), False)
-        t = select(stays, ahead, (low + high) / 2)
-        return abs(t - last) <= _CONVERGED * length, (low, high, t)
+    def value_and_rate(t: Scalar) -> tuple[Scalar, Scalar]:
+        return ((jerk * t + bend) * t + slow) * t + start - knot, (3 * jerk * t + 2 * bend) * t + slow
 
-    return loops.until(_HALVINGS, (0.0 * length, length, length / 2), step)[2]
+    return crossing(loops, value_and_rate, (0.0 * length, length), length / 2, tolerance=_CONVERGED * length)
 
 
 def _binding(joints: int, run: _Run) -> BindingLimit:
     """Return which limit of which joint binds for the longest time."""
     steps, of_joints = run.times[1:] - run.times[:-1], run.of_joints
-    fullest = of_joints.argmax(axis=1)
-    near = of_joints.max(axis=1) >= _BINDS * of_joints.max()
-    counts = np.bincount(fullest[near], weights=steps[near], minlength=2 * joints)
+    most = of_joints.max(axis=1)
+    long = np.where(most >= _BINDS * most.max(), steps, 0.0)
+    counts = np.bincount(of_joints.argmax(axis=1), weights=long, minlength=2 * joints)
     name, joint = divmod(int(counts.argmax()), joints)
     return ("acceleration" if name else "speed"), joint
 

@@ -12,14 +12,15 @@ from armwright.arrays import Array, ArrayLike, floats
 from armwright.motion.blends import PEAK_ACCELERATION, BlendPlan, Ends, blend_plan, blended, rates_at_points
 from armwright.motion.deviation import (
     ErrorBounds,
-    HandBounds,
-    HandSamples,
+    ToolBounds,
+    ToolSamples,
     TrackingError,
     error_of,
+    half_angle_bound,
     half_sines,
-    spin_bound,
 )
 from armwright.motion.knots import divided, segments_at
+from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
 from armwright.spatial.poses import homogeneous, position_text
@@ -56,6 +57,10 @@ class ToolPath:
         t = floats(t, "t")
         return homogeneous(self.orientation(t), self.position(t))
 
+    def poses_for(self, solver: Solver, t: Array) -> Array:  # noqa: ARG002 - of a tool path NumPy computes them
+        """Return the poses (k, 4, 4) at times (k,)."""
+        return self(t)
+
     def first_knots(self, step: float, fewest: int) -> Array:
         """Return the first times: so far apart [s], and so many at least in each blend and on each straight segment."""
         parts = np.clip(np.ceil(np.diff(self.knots) / step), fewest, _ENOUGH).astype(np.intp)
@@ -66,16 +71,17 @@ class ToolPath:
         position, orientation = self.position.slowed(factor), self.orientation.slowed(factor)
         return ToolPath(position=position, orientation=orientation, times=self.times * factor)
 
-    def bounds(self, times: Array, hand: HandBounds, run: Runner) -> ErrorBounds:  # noqa: ARG002
+    def bounds(self, times: Array, tool: ToolBounds, run: Runner) -> ErrorBounds:  # noqa: ARG002
         """Return bounds of the error on the intervals between times: those of tool and path together."""
         middles = (times[1:] + times[:-1]) / 2
         piece = segments_at(self.knots, middles, len(self.knots) - 1)
         rate, change = (bound[piece] for bound in self.spin())
         return ErrorBounds(
-            hand.pull + self.acceleration()[piece], spin_bound(hand.spin, hand.spin_change, change, rate)
+            tool.acceleration + self.acceleration()[piece],
+            half_angle_bound(tool.angular_speed, tool.angular_acceleration, change, rate),
         )
 
-    def error(self, samples: HandSamples) -> TrackingError:
+    def error(self, samples: ToolSamples) -> TrackingError:
         """Return how far a sampled tool is from where it should be at the time."""
         planned = self(samples.times)
         distances = np.linalg.norm(samples.poses[..., :3, 3] - planned[..., :3, 3], axis=-1)

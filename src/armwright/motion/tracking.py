@@ -17,7 +17,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.motion.chain import beside, chain
 from armwright.motion.deviation import (
-    HandMotion,
+    ToolMotion,
     TrackingError,
     curve_bounds,
     tracking_error,
@@ -73,7 +73,7 @@ class Task(NamedTuple):
     """
 
     solver: Solver
-    motion: HandMotion
+    motion: ToolMotion
     q_start: Array
     tolerance: Tolerance
     diagnosis: Tolerance
@@ -141,7 +141,7 @@ def too_far(task: Task, tracking: Tracking) -> Obstruction:
     return Obstruction("singular", time, joint, reason)
 
 
-def path_error(motion: HandMotion, obstruction: Obstruction) -> PathError:
+def path_error(motion: ToolMotion, obstruction: Obstruction) -> PathError:
     """Return the error for what stops the arm, with the position in words."""
     segment, fraction, where = motion.where(obstruction.time)
     cause, _, joint, reason, *_ = obstruction
@@ -199,7 +199,7 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
     """Put knots until the tool stays within the tolerance everywhere, near the configurations of a diagnosis if any."""
     arm, configurations = task.solver.arm, None if guide is None else guide.guide
     for _ in range(_ROUNDS):
-        X = task.motion(knots)
+        X = task.motion.poses_for(task.solver, knots)
         if configurations is None:
             q, failed = chain(task.solver, X, task.q_start)
         else:
@@ -214,13 +214,12 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
         h = knots[1:] - knots[:-1]
         bounds = curve_bounds(task.solver, trajectory)
         speed = bounds.speed
-        error = tracking_error(task.solver, task.motion, trajectory, bounds.hand, task.tolerance)
+        error = tracking_error(task.solver, task.motion, trajectory, bounds.tool, task.tolerance)
         tracking = Tracking(trajectory, error, speed)
         ratios = excess(error, task.tolerance)
         if ratios.max() <= 1:
             # Between two knots that keep a limit the spline may pass it where a joint reverses.
-            first, second = bounds.turning
-            return beyond_limits(arm, first, knots) or beyond_limits(arm, second, knots) or tracking
+            return beyond_limits(arm, bounds.turning, knots) or tracking
         if task.report_spline:
             return tracking
         ratio = np.where((h < knots[-1] / _SHORT)[:, None], _velocity_ratios(task, trajectory, speed), 0.0)

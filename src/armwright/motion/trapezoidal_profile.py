@@ -49,8 +49,8 @@ def trapezoid(
             short for the limits of a joint, or too long to be one.
     """
     start, goal = two_ends(q_start, q_goal)
-    way = goal - start
-    limits = _limits(way, speed, acceleration)
+    displacement = goal - start
+    limits = _limits(displacement, speed, acceleration)
     requested = None if duration is None else check_duration(duration)
     if limits is None:
         return hold(start, requested or 0.0)
@@ -61,8 +61,8 @@ def trapezoid(
         fastest, hardest = limits.joints
         j = fastest if limits.speed**2 < limits.acceleration else hardest
         raise InvalidValueError(
-            f"duration: {requested:g} s is too short for joint {j + 1}, whose travel of {abs(way[j]):.6g} takes "
-            f"at least {shortest:.6g} s within the limits"
+            f"duration: {requested:g} s is too short for joint {j + 1}, whose travel of {abs(displacement[j]):.6g} "
+            f"takes at least {shortest:.6g} s within the limits"
         )
     a = limits.acceleration
     # The speed v at which 1 = v (T - v / a), without loss of digits, and the time to reach it.
@@ -73,18 +73,18 @@ def trapezoid(
     times = (0.0, rise, requested - rise, requested)
     risen = a * rise**2 / 2
     profile = np.array([[0, 0, a / 2], [risen, v, 0], [1 - risen, v, -a / 2]])
-    coefficients = profile[:, :, None] * way
+    coefficients = profile[:, :, None] * displacement
     coefficients[:, 0] += start
     if times[2] - times[1] <= _ROUNDING * requested:
         return Trajectory(times=(0.0, rise, requested), coefficients=coefficients[[0, 2]])
     return Trajectory(times=times, coefficients=coefficients)
 
 
-def shortest_trapezoid(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike) -> float:
+def shortest_trapezoid(displacement: ArrayLike, speed: ArrayLike, acceleration: ArrayLike) -> float:
     """Return the shortest time of a trapezoid inside limits [s].
 
     Args:
-        way: (n,) of the joints [rad] or [m].
+        displacement: (n,) of the joints [rad] or [m].
         speed: (n,) limits, or one for all; infinite where there is none.
         acceleration: (n,) limits, or one for all; some joint that moves must have one.
 
@@ -93,18 +93,18 @@ def shortest_trapezoid(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike
         ShapeError: the limits do not fit the path.
         InvalidValueError: a number is NaN, or a limit not above 0 or missing.
     """
-    limits = _limits(joint_vector(way), speed, acceleration)
+    limits = _limits(joint_vector(displacement), speed, acceleration)
     return 0.0 if limits is None else _shortest(limits)
 
 
-def _limits(way: Array, speed: ArrayLike, acceleration: ArrayLike) -> _Limits | None:
+def _limits(displacement: Array, speed: ArrayLike, acceleration: ArrayLike) -> _Limits | None:
     """Return how fast the part of the path from 0 to 1 may change; None where there is no path."""
-    speeds = limit_per_joint(speed, len(way), "speed")
-    accelerations = limit_per_joint(acceleration, len(way), "acceleration")
-    if np.abs(way).max() <= NOWHERE:
+    speeds = limit_per_joint(speed, len(displacement), "speed")
+    accelerations = limit_per_joint(acceleration, len(displacement), "acceleration")
+    if np.abs(displacement).max() <= NOWHERE:
         return None
     with np.errstate(divide="ignore"):
-        by_speed, by_acceleration = speeds / np.abs(way), accelerations / np.abs(way)
+        by_speed, by_acceleration = speeds / np.abs(displacement), accelerations / np.abs(displacement)
     joints = int(by_speed.argmin()), int(by_acceleration.argmin())
     v, a = float(by_speed.min()), float(by_acceleration.min())
     if not math.isfinite(a):

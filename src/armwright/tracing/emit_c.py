@@ -176,7 +176,17 @@ def _statements(function: Function, code: MachineCode, dialect: Dialect) -> list
     lines[:0] = [f"(void){x.name};" for x in function.inputs if x.name not in read]
     for result in list(results):
         lines += written(result, names[result])
-    return [*lines, f"return {status_of(code, names)};"]
+    status = status_of(code, names)
+    if dialect is _FLOAT:
+        lines += ["int finite = 1;"]
+        for x in (x for x in function.outputs if not x.flag):
+            lines += [
+                f"for (int i = 0; i < {x.width}; i++) {{",
+                f"    finite &= {x.name}[i] - {x.name}[i] == 0.0f;",
+                "}",
+            ]
+        status = f"!finite ? {MEANINGLESS} : {status}"
+    return [*lines, f"return {status};"]
 
 
 def status_of(code: MachineCode, names: Mapping[int, str]) -> str:
@@ -351,8 +361,9 @@ _STATUS = {
 }
 _LARGEST = {
     "double": "an angle beyond 1e12, anything else beyond 1e100",
-    "float": "an angle beyond 1e12, anything else beyond 1e15",
-    "Real": "an angle beyond 1e12, anything else beyond 1e100; in float beyond 1e15",
+    "float": "an angle beyond 1e12, anything else beyond 1e15, or an output beyond the range of float",
+    "Real": "an angle beyond 1e12, anything else beyond 1e100; in float beyond 1e15, where outputs may still be "
+    "infinite",
 }
 _C_RULES = """\
 All inputs are read before an output is written, so an array may be both.

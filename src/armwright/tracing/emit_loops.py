@@ -1,7 +1,8 @@
-"""From a routine, see ``loops``, to LLVM IR: loops over numbers one by one, written as the routine runs.
+"""From a routine, see ``loops``, to LLVM IR: loops over numbers, written as the routine runs.
 
-Nothing is reordered or joined, so that a routine has the same bits as with NumPy but where sums are long. What it
-takes of memory for its own tables is given back before it returns.
+The innermost loop that fills tables takes a vector of numbers at a time where all that it reads along it lies side by
+side; every other loop takes one number after the other. Nothing is reordered or joined, so that a routine has the same
+bits as with NumPy but where sums are long. What it takes of memory for its own tables is given back before it returns.
 """
 
 from __future__ import annotations
@@ -14,16 +15,17 @@ from typing import Any, NamedTuple
 from armwright.tracing.graph import Traced
 from armwright.tracing.scalar import Scalar, larger, select, smaller
 
+# For numbers of a type, and what the functions of that type are called.
 _ON_NUMBERS = {
-    "add": "fadd double {0}, {1}",
-    "subtract": "fsub double {0}, {1}",
-    "multiply": "fmul double {0}, {1}",
-    "divide": "fdiv double {0}, {1}",
-    "negate": "fneg double {0}",
-    "less": "fcmp olt double {0}, {1}",
-    "less_equal": "fcmp ole double {0}, {1}",
-    "absolute": "call double @llvm.fabs.f64(double {0})",
-    "sqrt": "call double @llvm.sqrt.f64(double {0})",
+    "add": "fadd {kind} {0}, {1}",
+    "subtract": "fsub {kind} {0}, {1}",
+    "multiply": "fmul {kind} {0}, {1}",
+    "divide": "fdiv {kind} {0}, {1}",
+    "negate": "fneg {kind} {0}",
+    "less": "fcmp olt {kind} {0}, {1}",
+    "less_equal": "fcmp ole {kind} {0}, {1}",
+    "absolute": "call {kind} @llvm.fabs.{suffix}({kind} {0})",
+    "sqrt": "call {kind} @llvm.sqrt.{suffix}({kind} {0})",
 }
 _ON_INTEGERS = {
     "add": "add i64 {0}, {1}",
@@ -33,10 +35,8 @@ _ON_INTEGERS = {
     "less_equal": "icmp sle i64 {0}, {1}",
 }
 _TRUTHS = frozenset({"less", "less_equal"})
-_DECLARED = (
-    "declare double @llvm.fabs.f64(double)",
-    "declare double @llvm.sqrt.f64(double)",
-)
+# The indices of a vector of numbers side by side, by the first of them.
+_LANES = "lanes"
 
 
 class _Value(NamedTuple):
@@ -47,11 +47,23 @@ class _Value(NamedTuple):
     constant: float | None = None
 
 
+class _NotSideBySideError(Exception):
+    """A loop cannot take vectors of numbers."""
+
+
 class EmittedLoops:
     """The code of one function: the loops of a routine as it asks for them, see ``loops.Loops``."""
 
-    def __init__(self) -> None:
-        """Begin an empty function."""
+    def __init__(self, lanes: int) -> None:
+        """Begin an empty function.
+
+        Args:
+            lanes: how many numbers a vector has.
+        """
+        self._width = lanes
+        self._numbers, self._truths = f"<{lanes} x double>", f"<{lanes} x i1>"
+        # Which lanes of a vector are within the loop; None outside of loops over vectors.
+        self._mask: str | None = None
         self._lines: list[str] = []
         self._values: list[_Value] = []
         self._tables: list[str] = []
@@ -73,17 +85,35 @@ class EmittedLoops:
         """Write an operation and return the number of its result."""
         values = [self._values[i] for i in operands]
         if op == "select":
-            kind = self._common(values[1:])
-            condition, (then, otherwise) = values[0], (self._as(x, kind) for x in values[1:])
-            return self._let(kind, f"select i1 {self._as(condition, 'i1')}, {kind} {then}, {kind} {otherwise}")
+            condition, *choices = values
+            kind = self._common(choices)
+            by = self._truths if condition.kind == self._truths else "i1"
+            if by == self._truths and kind in ("i64", _LANES):
+                raise _NotSideBySideError
+            if by == self._truths and kind in ("double", "i1"):
+                kind = self._vector_of(kind)
+            then, otherwise = (self._as(x, kind) for x in choices)
+            return self._let(kind, f"select {by} {self._as(condition, by)}, {kind} {then}, {kind} {otherwise}")
         if op == "sqrt":
             x = Traced(self, operands[0])  # type: ignore[arg-type]
             operands = (select(x < 0.0, 0.0, x).node,)
             values = [self._values[operands[0]]]
         kind = self._common(values)
+        if kind == _LANES:
+            return self._shifted(op, values)
         kind = "double" if kind == "i64" and op not in _ON_INTEGERS else kind
-        instruction = (_ON_INTEGERS if kind == "i64" else _ON_NUMBERS)[op]
-        return self._let("i1" if op in _TRUTHS else kind, instruction.format(*(self._as(x, kind) for x in values)))
+        texts = [self._as(x, kind) for x in values]
+        if kind == "i64":
+            return self._let("i1" if op in _TRUTHS else kind, _ON_INTEGERS[op].format(*texts))
+        truth, suffix = ("i1", "f64") if kind == "double" else (self._truths, f"v{self._width}f64")
+        return self._let(truth if op in _TRUTHS else kind, _ON_NUMBERS[op].format(*texts, kind=kind, suffix=suffix))
+
+    def _shifted(self, op: str, values: Sequence[_Value]) -> int:
+        """Return indices side by side that begin farther on, or before."""
+        first, *others = values
+        if op not in ("add", "subtract") or [x.kind for x in values] != [_LANES, "i64"]:
+            raise _NotSideBySideError
+        return self._let(_LANES, _ON_INTEGERS[op].format(first.text, self._as(others[0], "i64")))
 
     def _new(self, value: _Value) -> int:
         self._values.append(value)
@@ -106,6 +136,12 @@ class EmittedLoops:
     def _common(self, values: Sequence[_Value]) -> str:
         """Return the type of an operation; a whole constant is an integer only beside others."""
         kinds = {x.kind for x in values}
+        if _LANES in kinds:
+            return _LANES
+        if self._numbers in kinds:
+            return self._numbers
+        if self._truths in kinds:
+            return self._truths
         computed = {x.kind for x in values if x.constant is None}
         return "double" if "double" in kinds else next(iter(computed or kinds))
 
@@ -114,12 +150,34 @@ class EmittedLoops:
         if x.constant is not None:
             if kind == "double":
                 return _constant(float(x.constant))
-            return str(int(x.constant)) if kind == "i64" else str(bool(x.constant)).lower()
+            if kind in ("i64", "i1"):
+                return str(int(x.constant)) if kind == "i64" else str(bool(x.constant)).lower()
         if x.kind == kind:
             return x.text
         if x.kind == "i64" and kind == "double":
             return self._name(f"sitofp i64 {x.text} to double")
+        if kind == self._numbers and x.kind in ("double", "i64"):
+            return self._splat("double", self._as(x, "double"))
+        if kind == self._truths and x.kind == "i1":
+            return self._splat("i1", self._as(x, "i1"))
+        if self._mask is not None:
+            raise _NotSideBySideError
         raise TypeError(f"{x.kind} where {kind} is needed")
+
+    def _vector_of(self, kind: str) -> str:
+        return f"<{self._width} x {kind}>"
+
+    def _splat(self, kind: str, text: str) -> str:
+        """Return a vector whose lanes are all the same number."""
+        vector = self._vector_of(kind)
+        first = self._name(f"insertelement {vector} poison, {kind} {text}, i64 0")
+        return self._name(f"shufflevector {vector} {first}, {vector} poison, <{self._width} x i32> zeroinitializer")
+
+    def _indices(self, first: str) -> str:
+        """Return indices side by side as a vector."""
+        vector = self._vector_of("i64")
+        steps = ", ".join(f"i64 {k}" for k in range(self._width))
+        return self._name(f"add {vector} {self._splat('i64', first)}, <{steps}>")
 
     def _text(self, x: Scalar, kind: str) -> str:
         return self._as(self._values[self.node(x)], kind)
@@ -155,11 +213,46 @@ class EmittedLoops:
                 table[indices] = x
             return
 
+        if len(sizes) == 1 and self._filled_by_vectors(tables, sizes[0], indices, body):
+            return
+
         def step(i: Scalar) -> tuple[()]:
             self._fill(tables, sizes[1:], (*indices, i), body)
             return ()
 
         self.walk(sizes[0], (), step)
+
+    def _filled_by_vectors(
+        self,
+        tables: Sequence[EmittedTable],
+        size: Scalar,
+        indices: tuple[Scalar, ...],
+        body: Callable[..., Sequence[Scalar]],
+    ) -> bool:
+        """Fill tables by vectors of numbers along the last axis; return False, and write nothing, where one cannot."""
+        mark = len(self._lines), len(self._values), self._block, self._depth
+        length = self._text(size, "i64")
+        shift = self._width.bit_length() - 1
+        vectors = self._name(f"lshr i64 {self._name(f'add i64 {length}, {self._width - 1}')}, {shift}")
+
+        def step(k: Scalar) -> tuple[()]:
+            first = self._name(f"shl i64 {self._text(k, 'i64')}, {shift}")
+            vector = self._vector_of("i64")
+            self._mask = self._name(f"icmp slt {vector} {self._indices(first)}, {self._splat('i64', length)}")
+            lanes = (*indices, self._traced(_LANES, first))
+            for table, x in zip(tables, body(*lanes), strict=True):
+                table[lanes] = x
+            return ()
+
+        try:
+            self.walk(self._traced("i64", vectors), (), step)
+        except _NotSideBySideError:
+            lines, values, self._block, self._depth = mark
+            del self._lines[lines:], self._values[values:]
+            return False
+        finally:
+            self._mask = None
+        return True
 
     def table(self, *sizes: Scalar) -> EmittedTable:
         """Return a new table of so many numbers along each axis; not within a loop."""
@@ -253,10 +346,17 @@ class EmittedLoops:
 
     def whole(self, x: Scalar) -> Scalar:
         """Return a number without a fraction as an index."""
+        if self._kind(x) == self._numbers:
+            raise _NotSideBySideError
         return self._traced("i64", self._name(f"fptosi double {self._text(x, 'double')} to i64"))
 
     def number(self, i: Scalar) -> Scalar:
         """Return an index as a number."""
+        if self._kind(i) == _LANES:
+            indices = self._indices(self._values[self.node(i)].text)
+            return self._traced(
+                self._numbers, self._name(f"sitofp {self._vector_of('i64')} {indices} to {self._numbers}")
+            )
         return self._traced("double", self._text(i, "double"))
 
     def segment(self, starts: EmittedTable, x: Scalar, count: Scalar) -> Scalar:
@@ -311,10 +411,13 @@ class EmittedLoops:
         step: Callable[..., tuple[Scalar, Sequence[Scalar]]],
         *,
         reverse: bool,
+        kinds: Sequence[str] = (),
     ) -> tuple[Scalar, ...]:
+        """Write a loop; what is carried has its own types, or given ones."""
         self._count += 1
         name = f"loop{self._count}"
-        kinds = [self._kind(x) for x in carry]
+        kinds = kinds or [self._kind(x) for x in carry]
+        mark = len(self._lines), len(self._values), self._block
         starts, length = [self._text(x, kind) for x, kind in zip(carry, kinds, strict=True)], self._text(size, "i64")
         first = self._name(f"sub i64 {length}, 1") if reverse else "0"
         before = self._block
@@ -327,6 +430,12 @@ class EmittedLoops:
         self._depth += 1
         done, new = step(self._traced("i64", index), *state)
         self._depth -= 1
+        # A number that is the same for all lanes at first may differ between them later.
+        wider = [self._numbers if self._kind(x) == self._numbers else k for x, k in zip(new, kinds, strict=True)]
+        if wider != list(kinds):
+            lines, values, self._block = mark
+            del self._lines[lines:], self._values[values:]
+            return self._loop(size, carry, step, reverse=reverse, kinds=wider)
         texts = [self._text(x, kind) for x, kind in zip(new, kinds, strict=True)]
         next_index = self._name(f"add i64 {index}, {-1 if reverse else 1}")
         end = self._block
@@ -396,6 +505,23 @@ class EmittedLoops:
         best, at = self.walk(size, (start, 0), step)
         return best, at
 
+    def _loaded(self, address: str, *, vector: bool) -> Scalar:
+        if not vector:
+            return self._traced("double", self._name(f"load double, ptr {address}"))
+        arguments = f"ptr {address}, i32 8, {self._truths} {self._mask}, {self._numbers} zeroinitializer"
+        load = f"call {self._numbers} @llvm.masked.load.v{self._width}f64.p0({arguments})"
+        return self._traced(self._numbers, self._name(load))
+
+    def _store(self, x: Scalar, address: str, *, vector: bool) -> None:
+        if vector:
+            text = self._text(x, self._numbers)
+            arguments = f"{self._numbers} {text}, ptr {address}, i32 8, {self._truths} {self._mask}"
+            self._lines.append(f"  call void @llvm.masked.store.v{self._width}f64.p0({arguments})")
+            return
+        if self._mask is not None:  # written once for each number of the loop, of which the last one stays
+            raise _NotSideBySideError
+        self._lines.append(f"  store double {self._text(x, 'double')}, ptr {address}")
+
     def _jump(self, branch: str, label: str) -> None:
         self._lines += [f"  {branch}", f"{label}:"]
         self._block = label
@@ -426,7 +552,17 @@ class EmittedLoops:
             if k:
                 end += [f"  call void %free(ptr {self._tables[k - 1]})", f"  br label %short{k - 1}_end"]
         head = "define i64 @routine(ptr noalias %tables, ptr noalias %lengths, ptr %allocate, ptr %free) nounwind {"
-        return "\n".join([*_DECLARED, head, "entry:", *self._lines, *end, "  ret i64 %status0", "}", ""])
+        numbers, truths, suffix = self._numbers, self._truths, f"v{self._width}f64"
+        declared = [
+            f"declare {kind} @llvm.{name}.{of}({kind})"
+            for name in ("fabs", "sqrt")
+            for kind, of in (("double", "f64"), (numbers, suffix))
+        ]
+        declared += [
+            f"declare {numbers} @llvm.masked.load.{suffix}.p0(ptr, i32, {truths}, {numbers})",
+            f"declare void @llvm.masked.store.{suffix}.p0({numbers}, ptr, i32, {truths})",
+        ]
+        return "\n".join([*declared, head, "entry:", *self._lines, *end, "  ret i64 %status0", "}", ""])
 
 
 class EmittedTable:
@@ -472,19 +608,25 @@ class EmittedTable:
         return EmittedTable(loops, self._pointer, [loops._text(x, "i64") for x in lengths])  # noqa: SLF001
 
     def __getitem__(self, key: Scalar) -> Scalar:
-        """Return an element."""
-        loops = self._loops
-        return loops._traced("double", loops._name(f"load double, ptr {self._address(key)}"))  # noqa: SLF001
+        """Return an element, or elements side by side."""
+        return self._loops._loaded(self._address(key), vector=self._is_vector(key))  # noqa: SLF001
 
     def __setitem__(self, key: Scalar, value: Scalar) -> None:
-        """Write an element."""
+        """Write an element, or elements side by side."""
+        self._loops._store(value, self._address(key), vector=self._is_vector(key))  # noqa: SLF001
+
+    def _is_vector(self, key: Scalar) -> bool:
+        """Whether an index stands for elements side by side."""
         loops = self._loops
-        text = loops._text(value, "double")  # noqa: SLF001
-        loops._lines.append(f"  store double {text}, ptr {self._address(key)}")  # noqa: SLF001
+        lanes = [loops._kind(x) == _LANES for x in (key if isinstance(key, tuple) else (key,))]  # noqa: SLF001
+        if any(lanes[:-1]) or (lanes[-1] and self._strides[-1] != "1"):
+            raise _NotSideBySideError
+        return lanes[-1]
 
     def _address(self, key: Scalar) -> str:
         loops = self._loops
-        indices = [loops._text(x, "i64") for x in (key if isinstance(key, tuple) else (key,))]  # noqa: SLF001
+        keys = [loops._values[loops.node(x)] for x in (key if isinstance(key, tuple) else (key,))]  # noqa: SLF001
+        indices = [x.text if x.kind == _LANES else loops._as(x, "i64") for x in keys]  # noqa: SLF001
         place = "0"
         for index, stride in zip(indices, self._strides, strict=True):
             if index != "0":

@@ -16,10 +16,11 @@ _CPP = (
     "public reinterpret_cast requires static_assert static_cast template this thread_local throw true try "
     "typeid typename using virtual wchar_t xor xor_eq"
 )
-# What the text itself uses, and macros of the headers that it includes.
+# What the text itself uses, and macros of the headers that it includes, or that are often included beside it.
 _OURS = (
     "Real armwright detail fma fabs fabsf sqrt sqrtf sinf cosf atan2f rintf memcpy uint64_t NAN INFINITY HUGE_VAL "
-    "HUGE_VALF EOF NULL stdin stdout stderr main linux unix std rows row status tile all"
+    "HUGE_VALF EOF NULL stdin stdout stderr main linux unix std rows row status tile all near far small interface "
+    "min max"
 )
 _RESERVED = frozenset(f"{_C} {_CPP} {_OURS}".split())
 # What values are called in the text.

@@ -120,6 +120,16 @@ def placed(image: bytes) -> tuple[int, Any]:
 
 
 @cache
+def can_be_placed() -> bool:
+    """Whether the system allows memory that can be executed; SELinux and others may refuse it."""
+    try:
+        placed(_START.pack(0) + b"\xc3")
+    except OSError:
+        return False
+    return True
+
+
+@cache
 def _protect() -> Any:
     protect = ctypes.CDLL(None, use_errno=True).mprotect
     protect.argtypes = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int

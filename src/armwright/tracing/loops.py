@@ -18,7 +18,7 @@ import numpy as np
 
 from armwright.arrays import Array, Flags
 from armwright.tracing.door import RoutineDoor, layout_is_known
-from armwright.tracing.native import function_address
+from armwright.tracing.native import function_address, processor
 from armwright.tracing.scalar import Scalar
 
 # A table has a ``shape``, and its numbers are read and written by index, a tuple of them where it has several axes.
@@ -129,25 +129,38 @@ def with_numpy(routine: Routine, inputs: Sequence[Array], *shapes: tuple[int, ..
     return [x.array for x in results]
 
 
-def compiled(routine: Routine, inputs: Sequence[Array], *shapes: tuple[int, ...]) -> list[Array]:
-    """Run a routine as machine code, which is compiled when it is first needed: see ``Runner``.
+class _Compiled:
+    """Runs routines as machine code, which is compiled when it is first needed: see ``Runner``."""
 
-    Raises:
-        MemoryError: there is not enough for the tables of the routine.
-    """
-    results = list(map(np.empty, shapes))
-    function = _FUNCTIONS.get(routine)
-    if function is None:
-        axes = tuple(np.ndim(x) for x in (*inputs, *results))
-        function = _FUNCTIONS[routine] = _function(routine, axes)
-    function(*inputs, *results)
-    return results
+    def __init__(self, *, quickly: bool) -> None:
+        """Begin without functions.
+
+        Args:
+            quickly: whether they are compiled with the least effort: see ``native.function_address``.
+        """
+        self._quickly = quickly
+        self._functions: dict[Routine, Callable[..., None]] = {}
+
+    def __call__(self, routine: Routine, inputs: Sequence[Array], *shapes: tuple[int, ...]) -> list[Array]:
+        """Run a routine.
+
+        Raises:
+            MemoryError: there is not enough for the tables of the routine.
+        """
+        results = list(map(np.empty, shapes))
+        function = self._functions.get(routine)
+        if function is None:
+            axes = tuple(np.ndim(x) for x in (*inputs, *results))
+            function = self._functions[routine] = _function(routine, axes, quickly=self._quickly)
+        function(*inputs, *results)
+        return results
 
 
-_FUNCTIONS: dict[Routine, Callable[..., None]] = {}
+compiled: Runner = _Compiled(quickly=False)
+compiled_quickly: Runner = _Compiled(quickly=True)
 
 
-def _function(routine: Routine, axes: tuple[int, ...]) -> Callable[..., None]:
+def _function(routine: Routine, axes: tuple[int, ...], *, quickly: bool) -> Callable[..., None]:
     """Return the compiled function of a routine, of arrays that have so many axes each."""
     door = RoutineDoor(axes)
     module, name = routine.__module__, routine.__qualname__
@@ -157,10 +170,10 @@ def _function(routine: Routine, axes: tuple[int, ...]) -> Callable[..., None]:
     def ir() -> str:
         from armwright.tracing.emit_loops import EmittedLoops  # noqa: PLC0415 - not needed by later processes
 
-        return EmittedLoops().module(routine, axes) + door.ir()
+        return EmittedLoops(processor().target.lanes).module(routine, axes) + door.ir()
 
     if not layout_is_known():
-        return partial(_by_addresses, function_address(ir, "routine", origin))
+        return partial(_by_addresses, function_address(ir, "routine", origin, quickly=quickly))
 
     function: Callable[..., None]
 
@@ -172,7 +185,7 @@ def _function(routine: Routine, axes: tuple[int, ...]) -> Callable[..., None]:
             raise MemoryError(f"{name}: not enough memory")
         function(*converted)
 
-    function = door.open(name, function_address(ir, "call", origin), careful)
+    function = door.open(name, function_address(ir, "call", origin, quickly=quickly), careful)
     return function
 
 

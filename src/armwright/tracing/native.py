@@ -66,13 +66,16 @@ def function_address(ir: str | Callable[[], str], name: str, origin: str = "", *
         name: of the function.
         origin: what the IR follows from, in surroundings that are the same: a process that finds the code by it does
             not ask for the IR. Empty where that cannot be said.
-        quickly: whether it is compiled with the least effort, in a third of the time: for code of which a call takes
-            so little that its speed does not matter. The bits of its results are the same.
+        quickly: whether it is compiled with the least effort, in a third of the time, where it was not compiled
+            before: for code of which a call takes so little, or of which there are so few, that its speed does not
+            matter. The bits of its results are the same.
     """
     reference = _reference(name, origin and f"{origin} {quickly}")
     if reference and (known := _REFERRED.get(reference)):
         return known
     key = _referred(reference) if reference else None
+    if key is None and reference and quickly:
+        key = _referred(_reference(name, f"{origin} {False}"))
     address = None if key is None else _loaded(key)
     if address is None:
         text = ir if isinstance(ir, str) else ir()

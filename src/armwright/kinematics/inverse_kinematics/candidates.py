@@ -15,7 +15,6 @@ from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, 
 from armwright.kinematics.inverse_kinematics.solution import Branch, InverseSolution, Outcome, violations
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, nearest_rotation, orthonormality_error
-from armwright.tracing.vectors import cross, dot
 
 # A pose typed with a few digits is turned into a rotation up to this error; beyond it is a mistake.
 _TYPED_ROTATION = 2e-2
@@ -57,12 +56,11 @@ def exact_pose(X_BT: ArrayLike) -> Array:
 
 def _is_computed(X: Array) -> bool:
     """Whether a pose (4, 4) is as exact as one can be; what is not is looked at more closely."""
-    *rows, last = X.tolist()
-    if last != [0.0, 0.0, 0.0, 1.0]:
-        return False
-    a, b, c = ([row[j] for row in rows] for j in range(3))
-    near = all(abs(dot(x, x) - 1) < _COMPUTED for x in (a, b, c))
-    return near and all(abs(dot(x, y)) < _COMPUTED for x, y in ((a, b), (a, c), (b, c))) and dot(cross(a, b), c) > 0
+    (a, d, g, _), (b, e, h, _), (c, f, i, _), last = X.tolist()
+    square = abs(a * a + b * b + c * c - 1), abs(d * d + e * e + f * f - 1), abs(g * g + h * h + i * i - 1)
+    mixed = abs(a * d + b * e + c * f), abs(a * g + b * h + c * i), abs(d * g + e * h + f * i)
+    determinant = (b * f - c * e) * g + (c * d - a * f) * h + (a * e - b * d) * i
+    return last == [0.0, 0.0, 0.0, 1.0] and bool(max(*square, *mixed) < _COMPUTED and determinant > 0)
 
 
 def typed_poses(X_BT: ArrayLike) -> Array:

@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.cell.hardware import PeakContact
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.controlled_stop import brake
-from armwright.motion.plan import hand_length
+from armwright.motion.plan import tool_path_length
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.program.language.source import Span
 from armwright.program.vm.machine import Machine
@@ -58,7 +58,7 @@ def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
         executed = join([last.trajectory.until(local), braking])
         efforts_before = [] if last.tau is None else [last.tau[: round(local / period)]]
         peak, when = peak_efforts(np.concatenate([*efforts_before, tau]), period)
-        stage, length = machine.state.stages[motion.stage_index], hand_length(arm, executed)
+        stage, length = machine.state.stages[motion.stage_index], tool_path_length(arm, executed)
         machine.state.stages[motion.stage_index] = attrs.evolve(
             stage, motion=executed, length=length, peak_effort=peak, peak_time=when, stopped=True
         )

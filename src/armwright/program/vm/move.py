@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.compiled.arm import compile_arm
+from armwright.compiled.arm import planning_arm
 from armwright.errors import IncapableArmError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.plan import Manner, Obstacle, PlannedStage, StageError, StageGoal, plan
@@ -194,7 +194,7 @@ def _plan_stages(
     ]
     manner = Manner(speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
     try:
-        stages = plan(compile_arm(cell_arm.arm), machine.hardware.configuration(arm, machine.now), goals, manner)
+        stages = plan(planning_arm(cell_arm.arm), machine.hardware.configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except IncapableArmError as error:
