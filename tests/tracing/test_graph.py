@@ -76,7 +76,8 @@ expressions = st.recursive(
     lambda inner: st.one_of(
         st.tuples(inner, st.sampled_from("+-*"), inner).map(lambda t: f"({t[0]} {t[1]} {t[2]})"),
         st.tuples(st.sampled_from(["sin", "cos", "sqrt", "-"]), inner).map(lambda t: f"{t[0]}({t[1]})"),
-        st.tuples(inner, inner).map(lambda t: f"atan2({t[0]}, {t[1]})"),
+        # Of points right of the y axis: elsewhere the angle depends on the sign of a zero, which is not kept.
+        st.tuples(inner, inner).map(lambda t: f"atan2({t[0]}, 1.0 + {t[1]} * {t[1]})"),
         st.tuples(inner, inner, inner).map(lambda t: f"select({t[0]} < {t[1]}, {t[2]}, {t[0]})"),
     ),
     max_leaves=25,
@@ -86,7 +87,7 @@ SCOPE = {"sin": sin, "cos": cos, "sqrt": sqrt, "atan2": atan2, "select": select}
 
 @given(expressions, finite, finite, finite)
 def test_any_expression(text: str, a: float, b: float, c: float) -> None:
-    """Whatever is written, the simplified graph has the value of the expression on floats."""
+    """Whatever is written, the simplified graph has exactly the value of the expression on floats."""
     graph = Graph()
     x, y, z = graph.inputs(3)
     result = eval(text, SCOPE, {"a": x, "b": y, "c": z})
@@ -95,12 +96,7 @@ def test_any_expression(text: str, a: float, b: float, c: float) -> None:
     node = result.node if isinstance(result, Traced) else graph.constant(float(result))
     (value,) = evaluate(graph, [node], [a, b, c])
 
-    assert value == pytest.approx(expected, rel=1e-9, abs=1e-9) or _on_an_edge(text)
-
-
-def _on_an_edge(text: str) -> bool:
-    """Rounding may take a comparison, or the cut of atan2, to the other side; such expressions prove nothing."""
-    return "select" in text or "atan2" in text or "sqrt" in text
+    assert value == expected
 
 
 @pytest.mark.parametrize("joints", [1, 3, 6, 9])
