@@ -212,10 +212,10 @@ def test_arrays_as_they_come(run: Runner, rng: np.random.Generator) -> None:
 def test_without_the_layout_of_objects(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
     """Where it is not known how objects lie in memory, a routine is called by the addresses of its arrays."""
     monkeypatch.setattr(loops, "layout_is_known", lambda: False)
-    monkeypatch.setattr(loops, "_FUNCTIONS", {})
+    fresh = loops._Compiled(quickly=False)
     x, y = rng.normal(size=(4, 5)), rng.normal(size=5)
 
-    doubled, total = compiled(_two, [x[:, ::-1], y], (4, 5), (1,))
+    doubled, total = fresh(_two, [x[:, ::-1], y], (4, 5), (1,))
 
     np.testing.assert_array_equal(doubled, (x[:, ::-1] + y) * 2)
     assert total == [y.max()]
