@@ -154,6 +154,7 @@ def test_no_number_is_a_constant_too(function: Callable[[Scalar], Scalar]) -> No
 
     expected = [math.nan, math.inf, -math.inf] if function is round_half_even else [math.nan] * 3
     np.testing.assert_array_equal(values, expected)
+    np.testing.assert_array_equal([function(x) for x in (math.nan, math.inf, -math.inf)], expected)
 
 
 def test_signed_zero_and_negative_constants() -> None:
