@@ -76,7 +76,7 @@ def positive(value: float, what: str, unit: str = "") -> float:
         InvalidValueError: it is not above 0, or larger than any of a robot.
     """
     result = number(value, what)
-    if not 0 < result:
+    if not result > 0:
         raise InvalidValueError(f"{what}: expected more than {f'0 {unit}'.strip()}, got {result}")
     return _within_largest(result, what, unit)
 
@@ -89,7 +89,7 @@ def not_negative(value: float, what: str, unit: str = "") -> float:
         InvalidValueError: it is below 0, or larger than any of a robot.
     """
     result = number(value, what)
-    if not 0 <= result:
+    if not result >= 0:
         raise InvalidValueError(f"{what}: expected {f'0 {unit}'.strip()} or more, got {result}")
     return _within_largest(result, what, unit)
 
