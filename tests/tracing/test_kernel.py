@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from armwright.kinematics.inverse_kinematics.geometry import solve_elbow, solve_
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import BRANCHES
 from armwright.tracing.emit import emit
-from armwright.tracing.kernel import LANES, CalledOff, Kernel, on_cores_for_long
+from armwright.tracing.kernel import LANES, CalledOff, Kernel, _addresses, on_cores_for_long
 from armwright.tracing.scalar import Scalar, atan2, cos, sin
 from oracles.arms import random_arm, random_configurations
 
@@ -192,3 +193,16 @@ def test_plain_arrays_need_no_checks(shape: tuple[int, ...], monkeypatch: pytest
     monkeypatch.setattr(Kernel, "_careful", None)
 
     np.testing.assert_array_equal(square(np.full(shape, 3.0)), np.full(shape, 9.0))
+
+
+def test_addresses_keep_what_they_point_to() -> None:
+    """A copy that is made for one call is there until the kernel has read it."""
+    copies = [np.zeros(3), np.zeros((4, 4))]
+    still_there = [weakref.ref(one) for one in copies]
+
+    addresses = _addresses(copies)
+    del copies
+
+    assert [one() is not None for one in still_there] == [True, True]
+    del addresses
+    assert [one() for one in still_there] == [None, None]
