@@ -163,3 +163,11 @@ def test_a_frame_that_has_left_the_fingers_is_not_held() -> None:
 
     run(program(moved.format("")))
     assert failure(program(moved.format("IF n = 0 THEN f = f * XYZ(0, 0, 0.001) ;"))).diagnostic.code == "E301"
+
+
+def test_a_frame_is_still_held_after_a_move_to_where_it_is() -> None:
+    """The fingers hold what they closed on until the arm has gone elsewhere without it."""
+    taken = "OPEN ARM_1 ; MOVE ARM_1 TO f ; GRASP ; IF n = 0 THEN MOVE ARM_1 TO {} ; MOVE f TO g"
+
+    run(program(taken.format("f")))
+    assert failure(program(taken.format("g"))).diagnostic.code == "E301"
