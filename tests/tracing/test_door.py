@@ -146,6 +146,7 @@ def test_names_of_arguments(both: Callable[..., Any], rng: np.random.Generator) 
             np.testing.assert_array_equal(got, right)
     wrong: list[tuple[tuple[Any, ...], dict[str, Any]]] = [
         ((), {}), ((x,), {}), ((x, m, m), {}), ((x, m), {"thread": 1}), ((x, m), {"m": m}), ((x, m, 1, out), {}),
+        ((x, m), {"out": out, "thread": 1, "threads": 1}), ((x, m), {"threads": 1, "axis": 0, "out": out}),
     ]  # fmt: skip
     for arguments, named in wrong:
         with pytest.raises(TypeError, match="argument"):

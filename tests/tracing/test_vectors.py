@@ -55,5 +55,5 @@ def test_symmetric_to_the_last_bit(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("operation", [add, subtract, dot])
 def test_lengths_that_do_not_fit(operation: Callable[..., object]) -> None:
     """Vectors of two lengths are a mistake, of which nothing is left out silently."""
-    with pytest.raises(ValueError, match="shorter|longer"):
+    with pytest.raises(ValueError, match="argument 2 is shorter"):
         operation([1.0, 2.0, 3.0], [1.0, 2.0])
