@@ -1,6 +1,7 @@
 """Derivatives of traced equations, by both modes."""
 
 import itertools
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -126,6 +127,24 @@ def test_a_branch_that_is_not_chosen(equation: Callable[[Scalar, Scalar], Scalar
     assert evaluate(graph, row, [0.0, 2.0]) == [0.0, 0.0]
     assert [evaluate(graph, of, [0.0, 2.0]) for of in second] == [[4.0, 0.0], [0.0, 0.0]]
     assert evaluate(graph, row, [2.0, 3.0]) == [-0.75, 0.5]
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_branch_of_many_inputs_that_is_not_chosen(first: bool) -> None:
+    """The same where the reverse mode, whose derivatives are NaN there, would take fewer operations."""
+    graph = Graph()
+    x, *others = inputs = graph.inputs(7)
+    share = math.prod(others[1:], start=others[0]) / x
+    total = sum(others, start=x)
+    ends = [select(x > 0.0, share, total) if first else select(x <= 0.0, total, share)]
+
+    row = jacobian(ends, inputs)[0]
+    reverse = reverse_mode(graph, _nodes(*ends), _nodes(*inputs))[0]
+
+    values = [0.0, *[2.0] * 6]
+    assert evaluate(graph, row, values) == [1.0] * 7
+    assert np.isnan(evaluate(graph, [Traced(graph, i) for i in reverse], values)).any()
+    assert sum(operation_count(graph, reverse).values()) < sum(operation_count(graph, _nodes(*row)).values())
 
 
 def test_fewer_operations() -> None:
