@@ -276,3 +276,16 @@ def test_kinds_of_scalars() -> None:
 
     with pytest.raises(TypeError, match="double where i1"):
         EmittedLoops().module(routine, [1])
+
+
+def _written_roots(loops: Loops, x: Table, result: Table) -> None:
+    loops.fill([result], [x.shape[0]], lambda i: [sqrt(x[i])])
+
+
+def test_root_of_a_negative_number(run: Runner) -> None:
+    """The root of what rounding has made negative is 0."""
+    x = np.array([-1e-30, -4.0, -0.0, 0.0, 4.0])
+
+    (found,) = run(_written_roots, [x], x.shape)
+
+    np.testing.assert_array_equal(found, [0, 0, 0, 0, 2])
