@@ -243,6 +243,8 @@ def test_float_knows_its_range(tmp_path: Path) -> None:
     assert of_arm("inverse_dynamics", *inputs)[1].tolist() == [1, 1, 1, 0]
     with pytest.raises(InvalidValueError, match="real: expected double for inverse_branches, got float"):
         source_text(arm, ["inverse_branches"], "c", "float")
+    with pytest.raises(InvalidValueError, match="real: expected double for cuda, got float"):
+        source_text(arm, ["forward"], "cuda", "float")
     heavy = attrs.evolve(arm, links=[attrs.evolve(link, mass=link.mass * 1e40) for link in arm.links])
     with pytest.raises(InvalidValueError, match=r"real: expected double, as the number .* beyond the range of float"):
         source_text(heavy, ["inverse_dynamics"], "c", "float")
