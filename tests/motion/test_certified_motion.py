@@ -58,10 +58,10 @@ def test_motions_one_after_the_other() -> None:
     there = first.trajectory(first.trajectory.duration)
     second = line(PUMA, (0.1, -0.2, -0.14), there, deviation=1e-3)
     back = line(PUMA, (-0.1, 0.2, 0.14), second.trajectory(second.trajectory.duration), deviation=1e-4)
-    # None of these lines turns back; as if they did.
+    # None of these lines turns back, and the one that strays most rotates most; as if it were not so.
     motions = [
-        attrs.evolve(each, certificate=attrs.evolve(each.certificate, backward=backward))
-        for each, backward in ((first, 1e-9), (second, 3e-9), (back, 2e-9))
+        attrs.evolve(each, certificate=attrs.evolve(each.certificate, backward=backward, rotation=rotation))
+        for each, backward, rotation in ((first, 1e-9, 2e-5), (second, 3e-9, 1e-5), (back, 2e-9, 3e-5))
     ]
     parts = [each.certificate for each in motions]
 
