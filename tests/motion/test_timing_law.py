@@ -65,3 +65,19 @@ def test_hardly_longer_than_the_fastest(size: float) -> None:
     assert 0 <= run.run.grid.shortest - shortest <= grid
     cost = run.trajectory.duration - run.run.grid.shortest
     assert cost == pytest.approx(min(0.006 * run.run.grid.shortest, 0.05), rel=1e-6)
+
+
+def test_very_different_limits(rng: np.random.Generator) -> None:
+    """Where the limit of the speed jumps by orders of magnitude, no part of the run passes it."""
+    for _ in range(3):
+        places = np.append(0.0, np.cumsum(10 ** rng.uniform(-3, 0, 50)))
+        caps = 10 ** rng.uniform(-3, 0, 50)
+
+        trajectory = run_of(places, caps).trajectory
+
+        times = trajectory.times
+        t = (times[1:] + times[:-1]) / 2
+        q, speed = (trajectory(t, order)[:, 0] for order in (0, 1))
+        segment = np.clip(np.searchsorted(places, q, side="right") - 1, 0, len(caps) - 1)
+        inside = np.abs(q[:, None] - places).min(axis=1) > 1e-9
+        assert (speed <= caps[segment] * (1 + 1e-9))[inside].all()
