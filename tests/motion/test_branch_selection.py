@@ -15,13 +15,15 @@ PUMA = load_arm("puma560-seed")
 
 def test_the_shortest_of_all(rng: np.random.Generator) -> None:
     """Of all sequences, of one branch where there are such, the shortest by the speeds of the joints is taken."""
-    lower, upper, speed = PUMA.limits.lower, PUMA.limits.upper, PUMA.limits.speed
+    once_round = {"lower": -np.pi, "upper": np.pi}
+    joints = [attrs.evolve(joint, limits=attrs.evolve(joint.limits, **once_round)) for joint in PUMA.joints]
+    arm, speed = attrs.evolve(PUMA, joints=joints), PUMA.limits.speed
     for _ in range(8):
-        near, *Q = rng.uniform(0.7 * lower + 0.3 * upper, 0.3 * lower + 0.7 * upper, (3, 6))
-        X = forward(PUMA, np.array(Q))
-        layers = [allowed_configurations(inverse(PUMA, pose, near)) for pose in X]
+        near, *Q = rng.uniform(-np.pi, np.pi, (3, 6))
+        X = forward(arm, np.array(Q))
+        layers = [allowed_configurations(inverse(arm, pose, near)) for pose in X]
 
-        found = configurations_through(PUMA, X, near)
+        found = configurations_through(arm, X, near)
 
         def length(way: tuple[np.ndarray, ...], near: np.ndarray = near) -> float:
             return sum(float(np.linalg.norm((b - a) / speed)) for a, b in zip((near, *way), way, strict=False))
