@@ -1,6 +1,7 @@
 """Arms whose quantities are compiled."""
 
 import inspect
+import math
 import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -350,3 +351,15 @@ def test_one_function_to_another_process() -> None:
     fast = compile_arm(load_arm("stanford"))
 
     assert pickle.loads(pickle.dumps(fast.forward)) == fast.forward
+
+
+def test_arms_that_differ_in_the_sign_of_a_zero() -> None:
+    """Arms that are equal but not to the bit are two: zeros of either sign come out as the arm has them."""
+    arms = [Arm(name="lever", joints=[Joint(kind="revolute", d=zero, a=0.5, alpha=0.1)]) for zero in (0.0, -0.0)]
+    assert arms[0] == arms[1]
+
+    compiled = [compile_arm(arm) for arm in arms]
+
+    assert compiled[0] is not compiled[1]
+    assert [math.copysign(1, each.arm.joints[0].d) for each in compiled] == [1, -1]
+    assert compile_arm(Arm(name="lever", joints=arms[1].joints)) is compiled[1]
