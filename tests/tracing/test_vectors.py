@@ -32,11 +32,11 @@ def test_against_numpy(rng: np.random.Generator) -> None:
             (subtract(a, b), a - b),
             (scale(3.0, a), 3 * a),
             (dot(a, b), a @ b),
-            (apply(A, v), A @ v),
-            (transpose(A), A.T),
-            (product(A, B), A @ B),
-            (congruence(A, S), A @ S @ A.T),
-            (mirrored(np.triu(S)), S),
+            (apply(A.tolist(), v.tolist()), A @ v),
+            (transpose(A.tolist()), A.T),
+            (product(A.tolist(), B.tolist()), A @ B),
+            (congruence(A.tolist(), S.tolist()), A @ S @ A.T),
+            (mirrored(np.triu(S).tolist()), S),
         ]
         for found, expected in pairs:
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14 * max(1.0, np.abs(expected).max()))
@@ -48,7 +48,7 @@ def test_symmetric_to_the_last_bit(rng: np.random.Generator) -> None:
     """What is symmetric has equal halves; what stands below the upper half does not count."""
     R, S = rng.normal(size=(2, 3, 3))
 
-    for found in (congruence(R, S + S.T), mirrored(S)):
+    for found in (congruence(R.tolist(), (S + S.T).tolist()), mirrored(S.tolist())):
         assert np.array_equal(found, np.transpose(found))
 
 
