@@ -156,6 +156,20 @@ def test_no_closed_form() -> None:
         _ = compile_arm(load_arm("ntu-3r")).inverse_branches
 
 
+@pytest.mark.parametrize("name", ["forward_dynamics", "forward_dynamics_derivatives"])
+def test_an_inertia_that_is_rounding(name: str) -> None:
+    """A mass on the axis of its joint, of which rounding leaves an inertia, is refused as well."""
+    refused = 0
+    for alpha in np.linspace(0.1, 1.4, 12):
+        on_axis = (-0.3, 0.7 * np.sin(alpha), 0.7 * np.cos(alpha))
+        joints = [Joint(kind="revolute", a=1.0, alpha=0.4), Joint(kind="revolute", a=0.3, alpha=alpha)]
+        arm = Arm(name="skew", joints=joints, links=[Link(mass=1.0), Link(mass=1.0, com=on_axis)])
+        with pytest.raises(UnsupportedArmError, match="the acceleration of joint 2 is undefined"):
+            getattr(compile_arm(arm), name)([0.3, 0.4], [0.1, 0.2], [0.0, 0.0])
+        refused += abs(mass_matrix(arm, [0.3, 0.4])[1, 1]) > 0
+    assert refused
+
+
 def test_an_arm_that_moves_nothing() -> None:
     """A joint without inertia is refused by the compiled forward dynamics in the words of the plain one."""
     light = Arm(name="light", joints=[Joint(kind="revolute", a=1.0)] * 2, links=[Link(mass=1.0), Link()])
