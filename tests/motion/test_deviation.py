@@ -54,7 +54,7 @@ def tool_motion(arm: Arm, trajectory: Trajectory, t: Array) -> tuple[Array, Arra
     R = at[:, :3, :3]
     back, on = (Rotation.from_matrix(X[:, :3, :3] @ np.swapaxes(R, -1, -2)).as_rotvec() for X in (before, behind))
     spin, change = (on - back) / (2 * STEP), (on + back) / STEP**2
-    return tuple(np.linalg.norm(x, axis=-1) for x in (pull, spin, change))  # type: ignore[return-value]
+    return tuple(np.linalg.norm(x, axis=-1) for x in (pull, spin, change))
 
 
 @pytest.mark.parametrize("kind", [Arm, CompiledArm])
