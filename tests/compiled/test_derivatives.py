@@ -280,3 +280,13 @@ def test_functions_of_others(equation: Callable[[Sequence[Scalar]], Scalar]) -> 
         derivative(equation, {"q": 2}, of="q")
 
     assert "functions from armwright.tracing" in found.value.__notes__[0]
+
+
+def test_how_many_numbers_an_input_may_have() -> None:
+    """An input has 10 000 numbers at most, whatever its shape."""
+    for shape in (10_000, (100, 100)):
+        with pytest.raises(UnknownNameError, match="nowhere"):  # what is looked at next
+            derivative(lambda x: x[0], {"x": shape}, of="nowhere")
+    for shape in (10_001, (73, 137)):
+        with pytest.raises(ShapeError, match="expected at most 10,000 numbers"):
+            derivative(lambda x: x[0], {"x": shape}, of="x")

@@ -357,3 +357,16 @@ def test_memory_behind_the_end_is_not_touched() -> None:
     expected = [np.polynomial.polynomial.polyval(t, terms) for t in x]
     np.testing.assert_allclose(results[0], expected, rtol=1e-15)
     assert CDLL(None).mprotect(c_void_p(behind), size, 3) == 0
+
+
+def _written_roots(loops: Loops, x: Table, result: Table) -> None:
+    loops.fill([result], [x.shape[0]], lambda i: [sqrt(x[i])])
+
+
+def test_root_of_a_negative_number(run: Runner) -> None:
+    """The root of what rounding has made negative is 0."""
+    x = np.array([-1e-30, -4.0, -0.0, 0.0, 4.0])
+
+    (found,) = run(_written_roots, [x], x.shape)
+
+    np.testing.assert_array_equal(found, [0, 0, 0, 0, 2])

@@ -38,9 +38,7 @@ def joint_body(joint: Joint, link: Link) -> JointBody:
     I = product(product(R, link.inertia.tolist()), transpose(R))
     half = 0.5 * (I[0][0] + I[1][1] + I[2][2])
     moment = scale(link.mass, com)
-    spread = [
-        [(half if i == j else 0.0) - 0.5 * (I[i][j] + I[j][i]) + moment[i] * com[j] for j in range(3)] for i in range(3)
-    ]
+    spread = [[(half if i == j else 0.0) - I[i][j] + moment[i] * com[j] for j in range(3)] for i in range(3)]
     return JointBody(mass=float(link.mass), moment=moment, spread=spread)
 
 

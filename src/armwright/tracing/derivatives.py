@@ -74,7 +74,7 @@ def forward_mode(
     for x in inputs:
         tangents = {x: graph.constant(1.0)}
         for i in order:
-            if i != x and (tangent := _tangent(graph, i, tangents)) is not None:
+            if (tangent := _tangent(graph, i, tangents)) is not None:
                 tangents[i] = tangent
         columns.append([tangents.get(i, zero) for i in outputs])
         if max_new is not None and len(graph.nodes) - first > max_new:
