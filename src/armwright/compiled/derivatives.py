@@ -9,6 +9,8 @@ from itertools import accumulate, pairwise
 from numbers import Integral, Real
 from typing import Any, Literal
 
+import numpy as np
+
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, counted, shown
 from armwright.tracing.derivatives import jacobian
 from armwright.tracing.emit import Shape, emit
@@ -132,8 +134,13 @@ def _values(result: Any) -> tuple[list[Scalar], Shape]:
     """Return what an equation returns as a list of scalars, and its shape."""
     if isinstance(result, Traced | Real):
         return [result], ()
+    if isinstance(result, np.ndarray) and result.ndim == 1:
+        result = result.tolist()
     if not isinstance(result, list | tuple) or not all(isinstance(x, Traced | Real) for x in result):
-        raise KindError(f"equation: expected it to return a scalar or a list of scalars, got {shown(result)}")
+        raise KindError(
+            "equation: expected it to return a scalar or a list of scalars, a matrix row by row as by np.ravel, got "
+            f"{shown(result)}"
+        )
     if not result:
         raise ShapeError("equation: expected it to return at least one scalar, got none")
     return list(result), (len(result),)
