@@ -40,3 +40,20 @@ def test_a_tool_beyond_an_end(run: Runner, along: float) -> None:
 
     off = np.sin(0.1 * angle / 2)
     assert off <= sines[0, 0] <= 1.001 * off
+
+
+@pytest.mark.parametrize("run", [with_numpy, compiled])
+def test_a_tool_that_gathers_speed(run: Runner) -> None:
+    """Where the chord rises at 1 1/s and the tool may gather 2 1/s², it may pass any point at 1 + 2 · 1 1/s."""
+    angle, one = 0.3, np.ones(1)
+    sampled = np.array([[[0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]])
+    poses = np.broadcast_to(np.eye(4), (1, 2, 4, 4)).copy()
+    inputs = [np.array([[0.0, 1.0]]), poses, sampled, one, 2 * one, *[0 * one] * 5, angle * one, one]
+
+    _, sines, *_ = run(_errors, inputs, (1,), (2, 1), (1,), (1,), (1,))
+
+    # The orientation of the line changes by the angle per unit of progress: half of 2 angle, a quarter of (3 angle)²,
+    # and the tool may be beyond an end by an eighth of 2.
+    at_most = (2 * angle / 2 + (3 * angle) ** 2 / 4) / 8
+    beyond = angle * (2 / 8) / 2
+    assert sines[0, 0] == pytest.approx(at_most + beyond, rel=1e-12)
