@@ -1,8 +1,12 @@
-"""What a name was meant to be."""
+"""What a name was meant to be, and what is wrong with a number."""
+
+import math
+from collections.abc import Callable
 
 import pytest
 
-from armwright.errors import closest, edit_distance
+from armwright.arrays import not_negative, positive
+from armwright.errors import InvalidValueError, closest, edit_distance
 
 
 @pytest.mark.parametrize(
@@ -54,3 +58,15 @@ def test_glyphs_that_look_alike(name: str, known: list[str], meant: str) -> None
 def test_nearest(name: str, known: list[str], meant: str | None) -> None:
     """The nearest name is meant, unless more than half of it would have to change."""
     assert closest(name, known) == meant
+
+
+@pytest.mark.parametrize("check", [positive, not_negative])
+def test_numbers_out_of_range(check: Callable[[float, str, str], float]) -> None:
+    """A message on a number says which end of its range it is beyond."""
+    assert check(2.5, "length", "m") == 2.5
+    with pytest.raises(InvalidValueError, match=r"^length: expected no more than 1e\+100 m, got inf$"):
+        check(math.inf, "length", "m")
+    with pytest.raises(InvalidValueError, match=r"^length: expected (more than 0 m|0 m or more), got -1.0$"):
+        check(-1.0, "length", "m")
+    with pytest.raises(InvalidValueError, match="got nan"):
+        check(math.nan, "length", "")

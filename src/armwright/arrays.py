@@ -76,9 +76,9 @@ def positive(value: float, what: str, unit: str = "") -> float:
         InvalidValueError: it is not above 0, or larger than any of a robot.
     """
     result = number(value, what)
-    if not 0 < result <= LARGEST:
+    if not result > 0:
         raise InvalidValueError(f"{what}: expected more than {f'0 {unit}'.strip()}, got {result}")
-    return result
+    return _within_largest(result, what, unit)
 
 
 def not_negative(value: float, what: str, unit: str = "") -> float:
@@ -89,9 +89,15 @@ def not_negative(value: float, what: str, unit: str = "") -> float:
         InvalidValueError: it is below 0, or larger than any of a robot.
     """
     result = number(value, what)
-    if not 0 <= result <= LARGEST:
+    if not result >= 0:
         raise InvalidValueError(f"{what}: expected {f'0 {unit}'.strip()} or more, got {result}")
-    return result
+    return _within_largest(result, what, unit)
+
+
+def _within_largest(value: float, what: str, unit: str) -> float:
+    if value > LARGEST:
+        raise InvalidValueError(f"{what}: expected no more than {f'{LARGEST:g} {unit}'.strip()}, got {value}")
+    return value
 
 
 def integer(value: int, what: str, *, least: int) -> int:

@@ -106,6 +106,18 @@ def test_degrees_by_mistake(fast: CompiledArm, lead: tuple[int, ...]) -> None:
         np.testing.assert_allclose(X, np.broadcast_to(forward_in_silence(q[..., :].reshape(-1, 6)[0]), X.shape))
 
 
+def test_positions_near_which_branches_are_sought(fast: CompiledArm) -> None:
+    """They are positions as well: what looks like degrees is warned of, and what is beyond all angles is refused."""
+    pose, near = forward(PUMA, np.full(6, 0.3)), np.zeros(6)
+
+    near[1] = 90.0
+    with pytest.warns(UnitWarning, match="near: joint 2 of 'puma560' is at 90 rad"):
+        fast.inverse_branches(pose, near)
+    near[1] = 1.1e12
+    with pytest.raises(InvalidValueError, match="near: expected numbers no larger than"):
+        fast.inverse_branches(pose, near)
+
+
 def forward_in_silence(q: np.ndarray) -> np.ndarray:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)

@@ -1,6 +1,7 @@
 """Arms whose quantities are compiled."""
 
 import inspect
+import math
 import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -154,6 +155,20 @@ def test_no_closed_form() -> None:
     """An arm without closed form says so when its branches are asked for."""
     with pytest.raises(UnsupportedArmError, match="'ntu-3r': no closed-form inverse"):
         _ = compile_arm(load_arm("ntu-3r")).inverse_branches
+
+
+@pytest.mark.parametrize("name", ["forward_dynamics", "forward_dynamics_derivatives"])
+def test_an_inertia_that_is_rounding(name: str) -> None:
+    """A mass on the axis of its joint, of which rounding leaves an inertia, is refused as well."""
+    refused = 0
+    for alpha in np.linspace(0.1, 1.4, 12):
+        on_axis = (-0.3, 0.7 * np.sin(alpha), 0.7 * np.cos(alpha))
+        joints = [Joint(kind="revolute", a=1.0, alpha=0.4), Joint(kind="revolute", a=0.3, alpha=alpha)]
+        arm = Arm(name="skew", joints=joints, links=[Link(mass=1.0), Link(mass=1.0, com=on_axis)])
+        with pytest.raises(UnsupportedArmError, match="the acceleration of joint 2 is undefined"):
+            getattr(compile_arm(arm), name)([0.3, 0.4], [0.1, 0.2], [0.0, 0.0])
+        refused += abs(mass_matrix(arm, [0.3, 0.4])[1, 1]) > 0
+    assert refused
 
 
 def test_an_arm_that_moves_nothing() -> None:
@@ -376,3 +391,15 @@ def test_without_memory_for_code(monkeypatch: pytest.MonkeyPatch) -> None:
     if CAN_BE_LINKED:
         with pytest.warns(CompilerWarning, match="refuses memory that can be executed"):
             assert planning_arm(arm) is arm
+
+
+def test_arms_that_differ_in_the_sign_of_a_zero() -> None:
+    """Arms that are equal but not to the bit are two: zeros of either sign come out as the arm has them."""
+    arms = [Arm(name="lever", joints=[Joint(kind="revolute", d=zero, a=0.5, alpha=0.1)]) for zero in (0.0, -0.0)]
+    assert arms[0] == arms[1]
+
+    compiled = [compile_arm(arm) for arm in arms]
+
+    assert compiled[0] is not compiled[1]
+    assert [math.copysign(1, each.arm.joints[0].d) for each in compiled] == [1, -1]
+    assert compile_arm(Arm(name="lever", joints=arms[1].joints)) is compiled[1]

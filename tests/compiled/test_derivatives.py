@@ -200,7 +200,7 @@ def test_numbers_that_are_none() -> None:
         ({"of": "q", "equation": lambda q, _p: "a" + q[0]}, KindError, "equation: expected a number, got 'a'"),
         ({"of": "q", "equation": lambda q, _p: q[0] * 1j}, KindError, "equation: expected a number, got 1j"),
         ({"of": "q", "equation": "hand"}, KindError, "expected a function of scalars, got 'hand'"),
-        ({"of": "q", "equation": lambda _q, _p: "x"}, KindError, "return a scalar or a list of scalars, got 'x'"),
+        ({"of": "q", "equation": lambda _q, _p: "x"}, KindError, "return a scalar or a list of scalars, .* got 'x'"),
         ({"of": "q", "equation": lambda _q, _p: []}, ShapeError, "at least one scalar"),
         ({"of": "q", "equation": lambda q, _p: [[q[0]]]}, KindError, "return a scalar or a list of scalars"),
     ],
@@ -280,3 +280,24 @@ def test_functions_of_others(equation: Callable[[Sequence[Scalar]], Scalar]) -> 
         derivative(equation, {"q": 2}, of="q")
 
     assert "functions from armwright.tracing" in found.value.__notes__[0]
+
+
+def test_how_many_numbers_an_input_may_have() -> None:
+    """An input has 10 000 numbers at most, whatever its shape."""
+    for shape in (10_000, (100, 100)):
+        with pytest.raises(UnknownNameError, match="nowhere"):  # what is looked at next
+            derivative(lambda x: x[0], {"x": shape}, of="nowhere")
+    for shape in (10_001, (73, 137)):
+        with pytest.raises(ShapeError, match="expected at most 10,000 numbers"):
+            derivative(lambda x: x[0], {"x": shape}, of="x")
+
+
+def test_equations_over_arrays() -> None:
+    """An equation may return an array of scalars; of a matrix the message says how."""
+    A = np.array([[1.0, 2.0], [3.0, 4.0]])
+    value, jacobian = derivative(lambda q: A @ np.array(q), {"q": 2}, of="q")([0.5, 0.25])
+
+    np.testing.assert_array_equal(value, A @ (0.5, 0.25))
+    np.testing.assert_array_equal(jacobian, A)
+    with pytest.raises(KindError, match=r"a list of scalars, a matrix row by row as by np\.ravel, got array"):
+        derivative(lambda q: np.outer(q, q), {"q": 2}, of="q")

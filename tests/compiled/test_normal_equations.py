@@ -25,6 +25,7 @@ def test_sums(lead: tuple[int, ...], rng: np.random.Generator) -> None:
     """The sums over blocks are those over all samples, with the weight of each joint, whatever their number."""
     q, qd, qdd, tau = rng.normal(size=(4, *lead, 6))
     weights = rng.uniform(0, 2, size=6)
+    weights[2] = 0.0  # a joint that was not measured
     Y = regressor(ARM, q, qd, qdd).reshape(-1, 6, 84)
 
     A, b = normal_equations(ARM, q, qd, qdd, tau, weights=weights)
@@ -75,5 +76,7 @@ def test_mistakes() -> None:
         normal_equations(ARM, zeros, zeros, zeros, np.full(6, np.nan))
     with pytest.raises(InvalidValueError, match="weights: expected numbers of 0 or more"):
         normal_equations(ARM, zeros, zeros, zeros, zeros, weights=[1, 1, 1, 1, 1, -1])
+    with pytest.raises(InvalidValueError, match="weights: expected numbers no larger than"):
+        normal_equations(ARM, zeros, zeros, zeros, zeros, weights=[1, 1, 1, 1, 1, 1e101])
     with pytest.raises(KindError, match="expected an Arm"):
         normal_equations("stanford", zeros, zeros, zeros, zeros)  # type: ignore[arg-type]

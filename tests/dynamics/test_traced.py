@@ -10,6 +10,7 @@ from armwright.arm.model import Arm
 from armwright.dynamics.articulated_body import articulated_body
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy
 from armwright.dynamics.inertia_matrix import composite_rigid_body
+from armwright.dynamics.joint_frames import Rotation
 from armwright.dynamics.lagrange_euler import lagrange_euler
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import gravity_shares, speed_shares
@@ -64,3 +65,17 @@ def test_articulated_bodies_grow_with_the_joints() -> None:
     assert count("articulated_body", 16) < 2.4 * count("articulated_body", 8)
     assert count("newton_euler", 16) < 2.4 * count("newton_euler", 8)
     assert count("mass matrix", 16) > 2.4 * count("mass matrix", 8)
+
+
+def test_a_quarter_turn_keeps_all_digits() -> None:
+    """Axes that change places change the places of a tensor's numbers; none is added to a larger one."""
+    A = [[1.0, 2e-20, 3e-20], [4e-20, 5e-20, 6e-20], [7e-20, 8e-20, 9e-20]]
+    turns = {
+        True: np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+        False: np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+    }
+
+    for about_x, R in turns.items():
+        found = Rotation(about_x=about_x, cosine=0.0, sine=1.0).outward_matrix(A)
+
+        assert np.array_equal(found, R @ np.array(A) @ R.T)

@@ -79,6 +79,18 @@ def test_peaks_of_a_run(run: Runner, rng: np.random.Generator) -> None:
             np.testing.assert_allclose(sampled, peak, rtol=1e-4, atol=1e-12)
 
 
+@pytest.mark.parametrize("run", [compiled, with_numpy])
+def test_peaks_of_single_pieces(run: Runner, rng: np.random.Generator) -> None:
+    """Where the rate of a piece rises and falls several times its largest peak is found as well."""
+    for _ in range(200):
+        cubics, law, length = rng.normal(size=(1, 4, 2)), rng.normal(size=(1, 4)), rng.uniform(0.3, 1.5)
+
+        terms, *rates = composed_peaks(cubics, law, np.zeros(1, dtype=np.intp), np.array([0.0, length]), run)
+
+        for order, peak in enumerate(rates, 1):
+            assert (_magnitudes(terms[0], length, order) <= peak * (1 + 1e-9)).all()
+
+
 def _magnitudes(terms: Array, length: float, order: int) -> Array:
     """Return the largest magnitudes of polynomials (k, n) at many samples, (n,)."""
     t = np.linspace(0.0, length, 4001)

@@ -11,7 +11,7 @@ from scipy.interpolate import PPoly
 from armwright.arm.load import load_arm
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.motion.quintic_polynomials import point_to_point, quintic
-from armwright.motion.trajectory import Trajectory, hold, join, whole_ticks
+from armwright.motion.trajectory import Trajectory, hold, join, slowed_together, whole_ticks
 from armwright.motion.xspline_path import xspline
 
 ROUNDING = 1e-12
@@ -135,6 +135,20 @@ def test_whole_ticks(duration: float, ticks: int) -> None:
     assert move.duration == pytest.approx(ticks * 1e-3, abs=ROUNDING)
 
 
+@given(st.lists(st.integers(0, 50), max_size=5), st.floats(0, 1))
+def test_slowed_together(ticks: list[int], duration: float) -> None:
+    """Trajectories take a duration together, rounded up to a tick; each ends on a tick, and none becomes shorter."""
+    moves = [quintic([0.0], [1.0], k * 1e-3) if k else hold([0.0], 0.0) for k in ticks]
+
+    slow = slowed_together(moves, duration, 1e-3)
+
+    counts = [move.duration / 1e-3 for move in slow]
+    np.testing.assert_allclose(counts, np.round(counts), atol=ROUNDING)
+    assert all(count >= k - ROUNDING for count, k in zip(counts, ticks, strict=True))
+    expected = max(sum(ticks), np.ceil(duration / 1e-3 - 1e-9)) if sum(ticks) else 0
+    assert sum(counts) == pytest.approx(expected, abs=ROUNDING)
+
+
 @given(
     terms=st.lists(st.floats(-1, 1), min_size=3, max_size=9),
     fading=st.integers(0, 16),
@@ -250,14 +264,19 @@ def test_times_that_mean_nothing() -> None:
     """Periods and durations of nothing, and periods that nobody can wait for, are refused with what came."""
     move = quintic([0.0], [1.0], 1.0)
     for period in (0.0, -1e-3, np.nan, np.inf):
-        with pytest.raises(InvalidValueError, match=f"period: expected more than 0 s, got {period}"):
+        expected = r"no more than 1e\+100 s" if period == np.inf else "more than 0 s"
+        with pytest.raises(InvalidValueError, match=f"period: expected {expected}, got {period}"):
             move.sampled(period)
-        with pytest.raises(InvalidValueError, match=f"duration: expected more than 0 s, got {period}"):
+        with pytest.raises(InvalidValueError, match=f"duration: expected {expected}, got {period}"):
             move.retimed(period)
-        with pytest.raises(InvalidValueError, match=f"period: expected more than 0 s, got {period}"):
+        with pytest.raises(InvalidValueError, match=f"period: expected {expected}, got {period}"):
             whole_ticks(move, period)
     with pytest.raises(KindError, match="period: expected a number, got None"):
         whole_ticks(move, None)  # type: ignore[arg-type]
+    with pytest.raises(InvalidValueError, match="divides 1 s into more ticks than can be counted"):
+        whole_ticks(move, 1e-320)
+    with pytest.raises(InvalidValueError, match="duration: expected 0 s or more, got nan"):
+        slowed_together([move], np.nan, 1e-3)
     with pytest.raises(InvalidValueError, match=r"1e-12 s divides 1 s into 1e\+12 samples; at most 1e\+08 are allowed"):
         move.sampled(1e-12)
     with pytest.raises(InvalidValueError, match=r"a motion of 0 s cannot be stretched to 2 s; use hold\(q, 2\)"):

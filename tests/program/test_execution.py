@@ -287,6 +287,25 @@ def unlimited(joint: Joint) -> Joint:
     return attrs.evolve(joint, limits=attrs.evolve(joint.limits, speed=math.inf, acceleration=math.inf))
 
 
+def slow(joint: Joint) -> Joint:
+    return attrs.evolve(joint, limits=attrs.evolve(joint.limits, speed=joint.limits.speed / 10))
+
+
+def test_the_shortest_duration() -> None:
+    """As long as it takes in any case may be asked for, and the limits still slow it; a little less may not."""
+    cell = changed(cell_of("cell1"), slow)
+    free = run(f"{PLACES} MOVE ARM_1 TO a STRAIGHTLY END.", cell)
+    move = f"{PLACES} MOVE ARM_1 TO a STRAIGHTLY, WITH DURATION = {{:.6f}} END."
+
+    again = run(move.format(free.duration), cell)
+    longer = run(move.format(2 * free.duration), cell)
+
+    assert again.duration == pytest.approx(free.duration, abs=1e-9)
+    assert "limited by the speed of joint" in again.stages[0].stage.slowed
+    assert not longer.stages[0].stage.slowed
+    assert failure(move.format(free.duration - 3 * cell.period), cell).diagnostic.code == "E405"
+
+
 @pytest.mark.parametrize(
     ("cell", "move", "said"),
     [

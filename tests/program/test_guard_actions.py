@@ -147,3 +147,27 @@ def test_frames_behind_a_call_that_may_halt() -> None:
     )
 
     assert failure(text).diagnostic.code == "E301"
+
+
+def test_a_frame_that_a_halted_hand_has_not_reached_is_not_held() -> None:
+    """The fingers close on no frame where HALT ended the motion to it, even if that is put there afterwards."""
+    moved = "OPEN ARM_1 ; {} ; GRASP ; IF n = 0 THEN f = ARM_1 ; MOVE f TO f * XYZ(0, 0, -0.05)"
+
+    assert failure(program(moved.format(f"{NEAR}BEGIN IF n = 0 THEN HALT END"))).diagnostic.code == "E301"
+    run(program(moved.format("MOVE ARM_1 TO f STRAIGHTLY")))
+
+
+def test_a_frame_that_has_left_the_fingers_is_not_held() -> None:
+    """What the fingers closed on is moved with them while it is there, not from where it has been put since."""
+    moved = "OPEN ARM_1 ; MOVE ARM_1 TO f ; GRASP ; {} MOVE f TO g"
+
+    run(program(moved.format("")))
+    assert failure(program(moved.format("IF n = 0 THEN f = f * XYZ(0, 0, 0.001) ;"))).diagnostic.code == "E301"
+
+
+def test_a_frame_is_still_held_after_a_move_to_where_it_is() -> None:
+    """The fingers hold what they closed on until the arm has gone elsewhere without it."""
+    taken = "OPEN ARM_1 ; MOVE ARM_1 TO f ; GRASP ; IF n = 0 THEN MOVE ARM_1 TO {} ; MOVE f TO g"
+
+    run(program(taken.format("f")))
+    assert failure(program(taken.format("g"))).diagnostic.code == "E301"

@@ -37,6 +37,18 @@ def test_order_of_one_instant(first: str, second: str, order: list[str]) -> None
     assert printed(recording) == order
 
 
+def test_a_lock_taken_twice_is_kept_until_the_outer_end() -> None:
+    """An error that leaves the inner LOCK of a frame gives back nothing that the outer one still holds."""
+    recording = run(
+        branches(
+            "BEGIN LOCK (n) DO BEGIN TRY LOCK (n) DO PRINT(1 / n) RECOVER PRINT(1) END ; PAUSE 1 ; PRINT(2) END END",
+            "BEGIN PAUSE 0.5 ; LOCK (n) DO PRINT(3) END",
+        )
+    )
+
+    assert printed(recording) == ["1", "2", "3"]
+
+
 def test_signal_wakes_the_important_one_first() -> None:
     """A process of high priority goes on at the instant its event comes, before the one that signalled."""
     recording = run(branches("PRIORITY 1 : BEGIN SIGNAL e ; PRINT(1) END", "PRIORITY 2 : BEGIN WAIT e ; PRINT(2) END"))

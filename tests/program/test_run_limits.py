@@ -37,6 +37,16 @@ def test_moves_without_time_come_to_an_end(text: str) -> None:
     assert error.time == 0
 
 
+def test_a_move_counts_as_many_steps() -> None:
+    """Of 20 000 steps without time, 20 MOVEs that cannot be made leave nothing."""
+    text = "WHILE n < 30 DO TRY MOVE ARM_1 TO far RECOVER BEGIN n = n + 1 ; PRINT(n) END END"
+
+    error = failure(program(text), limits=Limits(steps=20_000))
+
+    assert error.recording is not None
+    assert printed(error.recording())[-1] == "19"
+
+
 @pytest.mark.parametrize(
     ("text", "line"),
     [

@@ -1,13 +1,14 @@
 """Derivatives of traced equations, by both modes."""
 
 import itertools
+import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from armwright.arm.model import Motor
-from armwright.dynamics.drives import dry_friction
+from armwright.dynamics.drives import joint_coulomb_friction
 from armwright.tracing.derivatives import forward_mode, jacobian, replaced, reverse_mode
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph, Traced, operation_count
@@ -92,8 +93,8 @@ def test_random_equations(sample: Sample) -> None:
         (round_half_even, 0.5, 0.0),
         (lambda x: 1.0 * (x < 1.0), 1.0, 0.0),
         (lambda x: select(x > 0.0, x, 3.0 * x), 0.0, 3.0),
-        (lambda x: dry_friction(Motor(coulomb_forward=2.0, coulomb_backward=3.0), x), 0.0, 0.0),
-        (lambda x: dry_friction(Motor(coulomb_forward=2.0, coulomb_backward=3.0), x), 0.1, 0.0),
+        (lambda x: joint_coulomb_friction(Motor(coulomb_forward=2.0, coulomb_backward=3.0), x), 0.0, 0.0),
+        (lambda x: joint_coulomb_friction(Motor(coulomb_forward=2.0, coulomb_backward=3.0), x), 0.1, 0.0),
     ],
 )
 def test_edges(equation: Callable[[Scalar], Scalar], at: float, expected: float) -> None:
@@ -107,17 +108,43 @@ def test_edges(equation: Callable[[Scalar], Scalar], at: float, expected: float)
         assert graphs.evaluate(graph, rows[0], [at]) == [expected]
 
 
-def test_a_branch_that_is_not_chosen() -> None:
+@pytest.mark.parametrize(
+    "equation",
+    [
+        lambda x, y: select(x > 0.0, y / x, x * x * y),
+        lambda x, y: select(x <= 0.0, x * x * y, y / x),
+    ],
+    ids=["first", "second"],
+)
+def test_a_branch_that_is_not_chosen(equation: Callable[[Scalar, Scalar], Scalar]) -> None:
     """A division by 0 in a branch that is not chosen leaves no NaN in the derivatives, nor in the second ones."""
     graph = Graph()
     x, y = graph.inputs(2)
 
-    row = jacobian([select(x > 0.0, y / x, x * x * y)], [x, y])[0]
+    row = jacobian([equation(x, y)], [x, y])[0]
     second = jacobian(row, [x, y])
 
     assert evaluate(graph, row, [0.0, 2.0]) == [0.0, 0.0]
     assert [evaluate(graph, of, [0.0, 2.0]) for of in second] == [[4.0, 0.0], [0.0, 0.0]]
     assert evaluate(graph, row, [2.0, 3.0]) == [-0.75, 0.5]
+
+
+@pytest.mark.parametrize("branch", [1, 2])
+def test_a_branch_of_many_inputs_that_is_not_chosen(branch: int) -> None:
+    """The same where the reverse mode, whose derivatives are NaN there, would take fewer operations."""
+    graph = Graph()
+    x, *others = inputs = graph.inputs(7)
+    share = math.prod(others[1:], start=others[0]) / x
+    total = sum(others, start=x)
+    ends = [select(x > 0.0, share, total) if branch == 1 else select(x <= 0.0, total, share)]
+
+    row = jacobian(ends, inputs)[0]
+    reverse = reverse_mode(graph, _nodes(*ends), _nodes(*inputs))[0]
+
+    values = [0.0, *[2.0] * 6]
+    assert evaluate(graph, row, values) == [1.0] * 7
+    assert np.isnan(evaluate(graph, [Traced(graph, i) for i in reverse], values)).any()
+    assert sum(operation_count(graph, reverse).values()) < sum(operation_count(graph, _nodes(*row)).values())
 
 
 def test_fewer_operations() -> None:

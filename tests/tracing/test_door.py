@@ -146,6 +146,7 @@ def test_names_of_arguments(both: Callable[..., Any], rng: np.random.Generator) 
             np.testing.assert_array_equal(got, right)
     wrong: list[tuple[tuple[Any, ...], dict[str, Any]]] = [
         ((), {}), ((x,), {}), ((x, m, m), {}), ((x, m), {"thread": 1}), ((x, m), {"m": m}), ((x, m, 1, out), {}),
+        ((x, m), {"out": out, "thread": 1, "threads": 1}), ((x, m), {"threads": 1, "axis": 0, "out": out}),
     ]  # fmt: skip
     for arguments, named in wrong:
         with pytest.raises(TypeError, match="argument"):
@@ -205,6 +206,21 @@ def test_arrays_that_cannot_be_filled(both: Callable[..., Any], double: Callable
             both(x, m, out=out)
 
 
+@pytest.mark.parametrize("rows", [0, 2, 4, 5, 300])
+def test_rows_of_two_numbers(both: Callable[..., Any], rows: int) -> None:
+    """Arrays of different numbers of rows do not fit, be they read or filled."""
+    x, m = np.zeros((3, 3)), np.zeros((rows, 2, 2))
+
+    with pytest.raises(ShapeError, match="leading axes must broadcast"):
+        both(x, m)
+    for filled in ((rows, 3), (3, rows)):
+        out = np.full((filled[0], 3), 7.0), np.ones((filled[1], 2), dtype=bool)
+        with pytest.raises(ShapeError, match=r"^out: "):
+            both(x, np.zeros((3, 2, 2)), out=out)
+        assert (out[0] == 7).all()
+        assert out[1].all()
+
+
 @pytest.mark.parametrize("shift", range(-4, 5))
 @pytest.mark.parametrize("rows", [0, 1, 9])
 def test_filled_over_the_input(double: Callable[..., Any], shift: int, rows: int, rng: np.random.Generator) -> None:
@@ -227,6 +243,11 @@ def test_filled_over_each_other() -> None:
                 twins(np.array([1.0, 2.0]), out=(buffer[:2], buffer[shift : shift + 2]))
         side_by_side = twins(np.array([1.0, 2.0]), out=(buffer[:2], buffer[2:4]))
         np.testing.assert_array_equal(side_by_side, [[1, 2], [2, 1]])
+    triplets = Kernel(emitted=emit("triplets", lambda x: [[x[0]], [x[1]], [x[0]]], {"x": 2})).function("triplets")
+    a, b = np.zeros((2, 1))
+    for out in ((a, a, b), (a, b, a), (b, a, a)):
+        with pytest.raises(ShapeError, match="out: expected arrays apart from each other"):
+            triplets(np.array([1.0, 2.0]), out=out)
 
 
 # ---- errors ----

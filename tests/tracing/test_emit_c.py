@@ -195,6 +195,27 @@ def test_test_program_finds_an_error(tmp_path: Path) -> None:
     assert subprocess.run([program], capture_output=True, check=False).returncode == 1
 
 
+@pytest.mark.parametrize(
+    ("meddled", "status"),
+    [
+        ("if (row == 3) out[0] += 1e-9;", 0),  # the efforts go up to hundreds
+        ("if (row == 3) out[0] += 1e-4;", 1),
+        ("if (row == 3) out[0] = NAN;", 1),
+        ("if (row == 3) out[0] = HUGE_VAL;", 1),
+        ("if (row == 3) refused++;", 1),
+    ],
+)
+def test_what_a_test_program_refuses(meddled: str, status: int, tmp_path: Path) -> None:
+    """One number that is wrong or none, or one refusal, is enough, wherever it is; less than the tolerance is not."""
+    text = check_text(load_arm("stanford"), ["potential_energy"], "c")
+    call, end = "refused += stanford_potential_energy", " != 0;\n"
+    start = text.index(end, text.index(call)) + len(end)
+
+    program = build("gcc", f"{text[:start]}{meddled}\n{text[start:]}", tmp_path / "program")
+
+    assert subprocess.run([program], capture_output=True, check=False).returncode == status
+
+
 @pytest.mark.parametrize("name", SIX_JOINTS)
 @pytest.mark.drawn(0.2)
 def test_float(name: str, tmp_path: Path, sample: Sample) -> None:
@@ -246,6 +267,8 @@ def test_float_knows_its_range(tmp_path: Path) -> None:
     assert status.tolist() == [1, 0]
     with pytest.raises(InvalidValueError, match="real: expected double for inverse_branches, got float"):
         source_text(arm, ["inverse_branches"], "c", "float")
+    with pytest.raises(InvalidValueError, match="real: expected double for cuda, got float"):
+        source_text(arm, ["forward"], "cuda", "float")
     heavy = attrs.evolve(arm, links=[attrs.evolve(link, mass=link.mass * 1e40) for link in arm.links])
     with pytest.raises(InvalidValueError, match=r"real: expected double, as the number .* beyond the range of float"):
         source_text(heavy, ["inverse_dynamics"], "c", "float")

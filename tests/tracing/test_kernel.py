@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -15,8 +16,9 @@ from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.inverse_kinematics.geometry import solve_elbow, solve_joint_1
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import BRANCHES
+from armwright.tracing.door import ROWS_BETWEEN_SIGNALS
 from armwright.tracing.emit import emit
-from armwright.tracing.kernel import LANES, CalledOff, Kernel, on_cores_for_long
+from armwright.tracing.kernel import LANES, CalledOff, Kernel, _addresses, on_cores_for_long
 from armwright.tracing.scalar import Scalar, atan2, cos, sin
 from oracles.arms import random_arm, random_configurations
 
@@ -192,3 +194,30 @@ def test_plain_arrays_need_no_checks(shape: tuple[int, ...], monkeypatch: pytest
     monkeypatch.setattr(Kernel, "_careful", None)
 
     np.testing.assert_array_equal(square(np.full(shape, 3.0)), np.full(shape, 9.0))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_no_row_of_many_is_overlooked(circle: Kernel, threads: int) -> None:
+    """What is wrong with one row is said wherever it is, whichever part of the work meets it."""
+    x, y = np.ones((2, 2 * ROWS_BETWEEN_SIGNALS + 5, 1))
+    function = circle.function("circle")
+
+    for row in (0, ROWS_BETWEEN_SIGNALS, len(x) - 1):
+        y[row] = np.nan
+        with pytest.raises(InvalidValueError, match="y: every number must be finite"):
+            function(x, y, threads=threads)
+        y[row] = 1.0
+    function(x, y, threads=threads)
+
+
+def test_addresses_keep_what_they_point_to() -> None:
+    """A copy that is made for one call is there until the kernel has read it."""
+    copies = [np.zeros(3), np.zeros((4, 4))]
+    still_there = [weakref.ref(one) for one in copies]
+
+    addresses = _addresses(copies)
+    del copies
+
+    assert [one() is not None for one in still_there] == [True, True]
+    del addresses
+    assert [one() for one in still_there] == [None, None]

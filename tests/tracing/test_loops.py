@@ -212,10 +212,10 @@ def test_arrays_as_they_come(run: Runner, rng: np.random.Generator) -> None:
 def test_without_the_layout_of_objects(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
     """Where it is not known how objects lie in memory, a routine is called by the addresses of its arrays."""
     monkeypatch.setattr(loops, "layout_is_known", lambda: False)
-    monkeypatch.setattr(loops, "_FUNCTIONS", {})
+    fresh = loops._Compiled(quickly=False)
     x, y = rng.normal(size=(4, 5)), rng.normal(size=5)
 
-    doubled, total = compiled(_two, [x[:, ::-1], y], (4, 5), (1,))
+    doubled, total = fresh(_two, [x[:, ::-1], y], (4, 5), (1,))
 
     np.testing.assert_array_equal(doubled, (x[:, ::-1] + y) * 2)
     assert total == [y.max()]
@@ -357,3 +357,16 @@ def test_memory_behind_the_end_is_not_touched() -> None:
     expected = [np.polynomial.polynomial.polyval(t, terms) for t in x]
     np.testing.assert_allclose(results[0], expected, rtol=1e-15)
     assert CDLL(None).mprotect(c_void_p(behind), size, 3) == 0
+
+
+def _written_roots(loops: Loops, x: Table, result: Table) -> None:
+    loops.fill([result], [x.shape[0]], lambda i: [sqrt(x[i])])
+
+
+def test_root_of_a_negative_number(run: Runner) -> None:
+    """The root of what rounding has made negative is 0."""
+    x = np.array([-1e-30, -4.0, -0.0, 0.0, 4.0])
+
+    (found,) = run(_written_roots, [x], x.shape)
+
+    np.testing.assert_array_equal(found, [0, 0, 0, 0, 2])

@@ -200,3 +200,9 @@ def test_watched_inputs(rng: np.random.Generator) -> None:
     x[2, 1] = 1e13
     with pytest.raises(InvalidValueError, match="x"):
         kernel(x, y)
+
+
+def test_sequences_of_two_lengths() -> None:
+    """A sequence with more links than another is a mistake, of which nothing is left out silently."""
+    with pytest.raises(ValueError, match="argument 2 is longer"):
+        scan(lambda total, a, b: (total + a * b, total), 0.0, [1.0, 2.0], [1.0, 2.0, 3.0])

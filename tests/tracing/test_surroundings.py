@@ -185,6 +185,17 @@ def test_code_that_looks_up_an_address_is_left_to_llvm() -> None:
     assert linked(native._compile(looking_up), "f") is None
 
 
+@pytest.mark.parametrize("begin", [0, 5])
+def test_code_that_keeps_a_number_is_left_to_llvm(begin: int) -> None:
+    """An object whose memory is written, which that of an image cannot be, is none."""
+    counting = (
+        f"@count = internal global i64 {begin}\ndefine i64 @f() {{\n%a = load i64, ptr @count\n"
+        "%b = add i64 %a, 1\nstore i64 %b, ptr @count\nret i64 %b\n}"
+    )
+
+    assert linked(native._compile(counting), "f") is None
+
+
 @pytest.mark.skipif(not Path("/proc/self/maps").exists() or not CAN_BE_LINKED, reason="memory is looked up in /proc")
 def test_code_in_memory_cannot_be_written() -> None:
     """The memory of an image can be executed, and not written."""

@@ -248,7 +248,7 @@ class Motor:
     Attributes:
         inertia: of the rotor and gear at the load side [kg m²], or [kg] for a prismatic joint.
         viscous: friction per speed [N m s] or [N s/m].
-        coulomb_forward: magnitude of dry friction while the joint moves in the direction of q [N m] or [N].
+        coulomb_forward: magnitude of Coulomb friction while the joint moves in the direction of q [N m] or [N].
         coulomb_backward: the same, against the direction of q.
         gear_ratio: turns of the motor per turn of the joint; for information, ``inertia`` has it already.
     """

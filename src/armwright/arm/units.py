@@ -11,7 +11,7 @@ class JointUnits(NamedTuple):
 
     Attributes:
         position: of its position.
-        effort: of its effort and of its dry friction.
+        effort: of its effort and of its Coulomb friction.
         inertia: of the inertia of its drive.
         viscous: of its friction per speed.
         display: of a position as people read it.

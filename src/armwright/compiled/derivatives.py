@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import accumulate
+from functools import partial
+from itertools import accumulate, pairwise
 from numbers import Integral, Real
 from typing import Any, Literal
+
+import numpy as np
 
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, counted, shown
 from armwright.tracing.derivatives import jacobian
@@ -15,6 +18,11 @@ from armwright.tracing.graph import Graph, Traced
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import mirrored
+
+# Numbers of one input at most: each is a node of the graph, and code is written for it.
+_MAX_NUMBERS = 10_000
+
+_DOC = "Return the values of the equation, and their derivatives by {}: see ``armwright.compiled.derivative``."
 
 
 def derivative(
@@ -58,47 +66,24 @@ def derivative(
         Griewank & Walther (2008), Evaluating Derivatives, chapters 3 and 5.
     """
     shapes = _shapes(inputs)
-    names = _names(of)
-    for name in names:
-        if name not in shapes:
-            raise UnknownNameError("input", name, shapes)
-    if not names:
-        raise InvalidValueError("of: expected the name of an input, got none")
+    names = _names(of, shapes)
     if isinstance(order, bool) or not isinstance(order, Integral) or order not in (1, 2):
         raise InvalidValueError(f"order: expected 1 or 2, got {shown(order)}")
     if not callable(equation):
         raise KindError(f"equation: expected a function of scalars, got {shown(equation)}")
-    name_of_equation = getattr(equation, "__name__", "")
-    title = name_of_equation if isinstance(name_of_equation, str) and name_of_equation.isidentifier() else "equation"
     values, value_shape = _tried(equation, shapes)
-    if order == 2 and value_shape:
-        raise InvalidValueError(
-            f"order: expected 1, for the equation returns a list of {counted(len(values), 'scalar')}"
-        )
-    sizes = [math.prod(shapes[name]) for name in names]
-    places = [slice(last - size, last) for last, size in zip(accumulate(sizes), sizes, strict=True)]
-
-    def with_derivatives(*scalars: list[Traced]) -> list[list[Scalar]]:
-        values, _ = _values(equation(*scalars))
-        of_input = dict(zip(shapes, scalars, strict=True))
-        columns = [x for name in names for x in of_input[name]]
-        rows = jacobian(values, columns)
-        first = [[x for row in rows for x in row[place]] for place in places]
-        if order == 1:
-            return [values, *first]
-        return [values, *first, [x for row in mirrored(jacobian(rows[0], columns)) for x in row]]
-
     outputs = [value_shape, *((*value_shape, *shapes[name]) for name in names)]
     if order == 2:
-        outputs.append((sum(sizes), sum(sizes)))
+        if value_shape:
+            raise InvalidValueError(
+                f"order: expected 1, for the equation returns a list of {counted(len(values), 'scalar')}"
+            )
+        size = sum(math.prod(shapes[name]) for name in names)
+        outputs.append((size, size))
+    with_derivatives = partial(_with_derivatives, equation, shapes, names, second=order == 2)
+    title = _title(equation)
     kernel = Kernel(emitted=emit(title, with_derivatives, shapes, shapes=outputs))
     return kernel.function(title, _DOC.format(", ".join(names)))
-
-
-# Numbers of one input at most: each is a node of the graph, and code is written for it.
-_MAX_NUMBERS = 10_000
-
-_DOC = "Return the values of the equation, and their derivatives by {}: see ``armwright.compiled.derivative``."
 
 
 def _shapes(inputs: Mapping[str, int | Shape]) -> dict[str, Shape]:
@@ -110,12 +95,17 @@ def _shapes(inputs: Mapping[str, int | Shape]) -> dict[str, Shape]:
     return {name: _shape(name, value) for name, value in inputs.items()}
 
 
-def _names(of: str | Sequence[str]) -> list[str]:
-    """Return the names of the inputs to differentiate by."""
+def _names(of: str | Sequence[str], inputs: Mapping[str, Shape]) -> list[str]:
+    """Return the names of the inputs to differentiate by, one at least."""
     names: list[Any] = [of] if isinstance(of, str) or not isinstance(of, Iterable) else list(of)
     for name in names:
         if not isinstance(name, str):
             raise KindError(f"of: expected the name of an input, or a list of such, got {shown(of)}")
+    for name in names:
+        if name not in inputs:
+            raise UnknownNameError("input", name, inputs)
+    if not names:
+        raise InvalidValueError("of: expected the name of an input, got none")
     return names
 
 
@@ -144,8 +134,33 @@ def _values(result: Any) -> tuple[list[Scalar], Shape]:
     """Return what an equation returns as a list of scalars, and its shape."""
     if isinstance(result, Traced | Real):
         return [result], ()
+    if isinstance(result, np.ndarray) and result.ndim == 1:
+        result = result.tolist()
     if not isinstance(result, list | tuple) or not all(isinstance(x, Traced | Real) for x in result):
-        raise KindError(f"equation: expected it to return a scalar or a list of scalars, got {shown(result)}")
+        raise KindError(
+            "equation: expected it to return a scalar or a list of scalars, a matrix row by row as by np.ravel, got "
+            f"{shown(result)}"
+        )
     if not result:
         raise ShapeError("equation: expected it to return at least one scalar, got none")
     return list(result), (len(result),)
+
+
+def _title(equation: Callable[..., Any]) -> str:
+    name = getattr(equation, "__name__", "")
+    return name if isinstance(name, str) and name.isidentifier() else "equation"
+
+
+def _with_derivatives(
+    equation: Callable[..., Any], inputs: Iterable[str], names: Sequence[str], *scalars: list[Traced], second: bool
+) -> list[list[Scalar]]:
+    """Return the values of an equation, their derivatives by each of the inputs named, and the Hessian if wanted."""
+    values, _ = _values(equation(*scalars))
+    by_name = dict(zip(inputs, scalars, strict=True))
+    columns = [x for name in names for x in by_name[name]]
+    rows = jacobian(values, columns)
+    ends = list(accumulate((len(by_name[name]) for name in names), initial=0))
+    derivatives = [[x for row in rows for x in row[start:end]] for start, end in pairwise(ends)]
+    if not second:
+        return [values, *derivatives]
+    return [values, *derivatives, [x for row in mirrored(jacobian(rows[0], columns)) for x in row]]

@@ -73,10 +73,17 @@ class DeviceKernel:
         return self._device.compile(text_of(functions, "cuda"), functions[0].name)
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        """Evaluate the quantity: see ``Kernel.function``."""
-        given = self._kernel.signature.bind(*arguments, **named).arguments
-        inputs = [given[name] for name in self._kernel.emitted.inputs]
-        threads, out = given.get("threads"), given.get("out")
+        """Evaluate the quantity: see ``Kernel.function``.
+
+        Raises:
+            KindError: some inputs are on the device and some are not, or an array is not of float64.
+            ShapeError: an array on the device has another shape or order, or cannot be written.
+            InvalidValueError: an array is on another device.
+            DeviceError: something went wrong on the device.
+        """
+        bound = self._kernel.signature.bind(*arguments, **named).arguments
+        inputs = [bound[name] for name in self._kernel.emitted.inputs]
+        threads, out = bound.get("threads"), bound.get("out")
         on_device = [is_on_device(x) for x in inputs]
         if any(on_device):
             if not all(on_device):

@@ -10,6 +10,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, broadcast_rows, exact_shape, joint_array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.identification import base_parameters
+from armwright.dynamics.regressors import OF_DRIVE, OF_LINK
 from armwright.errors import InvalidValueError
 
 # Samples whose regressors exist at a time: 2 MB of them for six joints.
@@ -44,7 +45,7 @@ def normal_equations(
 ) -> NormalEquations:
     """Return the normal equations of measured motions, for the parameters of the dynamics.
 
-    The regressors of all samples never exist together: beside what is given, memory does not grow with their number.
+    The regressors of a block of samples exist at a time, so memory beside the arguments does not grow with the samples.
 
     Args:
         arm: the arm, with n joints.
@@ -53,7 +54,7 @@ def normal_equations(
         qdd: (..., n) joint accelerations.
         tau: (..., n) measured efforts [N m] or [N].
         weights: (n,) weight of each joint, 0 or more: the inverse of the variance of its effort; all 1 when left out.
-        base: whether they are those of the base parameters, not of all.
+        base: whether the parameters are the base parameters, not all of ``dynamic_parameters``.
 
     Returns:
         Their matrix and right side.
@@ -76,12 +77,12 @@ def normal_equations(
     named = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
     rows = broadcast_rows(", ".join(named), *(joint_array(x, n, name) for name, x in named.items()))
     q_, qd_, qdd_, tau_ = (x.reshape(-1, n) for x in rows)
-    columns = len(base_parameters(fast.arm).columns) if base else 14 * n
+    columns = len(base_parameters(fast.arm).columns) if base else (OF_LINK + OF_DRIVE) * n
     A, b = np.zeros((columns, columns)), np.zeros(columns)
     for first in range(0, len(q_), _BLOCK):
         block = slice(first, first + _BLOCK)
         Y = regressor(q_[block], qd_[block], qdd_[block])
-        # Each joint's rows: Y has one block of them per sample.
+        # Y is (samples, n, columns): a row for each joint of each sample.
         weighted = (Y * W[:, None]).reshape(-1, columns)
         A += weighted.T @ Y.reshape(-1, columns)
         b += weighted.T @ tau_[block].reshape(-1)

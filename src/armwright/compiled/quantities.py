@@ -11,7 +11,7 @@ from armwright.arm.positions import admitted, ask_for_degrees
 from armwright.arrays import Array
 from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics
 from armwright.dynamics.arguments import weighed
-from armwright.dynamics.articulated_body import articulated_body
+from armwright.dynamics.articulated_body import Pivot, articulated_body
 from armwright.dynamics.derivatives import acceleration_partials, effort_partials, forward_dynamics_derivatives
 from armwright.dynamics.drives import less_friction, with_drives
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy, rotor_energy
@@ -100,7 +100,7 @@ def evaluate_quantity(arm: Arm, name: str, *inputs: Sequence[float]) -> Rows:
     Args:
         arm: the arm.
         name: of a quantity that the arm has.
-        inputs: the numbers of each input, a matrix row by row.
+        inputs: the numbers of each input, a matrix row by row; as many as the input has.
 
     Returns:
         The numbers of each output.
@@ -159,7 +159,12 @@ def _inverse_dynamics(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers, *wrench: 
 
 def _forward_dynamics(arm: Arm, q: Numbers, qd: Numbers, tau: Numbers) -> Guarded:
     accelerations, pivots = articulated_body(arm, q, qd, less_friction(arm, qd, tau))
-    return Guarded([accelerations], [pivot.inertia - NEGLIGIBLE * pivot.size for pivot in pivots])
+    return _if_inertias_count([accelerations], pivots)
+
+
+def _if_inertias_count(values: Rows, pivots: Iterable[Pivot]) -> Guarded:
+    """Return values that mean something only where every joint moves more inertia than rounding leaves."""
+    return Guarded(values, [pivot.inertia - NEGLIGIBLE * pivot.size for pivot in pivots])
 
 
 def _mass_matrix(arm: Arm, q: Numbers) -> Rows:
@@ -170,7 +175,7 @@ def _mass_matrix(arm: Arm, q: Numbers) -> Rows:
 
 
 def _mass_and_bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
-    return [*_mass_matrix(arm, q), newton_euler(arm, q, qd, [0.0] * arm.n)]
+    return [*_mass_matrix(arm, q), *_bias(arm, q, qd)]
 
 
 def _bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
@@ -199,7 +204,7 @@ def _inverse_dynamics_derivatives(arm: Arm, q: Inputs, qd: Inputs, qdd: Inputs) 
 
 def _forward_dynamics_derivatives(arm: Arm, q: Inputs, qd: Inputs, tau: Inputs) -> Guarded:
     matrices, pivots = acceleration_partials(arm, q, qd, tau)
-    return Guarded([_flat(A) for A in matrices], [pivot.inertia - NEGLIGIBLE * pivot.size for pivot in pivots])
+    return _if_inertias_count([_flat(A) for A in matrices], pivots)
 
 
 def _regressor(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers) -> Rows:
@@ -220,7 +225,7 @@ def _pose(frame: tuple[Matrix, Vector]) -> Vector:
 
 
 class _Quantity(NamedTuple):
-    """One row of the table.
+    """A quantity of the table below.
 
     In shapes, n is the number of joints, f that of the frames, p that of the parameters, b that of the base parameters.
 
@@ -229,9 +234,10 @@ class _Quantity(NamedTuple):
         inputs: their shapes by their names.
         outputs: their shapes.
         flags: which outputs are truth values.
-        plain: the plain function, which raises what belongs to inputs that break a condition; None without conditions.
-        max_straight: the number of nodes of the graph beyond which loops over links are loops of the code; measured
-            as where these are faster. None if they never are.
+        plain: the function of the same quantity that is not compiled, which raises the error of inputs that break a
+            condition; None without conditions.
+        max_straight: the number of nodes of the graph beyond which loops over links are loops of the code; these were
+            measured to be faster there. None if they never are.
     """
 
     equation: Callable[..., Rows | Guarded]

@@ -29,11 +29,11 @@ def forward_dynamics(
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint speeds.
+        qd: (..., n) joint velocities.
         tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
         wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
             base axes; none when left out.
-        drives: whether rotor inertia and friction of the drives count. Dry friction of a joint at rest does not:
+        drives: whether rotor inertia and friction of the drives count. Coulomb friction of a joint at rest does not:
             whether it holds depends on all other joints; ``simulate`` determines that.
 
     Returns:
@@ -66,12 +66,12 @@ def toacc(
     """Return the joint accelerations that efforts cause, by n + 1 calls of Newton-Euler and a system of equations.
 
     A unit acceleration of one joint at a time yields the columns of the mass matrix; a call without accelerations
-    yields the efforts that speeds and gravity require.
+    yields the efforts that velocities and gravity require.
 
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint speeds.
+        qd: (..., n) joint velocities.
         tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
         wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
             base axes; none when left out.

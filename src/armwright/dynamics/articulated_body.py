@@ -3,7 +3,7 @@
 Each link with all links beyond it, their joints free to move, reacts to a force at its own joint like a body whose
 inertia depends on the direction. That inertia, and the force without acceleration, are passed inward from the last
 link; accelerations are passed back outward. Accelerations here are those of material points, not spatial ones, so
-linear speeds never appear.
+linear velocities never appear.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ class Articulated(NamedTuple):
 class Pivot(NamedTuple):
     """The inertia about or along a joint while all joints beyond it are free.
 
+    It is the diagonal element D of the factors M = Lᵀ D L of the mass matrix, and of the articulated-body inertia.
+
     Attributes:
         inertia: rotor included.
         size: the sum over all three axes, the reference for rounding.
@@ -49,7 +51,8 @@ class LinkVelocity(NamedTuple):
 
     Attributes:
         w: angular velocity, along the axes of the joint.
-        coriolis: acceleration of the link at the joint; angular, of a slide linear.
+        coriolis: what the velocity of the joint adds to the acceleration of the link: angular of a revolute joint,
+            linear of a prismatic one.
         centripetal: acceleration of the joint point about that of the joint before, along the axes of that.
     """
 
@@ -86,7 +89,7 @@ def articulated_body(
     Args:
         arm: the arm, with n joints.
         q: n joint positions.
-        qd: n joint speeds.
+        qd: n joint velocities.
         tau: n efforts.
         wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
 
@@ -128,12 +131,12 @@ def _zeros() -> Matrix:
     return [[0.0, 0.0, 0.0] for _ in range(3)]
 
 
-def _velocity(before: Vector, step: JointStep, speed: Scalar) -> tuple[Vector, LinkVelocity]:
+def _velocity(before: Vector, step: JointStep, velocity: Scalar) -> tuple[Vector, LinkVelocity]:
     """Return the velocity of a link, from the angular velocity of the link before."""
     w = step.inward_axes(before)
-    coriolis = scale(1.0 if step.revolute else 2.0, [w[1] * speed, -(w[0] * speed), 0.0])
+    coriolis = scale(1.0 if step.revolute else 2.0, [w[1] * velocity, -(w[0] * velocity), 0.0])
     if step.revolute:
-        w = [w[0], w[1], w[2] + speed]
+        w = [w[0], w[1], w[2] + velocity]
     return w, LinkVelocity(w, coriolis, cross(before, cross(before, step.lever)))
 
 
@@ -172,9 +175,9 @@ def _at_previous_joint(body: Articulated, step: JointStep, centripetal: Vector) 
     n0 = add(step.outward_axes(body.n0), apply(H, centripetal), cross(p, f0))
     # H and J about the point before: H + [p] M and J - H [p] + [p] (H + [p] M)ᵀ, row by row.
     shifted = [add(row, lever) for row, lever in zip(H, transpose([cross(p, row) for row in M]), strict=True)]
-    there, back = [cross(p, row) for row in H], [cross(p, row) for row in shifted]
+    left, right = [cross(p, row) for row in H], [cross(p, row) for row in shifted]
     return Articulated(
-        J=mirrored([[J[i][j] + there[i][j] + back[j][i] for j in range(3)] for i in range(3)]),
+        J=mirrored([[J[i][j] + left[i][j] + right[j][i] for j in range(3)] for i in range(3)]),
         H=shifted,
         M=mirrored(M),
         n0=n0,
@@ -185,10 +188,10 @@ def _at_previous_joint(body: Articulated, step: JointStep, centripetal: Vector) 
 def _joint_response(body: Articulated, step: JointStep, rotor: float, tau: Scalar) -> JointResponse:
     """Return the response of a body, about the joint point, to its joint, which is the z axis."""
     if step.revolute:
-        n, f, own, bias = [row[2] for row in body.J], body.H[2], body.J, body.n0[2]
+        n, f, inertia, bias = [row[2] for row in body.J], body.H[2], body.J, body.n0[2]
     else:
-        n, f, own, bias = [row[2] for row in body.H], body.M[2], body.M, body.f0[2]
-    pivot = Pivot(inertia=own[2][2] + rotor, size=own[0][0] + own[1][1] + own[2][2] + rotor)
+        n, f, inertia, bias = [row[2] for row in body.H], body.M[2], body.M, body.f0[2]
+    pivot = Pivot(inertia=inertia[2][2] + rotor, size=inertia[0][0] + inertia[1][1] + inertia[2][2] + rotor)
     return JointResponse(n, f, pivot, reciprocal(pivot.inertia), tau - bias)
 
 

@@ -54,7 +54,7 @@ def inverse_dynamics_derivatives(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: Arr
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint velocities. Dry friction is constant but for a jump at rest, and has the derivative 0.
+        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps.
         qdd: (..., n) joint accelerations.
 
     Returns:
@@ -79,7 +79,7 @@ def forward_dynamics_derivatives(arm: Arm, q: ArrayLike, qd: ArrayLike, tau: Arr
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint velocities. Dry friction is constant but for a jump at rest, and has the derivative 0.
+        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps.
         tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
 
     Returns:
@@ -157,7 +157,8 @@ def acceleration_partials(
 ) -> tuple[tuple[Matrix, Matrix, Matrix], list[Pivot]]:
     """Return the derivatives of the accelerations by positions, velocities and efforts, over traced scalars.
 
-    The efforts are differentiated at accelerations that are held; their inputs become the accelerations afterwards.
+    The efforts are differentiated at constant accelerations, which are inputs at first; the accelerations that the
+    efforts cause replace them afterwards.
 
     Args:
         arm: the arm, with n joints.
@@ -170,12 +171,12 @@ def acceleration_partials(
         meaningless.
     """
     graph = q[0].graph
-    held = graph.inputs(arm.n)
-    dq, dqd, M = effort_partials(arm, q, qd, held)
+    qdd = graph.inputs(arm.n)
+    dq, dqd, M = effort_partials(arm, q, qd, qdd)
     inverse, pivots = inverse_of_mass(arm, M)
     bias = newton_euler(arm, q, qd, [0.0] * arm.n)
     accelerations = apply(inverse, subtract(less_friction(arm, qd, tau), bias))
-    by = {x.node: acceleration for x, acceleration in zip(held, accelerations, strict=True)}
+    by = {x.node: acceleration for x, acceleration in zip(qdd, accelerations, strict=True)}
     at_accelerations = [replaced(row, by, graph) for row in dq]
     opposite = [scale(-1.0, row) for row in inverse]
     return (product(opposite, at_accelerations), product(opposite, dqd), inverse), pivots
@@ -184,12 +185,18 @@ def acceleration_partials(
 def inverse_of_mass(arm: Arm, M: Matrix) -> tuple[Matrix, list[Pivot]]:
     """Return the inverse of a mass matrix by M = Lᵀ D L, and its pivots D, over abstract scalars.
 
-    Elimination goes from the last joint inward, so that a pivot is the inertia about or along a joint while all joints
-    beyond it are free. No row is exchanged: a mass matrix is positive definite.
+    Elimination goes from the last joint to the first, so that a pivot is the inertia about or along a joint while all
+    joints beyond it are free. No row is exchanged: a mass matrix is positive definite.
 
     Args:
         arm: the arm, with n joints.
         M: n x n, of which the upper half is read.
+
+    Returns:
+        The inverse, n x n and symmetric, and n pivots.
+
+    Source:
+        Featherstone (2008), chapter 6: the LTDL factorization, here of a matrix without zeros.
     """
     n = arm.n
     rest = [list(row) for row in M]

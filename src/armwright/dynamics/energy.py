@@ -72,7 +72,7 @@ def kinetic_energy(arm: Arm, q: ArrayLike, qd: ArrayLike, *, drives: bool = True
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint speeds.
+        qd: (..., n) joint velocities.
         drives: whether the rotors count.
 
     Returns:

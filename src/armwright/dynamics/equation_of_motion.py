@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arm.model import Arm, Link
 from armwright.arrays import Array, ArrayLike, read_only, reduce_by_fields
 from armwright.dynamics.arguments import batch, stack_matrix
-from armwright.dynamics.drives import dry_friction
+from armwright.dynamics.drives import joint_coulomb_friction
 from armwright.dynamics.lagrange_euler import (
     gravity_coefficients,
     inertia_coefficients,
@@ -87,7 +87,7 @@ def terms(
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint speeds.
+        qd: (..., n) joint velocities.
         qdd: (..., n) joint accelerations.
         load: a body fixed at the tool, described in the tool frame.
         wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
@@ -126,7 +126,7 @@ def terms(
         coriolis=stack([x for plane in pairs for row in plane for x in row], lead).reshape(*lead, n, n, n),
         gravity=stack(gravity_coefficients(arm, derivatives), lead),
         viscous=stack([motor.viscous * speed for motor, speed, _ in motors], lead),
-        dry=stack([dry_friction(motor, speed) for motor, speed, _ in motors], lead),
+        dry=stack([joint_coulomb_friction(motor, speed) for motor, speed, _ in motors], lead),
         load=stack(newton_euler(payload(bare, load.mass, load.com, load.inertia), q_, qd_, qdd_), lead),
         outside=stack(newton_euler(bare, q_, still, still, push), lead),
     )

@@ -1,4 +1,4 @@
-"""The parameters that motions of an arm can tell: linear combinations of its dynamic parameters."""
+"""The base parameters of an arm, which its motions identify: linear combinations of its dynamic parameters."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from armwright.tracing.vectors import Matrix
 
 _OF_LINK = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _OF_DRIVE = ("rotor", "viscous", "forward", "backward")
-# Motions of which the structure is found; each gives an equation per joint.
-_MOTIONS = 100
+# States at which the regressor is evaluated to find its structure; each gives an equation per joint.
+_STATES = 100
 # A column that is no longer than this part of the longest has no effect.
 _NO_EFFECT = 1e-12
-# What is left of a column behind others that it is a combination of, as a part of it: rounding leaves 1e-13.
+# A column of which no longer part is orthogonal to others is a combination of them: rounding leaves 1e-13.
 _DEPENDENT = 1e-10
-# A share of one column in another that is no more than rounding.
-_NO_SHARE = 1e-11
+# A coefficient of one column in another that is no more than rounding.
+_NO_COEFFICIENT = 1e-11
 
 
 class BaseParameters(NamedTuple):
@@ -72,8 +72,9 @@ def base_parameters(arm: Arm) -> BaseParameters:
     Source:
         Gautier (1991), Numerical calculation of the base inertial parameters of robots.
     """
-    found = _base_parameters(weighed(arm))
-    return found._replace(combinations=found.combinations.copy())
+    parameters = _base_parameters(weighed(arm))
+    # The caller may write into its array; that of the cache stays as it is.
+    return parameters._replace(combinations=parameters.combinations.copy())
 
 
 def base_regressor(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -111,29 +112,33 @@ def effort_base_regressor(arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars) -> Ma
 def _base_parameters(arm: Arm) -> BaseParameters:
     n = arm.n
     rng = np.random.default_rng(0)
-    q, qd, qdd = rng.uniform(-3, 3, size=(3, n, _MOTIONS))
-    Y = stack_matrix(effort_regressor(arm, list(q), list(qd), list(qdd)), (_MOTIONS,))
+    q, qd, qdd = rng.uniform(-3, 3, size=(3, n, _STATES))
+    Y = stack_matrix(effort_regressor(arm, list(q), list(qd), list(qdd)), (_STATES,))
     Y = Y.reshape(-1, (OF_LINK + OF_DRIVE) * n)
     lengths = np.linalg.norm(Y, axis=0)
     has_effect = lengths > _NO_EFFECT * lengths.max()
-    # As many rows as columns tell the same.
-    units = np.array(np.linalg.qr(np.where(has_effect, Y / np.where(has_effect, lengths, 1.0), 0.0), mode="r"))
+    # The factor R has the same dependences between columns, in as many rows as columns.
+    R = np.array(np.linalg.qr(np.where(has_effect, Y / np.where(has_effect, lengths, 1.0), 0.0), mode="r"))
     of_links = [OF_LINK * i + k for i in range(n) for k in (*range(1, OF_LINK), 0)]
-    columns = _independent(units, [*of_links, *range(OF_LINK * n, len(lengths))])
-    shares = np.linalg.lstsq(units[:, columns], units, rcond=None)[0]
-    shares[np.abs(shares) < _NO_SHARE] = 0.0
-    shares[:, columns] = np.eye(len(columns))
-    combinations = shares * lengths / lengths[columns][:, None]
+    columns = _independent(R, [*of_links, *range(OF_LINK * n, len(lengths))])
+    coefficients = np.linalg.lstsq(R[:, columns], R, rcond=None)[0]
+    coefficients[np.abs(coefficients) < _NO_COEFFICIENT] = 0.0
+    coefficients[:, columns] = np.eye(len(columns))
+    combinations = coefficients * lengths / lengths[columns][:, None]
     names = parameter_names(n)
     return BaseParameters(tuple(columns), tuple(names[k] for k in columns), combinations)
 
 
-def _independent(units: Array, order: Sequence[int]) -> list[int]:
-    """Return which columns, of length 1 or 0, are no combination of those before them in an order."""
-    basis = np.zeros((len(units), len(order)))
+def _independent(R: Array, order: Sequence[int]) -> list[int]:
+    """Return which columns, each of length 1 or 0, are no combination of those before them in an order.
+
+    Source:
+        Gram-Schmidt orthogonalisation, done twice: Giraud et al. (2005).
+    """
+    basis = np.zeros((len(R), len(order)))
     columns: list[int] = []
     for k in order:
-        rest, known = units[:, k], basis[:, : len(columns)]
+        rest, known = R[:, k], basis[:, : len(columns)]
         # Twice, as what rounding has left of the first time is not orthogonal.
         for _ in range(2):
             rest = rest - known @ (known.T @ rest)

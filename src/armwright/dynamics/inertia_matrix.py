@@ -22,6 +22,9 @@ def composite_rigid_body(arm: Arm, q: Sequence[Scalar]) -> Matrix:
         arm: the arm, with n joints.
         q: n joint positions.
 
+    Returns:
+        M, symmetric, without the inertia of rotors.
+
     Source:
         Walker & Orin (1982), method 3; Featherstone (2008), section 6.2.
     """
@@ -34,7 +37,7 @@ def composite_rigid_body(arm: Arm, q: Sequence[Scalar]) -> Matrix:
         if beyond is not None:
             body = combined(body, at_previous_joint(beyond, steps[i + 1]))
         beyond = body
-        # About the joint point, of which the joint is the z axis.
+        # Momentum P and angular momentum L for a unit velocity of the joint, which is the z axis of its joint point.
         if joint.revolute:
             P: Vector = [-body.moment[1], body.moment[0], 0.0]
             L: Vector = [-body.spread[0][2], -body.spread[1][2], body.spread[0][0] + body.spread[1][1]]
@@ -64,6 +67,7 @@ def mass_matrix(arm: Arm, q: ArrayLike, *, drives: bool = True) -> Array:
         KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
         InvalidValueError: a number is NaN or infinite.
+        UnsupportedArmError: the mass of a link is unknown.
 
     Source:
         Walker & Orin (1982), method 3; TR-83-008 eq. (14).

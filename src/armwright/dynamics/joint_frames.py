@@ -38,9 +38,7 @@ def joint_body(joint: Joint, link: Link) -> JointBody:
     I = product(product(R, link.inertia.tolist()), transpose(R))
     half = 0.5 * (I[0][0] + I[1][1] + I[2][2])
     moment = scale(link.mass, com)
-    spread = [
-        [(half if i == j else 0.0) - 0.5 * (I[i][j] + I[j][i]) + moment[i] * com[j] for j in range(3)] for i in range(3)
-    ]
+    spread = [[(half if i == j else 0.0) - I[i][j] + moment[i] * com[j] for j in range(3)] for i in range(3)]
     return JointBody(mass=float(link.mass), moment=moment, spread=spread)
 
 
@@ -113,26 +111,26 @@ class JointStep(NamedTuple):
     Attributes:
         revolute: whether the joint rotates.
         fixed: constant rotation of the axes of the joint, before it moves, along those of the joint before.
-        turn: rotation about the axis of the joint.
+        rotation: about the axis of the joint, as far as the joint has moved.
         lever: from joint point to joint point, along the axes of the joint before.
     """
 
     revolute: bool
     fixed: Rotation | FixedRotation
-    turn: Rotation
+    rotation: Rotation
     lever: Vector
 
     def inward_axes(self, v: Vector) -> Vector:
         """Return a vector along the axes of the joint, given along those of the joint before."""
-        return self.turn.inward_axes(self.fixed.inward_axes(v))
+        return self.rotation.inward_axes(self.fixed.inward_axes(v))
 
     def outward_axes(self, v: Vector) -> Vector:
         """Return a vector along the axes of the joint before, given along those of the joint."""
-        return self.fixed.outward_axes(self.turn.outward_axes(v))
+        return self.fixed.outward_axes(self.rotation.outward_axes(v))
 
     def outward_matrix(self, A: Matrix) -> Matrix:
         """Return a tensor along the axes of the joint before, given along those of the joint."""
-        return self.fixed.outward_matrix(self.turn.outward_matrix(A))
+        return self.fixed.outward_matrix(self.rotation.outward_matrix(A))
 
 
 def joint_steps(arm: Arm, q: Sequence[Scalar]) -> list[JointStep]:
@@ -146,8 +144,8 @@ def joint_steps(arm: Arm, q: Sequence[Scalar]) -> list[JointStep]:
     fixed: Rotation | FixedRotation = Rotation(True, 1.0, 0.0)
     lever: Vector = [0.0, 0.0, 0.0]
     for joint in arm.joints:
-        turn = Rotation(False, exact_cosine(joint.theta), exact_sine(joint.theta))
-        at_rest.append(JointStep(joint.revolute, fixed, turn, lever))
+        rotation = Rotation(False, exact_cosine(joint.theta), exact_sine(joint.theta))
+        at_rest.append(JointStep(joint.revolute, fixed, rotation, lever))
         fixed, lever = _rotation_behind(joint), lever_behind(joint)
     offsets = [joint.theta if joint.revolute else joint.d for joint in arm.joints]
     return scan(_moved, (), at_rest, offsets, q)[1]
@@ -163,7 +161,7 @@ def _moved(_: tuple[()], step: JointStep, offset: float, position: Scalar) -> tu
     """Return the step to a joint that has moved."""
     value = offset + position
     if step.revolute:
-        return (), step._replace(turn=Rotation(False, cos(value), sin(value)))
+        return (), step._replace(rotation=Rotation(False, cos(value), sin(value)))
     return (), step._replace(lever=add(step.lever, scale(value, step.fixed.outward_axes([0.0, 0.0, 1.0]))))
 
 

@@ -161,7 +161,7 @@ def lagrange_euler(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar], qdd: Seq
     Args:
         arm: the arm, with n joints.
         q: n joint positions.
-        qd: n joint speeds.
+        qd: n joint velocities.
         qdd: n joint accelerations.
 
     Source:
@@ -216,7 +216,7 @@ def coriolis_matrix(arm: Arm, q: ArrayLike, qd: ArrayLike) -> Array:
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint speeds.
+        qd: (..., n) joint velocities.
 
     Returns:
         C: (..., n, n).

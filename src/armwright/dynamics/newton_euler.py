@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
@@ -23,9 +21,10 @@ _STILL = (0.0, 0.0, 0.0)
 def newton_euler(
     arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars = NO_WRENCH, *, base_acceleration: Scalars = _STILL
 ) -> list[Scalar]:
-    """Return the efforts that the links alone require, over abstract scalars.
+    """Return the efforts that the links alone require, over abstract scalars, without rotor inertia and friction.
 
-    Arguments and sources are those of ``joint_wrenches``. The efforts are the components along or about each joint.
+    Arguments and sources are those of ``joint_wrenches``. The effort at a joint is the component of the moment about
+    its axis if it is revolute, of the force along its axis if it is prismatic.
     """
     joints = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
     return [effort for _, _, effort in joints]
@@ -53,29 +52,35 @@ def joint_wrenches(
     Args:
         arm: the arm, with n joints.
         q: n joint positions.
-        qd: n joint speeds.
+        qd: n joint velocities.
         qdd: n joint accelerations.
         wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
         base_acceleration: of the base, along its own axes; the base does not rotate. On a base that falls freely, with
             the acceleration ``arm.gravity``, an arm has no weight.
+
+    Returns:
+        n wrenches.
 
     Source:
         Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25). The report prints the base acceleration with
         gravity pointing up; here gravity is a vector of the arm.
     """
     wrenches = []
-    found = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
-    for joint, position, (f, n, _) in zip(arm.joints, q, found, strict=True):
-        about = n if joint.revolute else add(n, cross([0.0, 0.0, joint.d + position], f))
+    about_joint_points = _wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
+    for joint, position, (f, n, _) in zip(arm.joints, q, about_joint_points, strict=True):
+        # The joint point of a prismatic joint has moved away from the origin of frame i-1.
+        moment = n if joint.revolute else add(n, cross([0.0, 0.0, joint.d + position], f))
         to_frame = transpose(joint.behind[:3, :3].tolist())
-        wrenches.append(JointWrench(apply(to_frame, f), apply(to_frame, about), [row[2] for row in to_frame]))
+        wrenches.append(JointWrench(apply(to_frame, f), apply(to_frame, moment), [row[2] for row in to_frame]))
     return wrenches
 
 
 def _wrenches(
     arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars, *, base_acceleration: Scalars
 ) -> list[tuple[Vector, Vector, Scalar]]:
-    """Return force, moment and effort of each joint; about its point and along its axes, of a link on the next.
+    """Return the force and the moment of link i-1 on link i and the effort, for each joint i.
+
+    The moment is about the joint point, and both are along the axes of the joint: see ``joint_frames``.
 
     Outward, from the base: angular velocity, angular acceleration and acceleration of each joint point, in the axes
     that rotate with the joint, of which z is its own. Gravity enters as an opposite acceleration of the base. Inward,
@@ -94,10 +99,10 @@ def _wrenches(
 
 
 def _outward(
-    motion: JointMotion, step: JointStep, body: JointBody, speed: Scalar, acceleration: Scalar
+    motion: JointMotion, step: JointStep, body: JointBody, velocity: Scalar, acceleration: Scalar
 ) -> tuple[JointMotion, tuple[Vector, Vector]]:
     """Return the motion of a link, from that of the link before, and the force and moment that accelerate it."""
-    motion = _next_motion(motion, step, speed, acceleration)
+    motion = _next_motion(motion, step, velocity, acceleration)
     return motion, _link_wrench(body, motion.U, motion.v_dot)
 
 
@@ -126,24 +131,21 @@ class JointMotion(NamedTuple):
     U: Matrix
 
 
-def joint_motions(
-    arm: Arm, steps: Sequence[JointStep], qd: Scalars, qdd: Scalars, base_acceleration: Scalars = _STILL
-) -> list[JointMotion]:
+def joint_motions(arm: Arm, steps: Sequence[JointStep], qd: Scalars, qdd: Scalars) -> list[JointMotion]:
     """Return the motion of each link, from the base outward.
 
     Args:
         arm: the arm, with n joints.
         steps: the steps from joint to joint.
-        qd: n joint speeds.
+        qd: n joint velocities.
         qdd: n joint accelerations.
-        base_acceleration: of the base, along its own axes.
     """
 
     def step_outward(motion: JointMotion, *of_joint: Any) -> tuple[JointMotion, JointMotion]:
         motion = _next_motion(motion, *of_joint)
         return motion, motion
 
-    return scan(step_outward, _base_motion(arm, base_acceleration), steps, qd, qdd)[1]
+    return scan(step_outward, _base_motion(arm, _STILL), steps, qd, qdd)[1]
 
 
 def _base_motion(arm: Arm, base_acceleration: Scalars) -> JointMotion:
@@ -151,15 +153,16 @@ def _base_motion(arm: Arm, base_acceleration: Scalars) -> JointMotion:
     return JointMotion(still, still, base_frame_acceleration(arm, base_acceleration), [list(still) for _ in range(3)])
 
 
-def _next_motion(motion: JointMotion, step: JointStep, speed: Scalar, acceleration: Scalar) -> JointMotion:
+def _next_motion(motion: JointMotion, step: JointStep, velocity: Scalar, acceleration: Scalar) -> JointMotion:
     """Return the motion of a link, from that of the link before."""
     v_dot = step.inward_axes(add(motion.v_dot, apply(motion.U, step.lever)))
     w, w_dot = step.inward_axes(motion.w), step.inward_axes(motion.w_dot)
     if step.revolute:
-        w_dot = add(w_dot, [w[1] * speed, -(w[0] * speed), acceleration])
-        w = [w[0], w[1], w[2] + speed]
+        w_dot = add(w_dot, [w[1] * velocity, -(w[0] * velocity), acceleration])
+        w = [w[0], w[1], w[2] + velocity]
     else:
-        twice = speed + speed
+        # The Coriolis acceleration of a prismatic joint.
+        twice = velocity + velocity
         v_dot = add(v_dot, [w[1] * twice, -(w[0] * twice), acceleration])
     return JointMotion(w, w_dot, v_dot, point_accelerations(w, w_dot))
 
@@ -180,9 +183,9 @@ def _link_wrench(body: JointBody, U: Matrix, v_dot: Vector) -> tuple[Vector, Vec
     force = add(scale(body.mass, v_dot), apply(U, body.moment))
     moment = []
     for b, c in ((1, 2), (2, 0), (0, 1)):
-        # Of the integral of r x (U r): what U makes of the spread, its antisymmetric part.
-        turned = dot(U[c], body.spread[b]) - dot(U[b], body.spread[c])
-        moment.append(turned + body.moment[b] * v_dot[c] - body.moment[c] * v_dot[b])
+        # The integral of r x (U r) over the mass is the antisymmetric part of U times the integral of r rᵀ.
+        relative = dot(U[c], body.spread[b]) - dot(U[b], body.spread[c])
+        moment.append(relative + body.moment[b] * v_dot[c] - body.moment[c] * v_dot[b])
     return force, moment
 
 
@@ -215,12 +218,6 @@ def _along_next_axes(vectors: tuple[Vector, Vector], step: JointStep) -> tuple[t
     return (step.inward_axes(a), step.inward_axes(b)), ()
 
 
-def coulomb_friction(arm: Arm, qd: Array) -> Array:
-    """Return the Coulomb friction of joints (..., n) that move as ``qd`` does, 0 at rest."""
-    forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
-    return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
-
-
 def inverse_dynamics(
     arm: Arm,
     q: ArrayLike,
@@ -236,7 +233,7 @@ def inverse_dynamics(
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint speeds.
+        qd: (..., n) joint velocities.
         qdd: (..., n) joint accelerations.
         wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
             base axes; none when left out.
@@ -250,13 +247,14 @@ def inverse_dynamics(
         KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
         InvalidValueError: a number is NaN or infinite.
+        UnsupportedArmError: the mass of a link is unknown.
 
     Source:
         Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25).
     """
-    lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
-    moved = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
-    efforts = newton_euler(arm, q_, qd_, qdd_, push, base_acceleration=moved)
+    lead, (q_, qd_, qdd_), on_tool = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
+    of_base = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
+    efforts = newton_euler(arm, q_, qd_, qdd_, on_tool, base_acceleration=of_base)
     if drives:
         efforts = with_drives(arm, efforts, qd_, qdd_)
     return stack(efforts, lead)
@@ -309,7 +307,7 @@ def link_forces(
     Source:
         Luh, Walker & Paul (1980); TR-83-008 eq. (22)-(24).
     """
-    lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
-    moved = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
-    wrenches = joint_wrenches(arm, q_, qd_, qdd_, push, base_acceleration=moved)
+    lead, (q_, qd_, qdd_), on_tool = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
+    of_base = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
+    wrenches = joint_wrenches(arm, q_, qd_, qdd_, on_tool, base_acceleration=of_base)
     return LinkForces(*(stack_matrix(parts, lead) for parts in list(zip(*wrenches, strict=True))[:2]))

@@ -56,7 +56,7 @@ def dynamic_parameters(arm: Arm) -> Array:
 
     with the mass m [kg], the centre of mass c in the frame of the link [m], and the inertia tensor I about the origin
     of that frame, not about c [kg m²]. Behind those of all links, for each joint: the rotor inertia, viscous friction,
-    and the magnitudes of dry friction in and against the direction of q, as in ``Motor``.
+    and the magnitudes of Coulomb friction in and against the direction of q, as in ``Motor``.
 
     Args:
         arm: the arm, with n joints.
@@ -88,7 +88,7 @@ def effort_regressor(arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars) -> Matrix:
     n = arm.n
     Y: Matrix = [[0.0] * ((OF_LINK + OF_DRIVE) * n) for _ in range(n)]
     steps = joint_steps(arm, q)
-    # The velocities of a link, at the joint point, for unit speeds of the joints up to its own.
+    # The velocities of a link, at the joint point, for unit velocities of the joints up to its own.
     unit: list[tuple[Vector, Vector]] = []
     for k, (joint, step, motion) in enumerate(zip(arm.joints, steps, joint_motions(arm, steps, qd, qdd), strict=True)):
         unit = [(step.inward_axes(w), step.inward_axes(add(v, cross(w, step.lever)))) for w, v in unit]

@@ -1,4 +1,4 @@
-"""Shares of the efforts: those by gravity alone, and those by the speeds alone."""
+"""Shares of the efforts: those by gravity alone, and those by the velocities alone."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def gravity_efforts(arm: Arm, q: ArrayLike) -> Array:
 
 
 def coriolis_efforts(arm: Arm, q: ArrayLike, qd: ArrayLike) -> Array:
-    """Return the centrifugal and Coriolis efforts, which grow with the square of the speeds.
+    """Return the centrifugal and Coriolis efforts, which grow with the square of the velocities.
 
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint speeds.
+        qd: (..., n) joint velocities.
 
     Returns:
         H: (..., n) torques [N m] or forces [N], positive in the direction of q.

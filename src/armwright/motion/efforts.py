@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.newton_euler import coulomb_friction
+from armwright.dynamics.drives import coulomb_friction
 from armwright.errors import IncapableArmError, KindError, ShapeError, shown
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of

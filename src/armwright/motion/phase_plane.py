@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.dynamics.newton_euler import coulomb_friction
+from armwright.dynamics.drives import coulomb_friction
 from armwright.errors import IncapableArmError
 from armwright.motion.efforts import check_lasting
 from armwright.motion.forward_backward import UNBOUNDED, Bounds, by_toppra, largest_squares

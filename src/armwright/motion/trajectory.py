@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import attrs
 import numpy as np
@@ -17,8 +17,8 @@ from armwright.notebook import html_table
 
 # Nobody reads more samples than this; a shorter period is a slip of the unit.
 _MAX_SAMPLES = 100_000_000
-# The hair's breadth keeps a duration that is a whole number of ticks but for rounding from gaining one.
-_ROUNDING = 1e-9
+# A part of a period: a duration that is a whole number of periods but for rounding gains no further one.
+_TICK_TOLERANCE = 1e-9
 
 
 def _times(value: ArrayLike) -> Array:
@@ -46,9 +46,9 @@ class Samples:
     Attributes:
         times: (k,) [s].
         q: (k, n) joint positions [rad] or [m].
-        qd: (k, n) speeds.
-        qdd: (k, n) accelerations.
-        jerk: (k, n) their rates.
+        qd: (k, n) joint velocities.
+        qdd: (k, n) joint accelerations.
+        jerk: (k, n) rates of the accelerations.
     """
 
     times: Array = attrs.field(converter=read_only)
@@ -103,7 +103,7 @@ class Trajectory:
 
         Args:
             t: (...) times [s]; before the start and after the end the arm stands at the ends.
-            order: 0 position, 1 speed, 2 acceleration, 3 jerk.
+            order: 0 position, 1 velocity, 2 acceleration, 3 jerk, and so on.
 
         Returns:
             (..., n). At a knot where the derivative jumps, the value just after it.
@@ -129,7 +129,7 @@ class Trajectory:
         """Return the smallest and largest value of every joint, (n,) each, exactly and not by sampling.
 
         Args:
-            order: 0 position, 1 speed, 2 acceleration, 3 jerk.
+            order: 0 position, 1 velocity, 2 acceleration, 3 jerk, and so on.
 
         Raises:
             KindError: the order is no whole number.
@@ -224,7 +224,7 @@ class Trajectory:
                 f"period: {period:g} s divides {self.duration:g} s into {self.duration / period:.3g} samples; "
                 f"at most {_MAX_SAMPLES:.0e} are allowed"
             )
-        before = max(math.ceil(self.duration / period - _ROUNDING), int(self.duration > 0))
+        before = max(math.ceil(self.duration / period - _TICK_TOLERANCE), int(self.duration > 0))
         times = np.append(period * np.arange(before), self.duration)
         q, qd, qdd, jerk = (self(times, order) for order in range(4))
         return Samples(times=times, q=q, qd=qd, qdd=qdd, jerk=jerk)
@@ -262,7 +262,7 @@ def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:
 
     Args:
         parts: one at least, of the same joints, each beginning where the one before ends.
-        gap: how far the end of a part and the start of the next may be apart [rad] or [m]. Speeds may jump: see
+        gap: how far the end of a part and the start of the next may be apart [rad] or [m]. Velocities may jump: see
             ``continuity``.
 
     Raises:
@@ -311,7 +311,7 @@ def whole_ticks(trajectory: Trajectory, period: float) -> Trajectory:
 
     Raises:
         KindError: the period is no number.
-        InvalidValueError: it is not above 0.
+        InvalidValueError: it is not above 0, or so short that the ticks cannot be counted.
     """
     period = positive(period, "period", "s")
     if trajectory.duration == 0:
@@ -330,22 +330,29 @@ def slowed_together(trajectories: Sequence[Trajectory], duration: float, period:
         period: of the servo [s].
 
     Raises:
-        KindError: the period is no number.
-        InvalidValueError: it is not above 0.
+        KindError: the period or the duration is no number.
+        InvalidValueError: the period is not above 0, or the duration below 0.
     """
-    period = positive(period, "period", "s")
-    ends = np.cumsum([round(each.duration / period) for each in trajectories])
-    least = int(ends[-1])
+    period, duration = positive(period, "period", "s"), not_negative(duration, "duration", "s")
+    ends = [0, *accumulate(round(trajectory.duration / period) for trajectory in trajectories)]
+    least = ends[-1]
     if least == 0:
         return list(trajectories)
     ticks = max(least, _ticks(duration, period))
-    # In whole numbers, so that nobody gets less than it has.
-    slow_ends = [(2 * int(end) * ticks + least) // (2 * least) for end in ends]
-    counts = np.diff([0, *slow_ends])
-    pairs = zip(trajectories, counts.tolist(), strict=True)
-    return [each.retimed(count * period) if count else each for each, count in pairs]
+    # In whole numbers, so that none gets fewer ticks than it has.
+    slow_ends = [(2 * end * ticks + least) // (2 * least) for end in ends]
+    counts = (end - start for start, end in pairwise(slow_ends))
+    pairs = zip(trajectories, counts, strict=True)
+    return [trajectory.retimed(count * period) if count else trajectory for trajectory, count in pairs]
 
 
 def _ticks(duration: float, period: float) -> int:
-    """Return how many servo periods a motion takes that lasts no shorter, one at least."""
-    return max(1, math.ceil(duration / period - _ROUNDING))
+    """Return how many servo periods a motion takes that is not shorter, one at least.
+
+    Raises:
+        InvalidValueError: there are more than a float64 can count.
+    """
+    periods = duration / period
+    if math.isinf(periods):
+        raise InvalidValueError(f"period: {period:g} s divides {duration:g} s into more ticks than can be counted")
+    return max(1, math.ceil(periods - _TICK_TOLERANCE))

@@ -11,7 +11,8 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_or_each
 from armwright.dynamics.arguments import weighed
-from armwright.dynamics.newton_euler import coulomb_friction, newton_euler
+from armwright.dynamics.drives import coulomb_friction
+from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import gravity_shares
 from armwright.errors import InvalidValueError
 

@@ -6,8 +6,8 @@ share with it or with each other are one node, and what is 0 disappears.
 
 Where an operation has no derivative, the one here is
 
-- 0 for ``round`` and for comparisons, and so for what a choice gains by changing over: dry friction, as a function of
-  the speed, has the derivative 0 at rest, too. A choice has the derivative of the branch that is chosen.
+- 0 for ``round`` and for comparisons, and so for what a choice gains by changing over: Coulomb friction, as a
+  function of the velocity, has the derivative 0 at rest, too. A choice has the derivative of the branch that is chosen.
 - 0 for the absolute value at 0, and for the angle of the point (0, 0).
 - 0 for a root at 0 and below, where ``sqrt`` itself is 0.
 
@@ -74,7 +74,7 @@ def forward_mode(
     for x in inputs:
         tangents = {x: graph.constant(1.0)}
         for i in order:
-            if i != x and (tangent := _tangent(graph, i, tangents)) is not None:
+            if (tangent := _tangent(graph, i, tangents)) is not None:
                 tangents[i] = tangent
         columns.append([tangents.get(i, zero) for i in outputs])
         if max_new is not None and len(graph.nodes) - first > max_new:

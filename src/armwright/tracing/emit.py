@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.errors import InvalidValueError, ShapeError, shown
 from armwright.tracing.emit_llvm import Column, Target, lanes_ir, rows_ir, single_ir
-from armwright.tracing.graph import Graph, TooManyNodesError, Traced, operation_count, turned
+from armwright.tracing.graph import Graph, TooManyNodesError, Traced, nodes_of_angles, operation_count
 from armwright.tracing.machine import MachineCode, Watched, machine_code
 from armwright.tracing.scalar import Scalar
 
@@ -201,7 +201,7 @@ def _translated(
     nodes_of_rows = [[graph.node(x) for x in row] for row in rows]
     flat = [node for row in nodes_of_rows for node in row]
     are_flags = [i in flags for i, row in enumerate(nodes_of_rows) for _ in row]
-    of_angles = turned(graph)
+    of_angles = nodes_of_angles(graph)
     nodes = [x.node for row in scalars.values() for x in row]
     watched = Watched(
         angles=[node for node in nodes if node in of_angles],

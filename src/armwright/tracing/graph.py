@@ -1,8 +1,21 @@
 """The graph that an equation leaves when it is run on traced scalars: every value once, constants folded.
 
 Nodes are hash-consed: the same operation on the same operands is the same node, so shared terms are computed once
-however the equation is written. Constants are folded, and 0·x, 1·x, x+0 and their like disappear; so the zeros of
-an arm's twists and offsets cost nothing.
+however the equation is written. Constants are folded, and 0·x, 1·x, x+0, x-x and their like disappear; so the zeros of
+an arm's twists and offsets cost nothing. That is right of finite numbers, which inputs must be. Where an equation
+itself divides by 0, a product of 0 and the quotient is 0, not NaN.
+
+The operations of a graph are
+
+- ``constant`` and ``input``: leaves, with a value and an index.
+- ``add``, ``subtract``, ``multiply``, ``divide``, ``negate``, ``absolute``, ``sqrt``, ``sin``, ``cos``, ``atan2``, and
+  ``round``: to the nearest integer, the even one of two.
+- ``less``, ``less_equal``: 1 where it holds, else 0; and ``select``: its second operand where the first is not 0, else
+  its third.
+- ``loop``: see ``Loop``; and its results, ``state`` and ``each``.
+
+Source:
+    Cooper & Torczon (2011), Engineering a Compiler, section 8.4.1: value numbering, with algebraic identities.
 """
 
 import math
@@ -14,13 +27,19 @@ import numpy as np
 
 from armwright.arrays import number
 
-_COMMUTE = frozenset({"add", "multiply"})
-# The values that a loop leaves.
-_OF_LOOPS = frozenset({"state", "each"})
+_COMMUTATIVE = frozenset({"add", "multiply"})
+# The results of a loop.
+_LOOP_RESULTS = frozenset({"state", "each"})
 
 
 class Node(NamedTuple):
-    """One operation and the numbers of the nodes it takes; a constant has its value, an input its index."""
+    """An operation and the numbers of the nodes that are its operands.
+
+    Attributes:
+        op: name of the operation.
+        operands: numbers of nodes.
+        value: of a constant its value; of an input, a loop and a result of a loop its index; 0 of others.
+    """
 
     op: str
     operands: tuple[int, ...]
@@ -28,7 +47,7 @@ class Node(NamedTuple):
 
 
 class TooManyNodesError(Exception):
-    """A graph has become larger than whoever builds it wants."""
+    """A graph has more nodes than its limit."""
 
 
 class LoopStep(NamedTuple):
@@ -46,9 +65,9 @@ class LoopStep(NamedTuple):
 class Loop(NamedTuple):
     """A loop over links.
 
-    Its node, ``loop``, has the number of the loop as its value, and takes the numbers of the state at the beginning,
-    and then, value by value, those of all links. Nodes that take it are the numbers of the last ``state``, and those of
-    ``each`` link: the value of link i of n for result k is k n + i.
+    Its node, ``loop``, has the index of the loop as its value. Its operands are the numbers of the state at the
+    beginning and then, value by value, those of all links. Nodes of which it is the operand are the numbers of the last
+    ``state``, by their index, and the results of ``each`` link: result k of link i of n has the index k n + i.
 
     Attributes:
         steps: by the kind of link.
@@ -75,7 +94,7 @@ class Graph:
 
     Attributes:
         nodes: all of them.
-        loops: what the nodes of loops do.
+        loops: those of the nodes ``loop``, by their index.
         rolls: whether a scan becomes a loop.
     """
 
@@ -107,7 +126,7 @@ class Graph:
             return self.constant(_FOLD[op](*(self.nodes[i].value for i in operands)))
         if op in _SIMPLIFY and (simple := _SIMPLIFY[op](self, *operands)) is not None:
             return simple
-        if op in _COMMUTE:
+        if op in _COMMUTATIVE:
             operands = tuple(sorted(operands))
         return self.record(Node(op, operands))
 
@@ -117,7 +136,7 @@ class Graph:
         return self.record(Node("loop", tuple(operands), float(len(self.loops) - 1)))
 
     def value(self, node: int) -> float | None:
-        """Return the value of a constant, None for any other node."""
+        """Return the value of a constant, None of any other node."""
         return self.nodes[node].value if self.nodes[node].op == "constant" else None
 
     def node(self, x: Any) -> int:
@@ -154,7 +173,7 @@ class Graph:
 
 
 def _key(node: Node) -> tuple[Any, ...]:
-    """Tell a node from others; -0.0 is another constant than 0.0."""
+    """Return the key of a node in the table of known ones; -0.0 is another constant than 0.0."""
     return node.op, node.operands, node.value, math.copysign(1.0, node.value)
 
 
@@ -162,15 +181,15 @@ _Operator: TypeAlias = Callable[["Traced", Any], "Traced"]
 
 
 def _binary(op: str) -> tuple[_Operator, _Operator]:
-    """Return the method of an operator of two scalars, and that of the same with its scalars exchanged."""
+    """Return the method of a binary operator, and the reflected one, whose operands are exchanged."""
 
     def method(self: "Traced", other: Any) -> "Traced":
         return traced(op, self, other)
 
-    def exchanged(self: "Traced", other: Any) -> "Traced":
+    def reflected(self: "Traced", other: Any) -> "Traced":
         return traced(op, other, self)
 
-    return method, exchanged
+    return method, reflected
 
 
 class Traced:
@@ -243,29 +262,31 @@ def reachable(graph: Graph, outputs: Iterable[int]) -> list[int]:
     return sorted(needed)
 
 
-def turned(graph: Graph) -> set[int]:
-    """Return the nodes that the argument of a sine or cosine comes of."""
+def nodes_of_angles(graph: Graph) -> set[int]:
+    """Return the nodes that the argument of a sine or cosine depends on, and the arguments themselves."""
     angles: list[int] = []
     for op, operands, value in graph.nodes:
         if op in ("sin", "cos"):
             angles.append(operands[0])
         elif op == "loop":
-            angles += _turned_by_loop(graph.loops[int(value)], operands)
+            angles += _angles_of_loop(graph.loops[int(value)], operands)
     return set(reachable(graph, angles))
 
 
-def _turned_by_loop(loop: Loop, operands: Sequence[int]) -> list[int]:
-    """Return the operands of a loop of which the arguments of its sines and cosines come."""
+def _angles_of_loop(loop: Loop, operands: Sequence[int]) -> list[int]:
+    """Return the operands of a loop that the arguments of its sines and cosines depend on."""
     angles: list[int] = []
     values = loop.links(operands)
     for kind, step in enumerate(loop.steps):
-        nodes = [step.graph.nodes[i] for i in turned(step.graph)]
+        nodes = [step.graph.nodes[i] for i in nodes_of_angles(step.graph)]
         inputs = {int(node.value) for node in nodes if node.op == "input"}
-        # An angle that comes of the state may come of anything.
+        # An angle that depends on the state may depend on anything.
         if any(k < loop.carried for k in inputs):
             return list(operands)
         used = [values[k - loop.carried] for k in inputs if k - loop.carried < len(values)]
-        angles += [of_links[i] for of_links in used for i, of in enumerate(loop.kinds) if of == kind]
+        angles += [
+            of_links[i] for of_links in used for i, kind_of_link in enumerate(loop.kinds) if kind_of_link == kind
+        ]
     return angles
 
 
@@ -281,30 +302,30 @@ def operation_count(graph: Graph, outputs: Iterable[int]) -> dict[str, int]:
             of_kinds = [operation_count(*step) for step in loop.steps]
             for kind in loop.kinds:
                 count.update(of_kinds[kind])
-        elif node.operands and node.op not in _OF_LOOPS:
+        elif node.operands and node.op not in _LOOP_RESULTS:
             count[node.op] += 1
     return dict(sorted(count.items()))
 
 
-def _ratio(a: float, b: float) -> float:
+def _quotient(a: float, b: float) -> float:
     """Divide as the processor does: by 0 too."""
     if b:
         return a / b
-    return math.copysign(math.inf, a) * math.copysign(1.0, b) if a and a == a else math.nan  # noqa: PLR0124
+    return math.nan if a == 0 or math.isnan(a) else math.copysign(math.inf, a) * math.copysign(1.0, b)
 
 
 _FOLD: dict[str, Callable[..., float]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
     "multiply": lambda a, b: a * b,
-    "divide": _ratio,
+    "divide": _quotient,
     "negate": lambda a: -a,
-    "sin": math.sin,
-    "cos": math.cos,
+    "sin": lambda a: math.sin(a) if math.isfinite(a) else math.nan,
+    "cos": lambda a: math.cos(a) if math.isfinite(a) else math.nan,
     "sqrt": lambda a: math.sqrt(max(a, 0.0)),
     "atan2": math.atan2,
     "absolute": abs,
-    "round": lambda a: float(round(a)),
+    "round": lambda a: float(round(a)) if math.isfinite(a) else a,
     "less": lambda a, b: float(a < b),
     "less_equal": lambda a, b: float(a <= b),
     "select": lambda c, a, b: a if c else b,

@@ -230,7 +230,7 @@ _ROWS = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.
 def _addresses(arrays: Sequence[Array]) -> Any:
     """Return the addresses of arrays, as a kernel takes them; they keep the arrays."""
     addresses: Any = (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
-    # A signal may end a call while other threads still work on its arrays.
+    # Nothing else keeps a copy that is made for a call.
     addresses.arrays = arrays
     return addresses
 

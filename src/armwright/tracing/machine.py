@@ -35,18 +35,18 @@ _SUMS = frozenset({"add", "subtract"})
 # What the library of a language has for each type of numbers.
 _OF_A_LIBRARY = frozenset({"sin", "cos", "atan2", "round"})
 
-# No angle beyond has a sine: what an equation computes of its inputs may be one.
+# Larger angles, which an equation may compute of its inputs, have no sine: it is NaN.
 _LARGEST_REDUCED = 1e15
 
 
 class Watched(NamedTuple):
-    """What makes a configuration valid, and what makes it unusual, by the numbers of nodes.
+    """The conditions that make a configuration valid, and those that make it unusual, by the numbers of nodes.
 
     Attributes:
         angles: inputs whose sine is taken, which must be finite and no larger than ``LARGEST_ANGLE``.
         others: inputs that must be finite and no larger than ``LARGEST``.
         positive: nodes that must be above 0.
-        bounds: by node, beyond what it is unusual.
+        bounds: magnitudes beyond which nodes are unusual.
     """
 
     angles: Sequence[int] = ()
@@ -60,8 +60,8 @@ class MachineCode(NamedTuple):
 
     Attributes:
         graph: its nodes, each behind its operands.
-        order: the nodes in use.
-        outputs: the nodes of the values asked for; numbers, but for those of flags.
+        order: the nodes that the outputs and conditions need.
+        outputs: the nodes of the outputs; numbers, but for flags, which are truth values.
         invalid: the truth value that a configuration has no meaning; None where none is watched.
         unusual: the truth value that an input is beyond its bound; None where there are no bounds.
         joined: how many additions take in a multiplication.
@@ -87,9 +87,9 @@ def machine_code(
 
     Args:
         graph: the graph of an equation.
-        outputs: the nodes whose values are asked for.
+        outputs: the nodes of the outputs.
         watched: what is watched, if anything.
-        flags: which outputs, by their places, are truth values.
+        flags: which outputs, by their numbers, are truth values.
         any_type: whether it is for any type of numbers, not for double alone.
     """
     watched = watched or Watched()
@@ -107,8 +107,8 @@ def with_results(
 ) -> list[tuple[int, list[int]]]:
     """Return the nodes in use in an order in which results are complete early, each with those it completes.
 
-    What is written as soon as it is known is not in the way until the end. Conditions, too, stand right behind what
-    they are about: at the end they would keep all inputs until then.
+    A result that is written as soon as it is known is not live until the end, and takes no register there. Conditions,
+    too, stand right behind what they are about: at the end they would keep all inputs live.
 
     Args:
         code: operations.
@@ -116,70 +116,73 @@ def with_results(
         in_turn: whether the groups are to be complete one after the other; otherwise the nodes stay in their order.
 
     Returns:
-        Of each node its number, and the numbers of the groups of which it is the last.
+        The nodes, each with the numbers of the groups that are complete with it.
     """
-    place: dict[int, int] = {i: i for i in reachable(code.graph, code.outputs)} if not in_turn else {}
+    rank: dict[int, int] = {i: i for i in reachable(code.graph, code.outputs)} if not in_turn else {}
     for k, nodes in enumerate(groups if in_turn else ()):
         waiting = list(nodes)
         while waiting:
-            if (i := waiting.pop()) not in place:
-                place[i] = k
+            if (i := waiting.pop()) not in rank:
+                rank[i] = k
                 waiting.extend(code.graph.nodes[i].operands)
     for i in code.order:
-        if i not in place:
-            place[i] = max((place[k] for k in code.graph.nodes[i].operands), default=0)
-    order = sorted(code.order, key=lambda i: (place[i], i))
-    found = {node: k for k, node in enumerate(order)}
+        if i not in rank:
+            rank[i] = max((rank[k] for k in code.graph.nodes[i].operands), default=0)
+    order = sorted(code.order, key=lambda i: (rank[i], i))
+    index = {node: k for k, node in enumerate(order)}
     complete: list[list[int]] = [[] for _ in order]
     last = 0
     for k, nodes in enumerate(groups):
-        last = max(last if in_turn else 0, *(found[i] for i in nodes))
+        last = max(last if in_turn else 0, *(index[i] for i in nodes))
         complete[last].append(k)
     return list(zip(order, complete, strict=True))
 
 
-# A processor for which operations are put in order: how many of either kind it begins at a time, when the results of
-# them and of all others are known, and among how many it chooses.
-_AT_A_TIME, _LATENCY, _OTHERS, _CHOICE = 2, 4, 1, 100
+# The processor for which operations are scheduled: how many multiplications, and how many additions, it issues in a
+# cycle; after how many cycles the results of these, and of other operations, are ready; and among how many operations
+# the next ones are chosen.
+_ISSUE_WIDTH, _LATENCY, _LATENCY_OF_OTHERS, _WINDOW = 2, 4, 1, 100
 _MULTIPLY = frozenset({"multiply", "fma"})
-_AT_ONCE = frozenset({"constant", "limit", "input"})
+_WITHOUT_INSTRUCTION = frozenset({"constant", "limit", "input"})
 
 
 def scheduled(graph: Graph, order: Sequence[int]) -> list[int]:
-    """Return nodes in an order in which a processor that begins several at a time need not wait for results.
+    """Return nodes in an order in which a processor that issues several operations at a time need not wait for results.
 
     Operations of one sum or one sweep wait for each other; others stand between them then. The order given is kept as
-    far as that allows, so that not many more values live at a time.
+    far as that allows, so that not many more values are live at a time.
 
     Args:
         graph: their graph.
         order: nodes, each behind its operands; no loops.
+
+    Source:
+        List scheduling: Cooper & Torczon (2011), Engineering a Compiler, section 12.3, with the given order for the
+        priority.
     """
     nodes = graph.nodes
-    result = [i for i in order if nodes[i].op in _AT_ONCE]
-    known: dict[int, int] = dict.fromkeys(result, 0)
-    waiting = [i for i in order if i not in known]
-    time = 0
+    result = [i for i in order if nodes[i].op in _WITHOUT_INSTRUCTION]
+    ready_at: dict[int, int] = dict.fromkeys(result, 0)
+    waiting = [i for i in order if i not in ready_at]
+    cycle = 0
     while waiting:
-        free = {True: _AT_A_TIME, False: _AT_A_TIME}
-        begun = set()
-        for i in waiting[:_CHOICE]:
+        # Units for multiplications and for others; of the others, only additions occupy one.
+        free = {True: _ISSUE_WIDTH, False: _ISSUE_WIDTH}
+        issued = set()
+        for i in waiting[:_WINDOW]:
             op, operands, _ = nodes[i]
-            kind = op in _MULTIPLY
-            if free[kind] and all(known.get(k, time + 1) <= time for k in operands):
-                begun.add(i)
-                if kind or op in _SUMS:
-                    free[kind] -= 1
-                known[i] = time + (_LATENCY if kind or op in _SUMS else _OTHERS)
+            multiplies = op in _MULTIPLY
+            if free[multiplies] and all(ready_at.get(k, cycle + 1) <= cycle for k in operands):
+                issued.add(i)
+                is_counted = multiplies or op in _SUMS
+                if is_counted:
+                    free[multiplies] -= 1
+                ready_at[i] = cycle + (_LATENCY if is_counted else _LATENCY_OF_OTHERS)
                 result.append(i)
-        if begun:
-            waiting = [*(i for i in waiting[:_CHOICE] if i not in begun), *waiting[_CHOICE:]]
-        time += 1
+        if issued:
+            waiting = [*(i for i in waiting[:_WINDOW] if i not in issued), *waiting[_WINDOW:]]
+        cycle += 1
     return result
-
-
-def _product(graph: Graph, number: int | None) -> tuple[int, Node] | None:
-    return None if number is None else (number, graph.nodes[number])
 
 
 def _used_results(graph: Graph, order: Iterable[int]) -> dict[int, list[int]]:
@@ -200,9 +203,11 @@ class _Target:
         self.graph, self._any_type = graph, any_type
         self._kept = _OF_A_LIBRARY if any_type else frozenset()
         self.joined = 0
-        self._circles: dict[int, tuple[Traced, Traced]] = {}
-        # How large values can be, by their nodes, for inputs that are valid.
-        self._sizes: dict[int, float] = {}
+        # The sines and cosines of angles.
+        self._sine_cosines: dict[int, tuple[Traced, Traced]] = {}
+        # The largest magnitudes of values where all inputs are angles, by node, complete up to a node.
+        self._magnitudes: dict[int, float] = {}
+        self._first_unknown = 0
 
     def translated(self, graph: Graph, inputs: Sequence[int], required: Sequence[int]) -> dict[int, int]:
         """Translate what inputs and required nodes of a traced graph need; return the new nodes by the old ones."""
@@ -220,10 +225,12 @@ class _Target:
                 (loop,) = node.operands
                 links = len(graph.loops[int(graph.nodes[loop].value)].kinds)
                 k, link = divmod(int(node.value), links)
-                place = used[loop].index(k) * links + link
-                new[i] = self.graph.record(Node("each", (new[loop],), float(place)))
+                index = used[loop].index(k) * links + link
+                new[i] = self.graph.record(Node("each", (new[loop],), float(index)))
+            elif i in joined:
+                new[i] = self._fused(node, new, joined[i], graph.nodes[joined[i]])
             elif i not in absorbed:
-                new[i] = self.translate(node, new, _product(graph, joined.get(i)))
+                new[i] = self._operation(node, new)
         return new
 
     def _loop(self, loop: Loop, used: Sequence[int], operands: Sequence[int]) -> int:
@@ -237,12 +244,10 @@ class _Target:
             self.joined += target.joined * loop.kinds.count(len(steps) - 1)
         return self.graph.loop(loop._replace(steps=tuple(steps)), [self.number(i) for i in operands])
 
-    def translate(self, node: Node, new: Mapping[int, int], product: tuple[int, Node] | None) -> int:
-        """Return the node for one of the traced graph, whose operands are translated; ``product``: what it takes in."""
+    def _operation(self, node: Node, new: Mapping[int, int]) -> int:
+        """Return the node for one of the traced graph, whose operands are translated."""
         if node.op in ("constant", "input"):
             return self.graph.record(node)
-        if product is not None:
-            return self._fused(node, new, *product)
         operands = [new[i] for i in node.operands]
         if node.op == "select":
             return self._op("select", self.truth(operands[0]), *map(self.number, operands[1:]))
@@ -255,39 +260,36 @@ class _Target:
         if op in _WRITTEN_OUT and op not in self._kept:
             written = _WRITTEN_OUT[op](*(Traced(self.graph, i) for i in operands)).node
             if op == "atan2":
-                self._sizes[written] = math.pi
+                self._magnitudes[written] = math.pi
             return written
-        is_circle = op in ("sin", "cos") and op not in self._kept
-        return self._circle(operands[0], op) if is_circle else self._op(op, *operands)
+        is_circular = op in ("sin", "cos") and op not in self._kept
+        return self._sine_or_cosine(operands[0], op) if is_circular else self._op(op, *operands)
 
-    def _circle(self, angle: int, op: str) -> int:
+    def _sine_or_cosine(self, angle: int, op: str) -> int:
         """Return the sine or cosine of an angle, of which both are written out together."""
-        if angle not in self._circles:
+        if angle not in self._sine_cosines:
             x = Traced(self.graph, angle)
             sine, cosine = sine_cosine(x)
-            if not self._size(angle) <= _LARGEST_REDUCED:
+            if not self._magnitude(angle) <= _LARGEST_REDUCED:
                 # Beyond, what is written out is not even between -1 and 1.
-                known = abs(x) <= _LARGEST_REDUCED
-                sine, cosine = select(known, sine, math.nan), select(known, cosine, math.nan)
-            self._circles[angle] = sine, cosine
-            self._sizes |= {sine.node: 1.0, cosine.node: 1.0}
-        return self._circles[angle][op == "cos"].node
+                is_reduced = abs(x) <= _LARGEST_REDUCED
+                sine, cosine = select(is_reduced, sine, math.nan), select(is_reduced, cosine, math.nan)
+            self._sine_cosines[angle] = sine, cosine
+            self._magnitudes |= {sine.node: 1.0, cosine.node: 1.0}
+        return self._sine_cosines[angle][op == "cos"].node
 
-    def _size(self, node: int) -> float:
-        """Return how large a value can be where all inputs are angles."""
-        # What is known is not gone through again, which in a chain of sines would take time quadratic in its length.
-        waiting = [node]
-        while waiting:
-            op, operands, value = self.graph.nodes[waiting[-1]]
-            if unknown := [k for k in operands if k not in self._sizes and waiting[-1] not in self._sizes]:
-                waiting += unknown
-                continue
-            i = waiting.pop()
-            if i not in self._sizes:
-                sizes = [self._sizes[k] for k in operands]
-                constant = abs(value) if op == "constant" else LARGEST_ANGLE
-                self._sizes[i] = _SIZES[op](*sizes) if op in _SIZES else constant if not operands else math.inf
-        return self._sizes[node]
+    def _magnitude(self, node: int) -> float:
+        """Return the largest magnitude of a value where all inputs are angles, by interval arithmetic."""
+        for i in range(self._first_unknown, node + 1):
+            if i not in self._magnitudes:
+                op, operands, value = self.graph.nodes[i]
+                if op in _MAGNITUDES:
+                    self._magnitudes[i] = _MAGNITUDES[op](*(self._magnitudes[k] for k in operands))
+                else:
+                    of_leaf = abs(value) if op == "constant" else LARGEST_ANGLE
+                    self._magnitudes[i] = math.inf if operands else of_leaf
+        self._first_unknown = max(self._first_unknown, node + 1)
+        return self._magnitudes[node]
 
     def number(self, node: int) -> int:
         """Return a node as a number."""
@@ -306,7 +308,7 @@ class _Target:
     def verdicts(self, watched: Watched, new: Mapping[int, int]) -> tuple[int | None, int | None]:
         """Return whether a configuration is invalid, and whether it is unusual."""
         valid: list[int] = []
-        # One sum of squares tells of many: it is not a number, infinite or too large where one of them is.
+        # One sum of squares for all: it is NaN, infinite or too large where one of the inputs is.
         for inputs, largest in ((watched.angles, LARGEST_ANGLE), (watched.others, LARGEST)):
             if inputs:
                 first, *others = (new[i] for i in inputs)
@@ -347,8 +349,8 @@ class _Target:
         return self.graph.record(Node(op, operands))
 
 
-# How large the result of an operation can be, of how large its operands can be; others, as quotients, know no bound.
-_SIZES: dict[str, Callable[..., float]] = {
+# The largest magnitude of the result of an operation, by those of its operands; others, as quotients, know no bound.
+_MAGNITUDES: dict[str, Callable[..., float]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a + b,
     "multiply": lambda a, b: a * b,
@@ -368,16 +370,16 @@ _WRITTEN_OUT: dict[str, Callable[..., Traced]] = {"atan2": arc_tangent, "round":
 def fused(graph: Graph, order: Iterable[int], outputs: Iterable[int]) -> dict[int, int]:
     """Return which multiplication each sum takes in: number of the sum -> number of the multiplication.
 
-    A compiler may join a · b + c in one instruction, rounded once, on its own, but then what it does depends on what
-    stands around the code. Here it is part of the graph's translation, so a kernel gives the same bits however it is
-    compiled: alone, in a vector, inlined into another loop.
+    A compiler may contract a · b + c to one instruction, rounded once, on its own, but then what it does depends on
+    what stands around the code. Here it is part of the graph's translation, so a kernel gives the same bits however it
+    is compiled: alone, in a vector, inlined into another loop.
 
     A multiplication is taken in only where that makes it disappear: by all sums that use it, or by none.
 
     Args:
         graph: the graph.
         order: the nodes in use.
-        outputs: the nodes whose values are asked for.
+        outputs: the nodes of the outputs.
     """
     users: dict[int, list[int]] = {}
     for i in order:
@@ -386,8 +388,8 @@ def fused(graph: Graph, order: Iterable[int], outputs: Iterable[int]) -> dict[in
     required = set(outputs)
     products = [
         i
-        for i, of in users.items()
-        if graph.nodes[i].op == "multiply" and i not in required and all(graph.nodes[j].op in _SUMS for j in of)
+        for i, by in users.items()
+        if graph.nodes[i].op == "multiply" and i not in required and all(graph.nodes[j].op in _SUMS for j in by)
     ]
     taken: dict[int, int] = {}
     # Those with one user first: each of them is one instruction less, whatever becomes of the others.

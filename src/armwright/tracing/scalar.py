@@ -25,12 +25,12 @@ def _evaluate(op: str, on_arrays: Callable[..., Any], on_floats: Callable[..., f
 
 def sin(x: Scalar) -> Scalar:
     """Return the sine of ``x`` [rad]."""
-    return _evaluate("sin", np.sin, math.sin, x)
+    return _evaluate("sin", np.sin, lambda x: math.sin(x) if math.isfinite(x) else math.nan, x)
 
 
 def cos(x: Scalar) -> Scalar:
     """Return the cosine of ``x`` [rad]."""
-    return _evaluate("cos", np.cos, math.cos, x)
+    return _evaluate("cos", np.cos, lambda x: math.cos(x) if math.isfinite(x) else math.nan, x)
 
 
 def sqrt(x: Scalar) -> Scalar:
@@ -45,7 +45,7 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
 
 def round_half_even(x: Scalar) -> Scalar:
     """Return the whole number nearest to ``x``, as a float; the even one of two."""
-    return _evaluate("round", np.round, lambda x: float(round(x)), x)
+    return _evaluate("round", np.round, lambda x: float(round(x)) if math.isfinite(x) else x, x)
 
 
 def select(condition: Any, then: Scalar, otherwise: Scalar) -> Scalar:

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 from armwright.tracing.graph import Graph, Loop, LoopStep, Node, Traced
 
-# A scalar, or lists, tuples and named tuples of trees. What is no number (a truth value) tells kinds of links apart.
+# A scalar, or lists, tuples and named tuples of trees. Leaves that are no numbers, such as truth values, are part of
+# the kind of a link.
 Tree = Any
 
 
@@ -73,8 +74,8 @@ class _Links(NamedTuple):
     """The links of one kind.
 
     Attributes:
-        tree: of one of them.
-        numbers: of all of them, by the link.
+        tree: of the first of them.
+        numbers: of each of them, by the number of the link.
     """
 
     tree: Tree
@@ -86,7 +87,14 @@ class _Links(NamedTuple):
 
 
 class _TracedStep(NamedTuple):
-    """A step as it is traced for one kind of link: its graph, and the nodes of the new state and of the results."""
+    """A step as it is traced for a kind of link.
+
+    Attributes:
+        graph: of the step.
+        state: the nodes of the new state.
+        results: the nodes of the results.
+        tree: the results as the step returned them.
+    """
 
     graph: Graph
     state: list[int]
@@ -105,50 +113,54 @@ class _Rolled:
         self, graph: Graph, step: Callable[..., tuple[Tree, Tree]], state: Tree, links: Sequence[Tree], *, reverse: bool
     ) -> None:
         self.graph, self.step, self.state, self.count, self.reverse = graph, step, state, len(links), reverse
-        found: dict[Hashable, _Links] = {}
+        kinds: dict[Hashable, _Links] = {}
         for i, link in enumerate(links):
-            found.setdefault(_kind(link), _Links(link, {})).numbers[i] = list(_numbers(link))
-        self.kinds = list(found.values())
+            kinds.setdefault(_kind(link), _Links(link, {})).numbers[i] = list(_numbers(link))
+        self.kinds = list(kinds.values())
         self.sequences = self._sequences()
         self.tables = [self._table(kind) for kind in self.kinds]
 
     def result(self) -> tuple[Tree, list[Tree]]:
         """Leave the loop in the graph; return what ``scan`` does."""
         start = _nodes(self.graph, self.state)
-        places, steps = self._traced_steps(start)
-        carried = max(places, default=-1) + 1
-        firsts = [places.index(k) for k in range(carried)]
-        stored = [list(dict.fromkeys(r for r in one.results if self._is_computed(one, r, carried))) for one in steps]
+        slots, steps = self._traced_steps(start)
+        carried = max(slots, default=-1) + 1
+        # Of the numbers that share a slot, the first stands for all.
+        first_of_slots = [slots.index(slot) for slot in range(carried)]
+        stored = [
+            list(dict.fromkeys(node for node in step.results if self._is_computed(step, node, carried)))
+            for step in steps
+        ]
         loop = Loop(
-            steps=tuple(self._loop_steps(steps, firsts, stored)),
+            steps=tuple(self._loop_steps(steps, first_of_slots, stored)),
             kinds=tuple(k for _, k in sorted((i, k) for k, kind in enumerate(self.kinds) for i in kind.numbers)),
             constants=tuple(self._constants()),
             carried=carried,
             reverse=self.reverse,
         )
-        operands = [*(start[f] for f in firsts), *(node for sequence in self.sequences.values() for node in sequence)]
-        node = self.graph.loop(loop, operands)
+        initial = [start[first] for first in first_of_slots]
+        loop_node = self.graph.loop(loop, [*initial, *(x for sequence in self.sequences.values() for x in sequence)])
         results: list[Tree] = [None] * self.count
-        for k, one in enumerate(steps):
+        for k, step in enumerate(steps):
             for j, i in enumerate(self.kinds[k].numbers):
                 values = [
-                    self._of_loop("each", node, stored[k].index(r) * self.count + i)
-                    if r in stored[k]
-                    else self._passed(one.graph.nodes[r], carried, i, [column[j] for column in self.tables[k]])
-                    for r in one.results
+                    self._of_loop("each", loop_node, stored[k].index(node) * self.count + i)
+                    if node in stored[k]
+                    else self._passed(step.graph.nodes[node], carried, i, [column[j] for column in self.tables[k]])
+                    for node in step.results
                 ]
-                results[i] = _replaced(one.tree, iter(values))
-        return _replaced(self.state, iter([self._of_loop("state", node, k) for k in places])), results
+                results[i] = _replaced(step.tree, iter(values))
+        return _replaced(self.state, iter([self._of_loop("state", loop_node, slot) for slot in slots])), results
 
     @staticmethod
     def _loop_steps(
-        steps: Sequence[_TracedStep], firsts: Sequence[int], stored: Sequence[Sequence[int]]
+        steps: Sequence[_TracedStep], first_of_slots: Sequence[int], stored: Sequence[Sequence[int]]
     ) -> Iterator[LoopStep]:
-        """Give the steps of the loop; one with fewer results than another has anything in their place."""
+        """Give the steps of the loop; one with fewer results than another has zeros for the rest."""
         most = max(map(len, stored))
-        for one, results in zip(steps, stored, strict=True):
-            others = [one.graph.constant(0.0) for _ in range(most - len(results))]
-            yield LoopStep(one.graph, (*(one.state[f] for f in firsts), *results, *others))
+        for step, results in zip(steps, stored, strict=True):
+            others = [step.graph.constant(0.0) for _ in range(most - len(results))]
+            yield LoopStep(step.graph, (*(step.state[first] for first in first_of_slots), *results, *others))
 
     def _constants(self) -> Iterator[tuple[float, ...]]:
         """Give the constants of each link."""
@@ -204,23 +216,29 @@ class _Rolled:
         return list(dict.fromkeys(c for c in constants if any(x != c[0] for x in c)))
 
     def _traced_steps(self, start: Sequence[int]) -> tuple[list[int], list[_TracedStep]]:
-        """Trace the step for all kinds; return where in the loop's state each number of the state is, too.
+        """Trace the step for all kinds; return the slots, and the steps.
 
-        Numbers of the state that are equal in every link, such as both halves of a symmetric matrix, are one there:
-        those that begin equal are taken to be, until a step makes them differ.
+        The loop has a slot for numbers of the state that are equal in every link, such as both halves of a symmetric
+        matrix: those that begin equal share one, until a step makes them differ.
+
+        Returns:
+            The slot of each number of the state, and the step of each kind.
+
+        Source:
+            Alpern, Wegman & Zadeck (1988): equality is assumed and refined until every step confirms it.
         """
-        places = _numbered(start)
+        slots = _value_numbers(start)
         while True:
-            steps = [self._traced_step(k, places) for k in range(len(self.kinds))]
-            finer = _numbered(zip(places, *(one.state for one in steps), strict=True))
-            if finer == places:
-                return places, steps
-            places = finer
+            steps = [self._traced_step(k, slots) for k in range(len(self.kinds))]
+            finer = _value_numbers(zip(slots, *(step.state for step in steps), strict=True))
+            if finer == slots:
+                return slots, steps
+            slots = finer
 
-    def _traced_step(self, k: int, places: Sequence[int]) -> _TracedStep:
+    def _traced_step(self, k: int, slots: Sequence[int]) -> _TracedStep:
         kind, table = self.kinds[k], self.tables[k]
         graph = Graph()
-        state = graph.inputs(max(places, default=-1) + 1)
+        state = graph.inputs(max(slots, default=-1) + 1)
         traced = dict(zip(self.sequences, graph.inputs(len(self.sequences)), strict=True))
         constants = dict(zip(table, graph.inputs(len(table)), strict=True))
         numbers: list[Any] = []
@@ -230,7 +248,7 @@ class _Rolled:
             else:
                 numbers.append(constants.get(tuple(map(float, column)), column[0]))
         new, results = self.step(
-            _replaced(self.state, iter([state[p] for p in places])), *_replaced(kind.tree, iter(numbers))
+            _replaced(self.state, iter([state[slot] for slot in slots])), *_replaced(kind.tree, iter(numbers))
         )
         return _TracedStep(graph, _nodes(graph, new), _nodes(graph, results), results)
 
@@ -249,7 +267,7 @@ def _nodes(graph: Graph, tree: Tree) -> list[int]:
     return [graph.node(x) for x in _numbers(tree)]
 
 
-def _numbered(values: Iterable[Hashable]) -> list[int]:
-    """Return for each value the number of its like, in the order in which they come first."""
+def _value_numbers(values: Iterable[Hashable]) -> list[int]:
+    """Return a number for each value, the same for equal ones; new values are counted from 0."""
     known: dict[Hashable, int] = {}
     return [known.setdefault(value, len(known)) for value in values]
