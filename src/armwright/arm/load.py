@@ -10,6 +10,7 @@ import numpy as np
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
+from armwright.arm.solid_entries import solids_in
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
@@ -94,6 +95,7 @@ def read_arm(path: Path | str) -> Arm:
         gravity_from="stated" if stated else "standard",
         reach=number_in(hand, "reach", LENGTH, default=math.inf, positive=True),
         tool_speed=number_in(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
+        base_solids=solids_in(top, "base_solids"),
         base_link=top.text("base_link", default=""),
         tool_link=top.text("tool_link", default=""),
         source=top.text("source", default=""),
@@ -174,12 +176,14 @@ def _link(table: Table) -> Link:
         for key in ("mass_kg", "com_m", "inertia_kgm2"):
             if key in table:
                 raise table.error(key, "mass and inertia are declared unknown; specify either them or the reason")
+        solids = solids_in(table, "solids")
         table.refuse_unknown_keys()
-        return Link(unknown=unknown, name=name)
+        return Link(unknown=unknown, name=name, solids=solids)
     mass = table.number("mass_kg", default=0.0, lower=0.0)
     com = vector_in(table, "com", LENGTH, default=np.zeros(3))
     numbers = table.vector("inertia_kgm2", (3, 6), default=np.zeros(3))
     about = table.choice("inertia_about", ("com", "frame"), default="com")
+    solids = solids_in(table, "solids")
     table.refuse_unknown_keys()
     xx, yy, zz, xy, xz, yz = (*numbers, 0.0, 0.0, 0.0)[:6]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -188,7 +192,7 @@ def _link(table: Table) -> Link:
     moments = impossible_moments(mass, com, inertia)
     if moments is not None:
         raise table.error("inertia_kgm2", f"{moments_message(moments)}; check inertia_about and com")
-    return Link(mass=mass, com=com, inertia=inertia, name=name)
+    return Link(mass=mass, com=com, inertia=inertia, name=name, solids=solids)
 
 
 def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001

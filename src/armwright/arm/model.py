@@ -38,6 +38,7 @@ from armwright.errors import InvalidValueError, KindError, ShapeError, counted, 
 from armwright.notebook import html_table
 from armwright.spatial.poses import one_pose
 from armwright.spatial.rotations import exact_cosine, exact_sine
+from armwright.spatial.shapes import Solid
 
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
 # Who says which way an arm's gravity points: nobody, its file or its maker, the root of a URDF file, or the cell it
@@ -206,6 +207,10 @@ class Joint:
         return math.hypot(self.a, along) if self.fixed is None else along + float(np.linalg.norm(self.behind[:3, 3]))
 
 
+def _solids(value: Iterable[Solid]) -> tuple[Solid, ...]:
+    return _parts(value, Solid, "solids")
+
+
 @attrs.frozen(kw_only=True)
 class Link:
     """The body that a joint moves, described in the frame of the link.
@@ -218,6 +223,7 @@ class Link:
         unknown: why nothing is known of mass and inertia, which are 0 then; empty where they are known. Dynamics of
             an arm with such a link is refused.
         name: as its file calls it; empty where it has none.
+        solids: what of it meets other bodies, in the frame of the link; none where nothing is known.
     """
 
     mass: float = 0.0
@@ -226,6 +232,7 @@ class Link:
     complete: bool = attrs.field(default=True, eq=False)
     unknown: str = ""
     name: str = ""
+    solids: tuple[Solid, ...] = attrs.field(default=(), converter=_solids, eq=False)
 
     __reduce__ = reduce_by_fields
 
@@ -311,6 +318,7 @@ class Arm:
             where it points down in the root link of a URDF file, ``world`` in a cell.
         reach: greatest distance of the hand from the base axis that the report's speed rule divides by [m].
         tool_speed: speed of the hand at full reach [m/s].
+        base_solids: what of the base meets other bodies, in the base frame.
         base_link: what the base frame is called in its file; empty where it has no name.
         tool_link: what the tool is called.
         source: where the numbers come from.
@@ -336,6 +344,7 @@ class Arm:
     gravity_from: GravityFrom = attrs.field(default="standard", eq=False)
     reach: float = math.inf
     tool_speed: float = math.inf
+    base_solids: tuple[Solid, ...] = attrs.field(default=(), converter=_solids, eq=False)
     base_link: str = ""
     tool_link: str = ""
     source: str = ""

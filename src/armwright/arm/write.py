@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -18,6 +18,7 @@ from armwright.arm.tensors import impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
+from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 
 
 def toml_text(arm: Arm) -> str:
@@ -37,6 +38,7 @@ def _lines(arm: Arm) -> Iterator[str]:
     for key in ("title", "source", "base_link", "tool_link"):
         if getattr(arm, key):
             yield f"{key} = {_text(getattr(arm, key))}"
+    yield from _solids("base_solids", arm.base_solids)
     yield ""
     hand = {"reach_m": arm.reach, "speed_m_per_s": arm.tool_speed}
     yield from _table("hand", {key: value for key, value in hand.items() if math.isfinite(value)})
@@ -81,11 +83,40 @@ def _body(arm: Arm, i: int, link: Link) -> Iterator[str]:
     """Write the table of a link: its name, and its mass or why that is not known."""
     texts = {key: value for key, value in (("name", link.name), ("unknown", link.unknown)) if value}
     numbers = {} if link.unknown else _link(arm, i, link)
-    if texts or numbers:
+    if texts or numbers or link.solids:
         yield "[joint.link]"
         yield from (f"{key} = {_text(value)}" for key, value in texts.items())
         yield from _numbers(numbers)
+        yield from _solids("solids", link.solids)
         yield ""
+
+
+def _solids(key: str, solids: Sequence[Solid]) -> Iterator[str]:
+    """Write the solids of a body, one on a line."""
+    if solids:
+        yield f"{key} = ["
+        yield from (f"    {{{_solid(solid)}}}," for solid in solids)
+        yield "]"
+
+
+def _solid(solid: Solid) -> str:
+    values: dict[str, object] = {}
+    match solid.shape:
+        case Box(size=size):
+            kind, values["size_m"] = "box", size.tolist()
+        case Sphere(radius=radius):
+            kind, values["diameter_m"] = "sphere", 2 * radius
+        case Cylinder(radius=radius, length=length) | Capsule(radius=radius, length=length):
+            kind = "cylinder" if isinstance(solid.shape, Cylinder) else "capsule"
+            values["diameter_m"], values["length_m"] = 2 * radius, length
+        case Mesh():
+            raise InvalidValueError(f"an arm file cannot hold the triangles of the mesh '{solid.shape.name}'")
+    X = solid.pose + 0.0
+    if X[:3, 3].any():
+        values["xyz_m"] = X[:3, 3].tolist()
+    if not np.array_equal(X[:3, :3], np.eye(3)):
+        values["rotation"] = X[:3, :3].tolist()
+    return ", ".join([f'kind = "{kind}"', *(f"{name} = {value!r}" for name, value in values.items())])
 
 
 def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:

@@ -97,7 +97,8 @@ def _bits(value: object) -> object:
     if isinstance(value, tuple):
         return tuple(map(_bits, value))
     if attrs.has(kind := type(value)):
-        return kind.__qualname__, *(_bits(getattr(value, field.name)) for field in attrs.fields(kind))
+        # What does not count when values are compared is in no equation either.
+        return kind.__qualname__, *(_bits(getattr(value, field.name)) for field in attrs.fields(kind) if field.eq)
     return value.hex() if isinstance(value, float) else value
 
 

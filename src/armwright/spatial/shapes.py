@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, exact_shape, floats, positive, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError
+from armwright.spatial.poses import one_pose
 
 # No solid of a robot's surroundings is larger [m].
 LARGEST_SIZE = 1e3
@@ -130,6 +131,25 @@ class Mesh:
 
 
 Shape: TypeAlias = Box | Cylinder | Capsule | Sphere | Mesh
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Solid:
+    """A shape at a pose of some frame.
+
+    Attributes:
+        shape: its form.
+        pose: (4, 4) of the shape in the frame.
+    """
+
+    shape: Shape
+    pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+
+    __reduce__ = reduce_by_fields
+
+    def moved(self, X: Array) -> Solid:
+        """Return the solid seen from another frame, in which this one has the pose X (4, 4)."""
+        return attrs.evolve(self, pose=X @ self.pose)
 
 
 def is_closed(mesh: Mesh) -> bool:

@@ -116,12 +116,13 @@ def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:
     if unknown:
         return unknown[0]
     whole = _welded([body for body in bodies if body.mass or body.inertia.any()])
-    seen = carry(whole, inverse(X_BL))
+    solids = [solid for body in bodies for solid in body.solids]
+    seen = carry(attrs.evolve(whole, solids=solids), inverse(X_BL))
     # What has no mass has no centre of mass either; it is put at the origin.
     com = cleared(seen.com, size) if seen.mass else np.zeros(3)
     inertia = cleared(seen.inertia, float(np.abs(seen.inertia).max()))
     known = impossible_moments(seen.mass, com, inertia) is None
-    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known)
+    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known, solids=seen.solids)
 
 
 def _welded(bodies: Sequence[Link]) -> Link:
