@@ -1,0 +1,1 @@
+"""The world of a cell: distances between its bodies along motions, contact, gripper and camera."""
