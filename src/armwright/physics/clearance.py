@@ -13,15 +13,19 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.distances import TOLERANCE, Distances
 from armwright.spatial.shapes import Solid, farthest
+
+Numbers: TypeAlias = npt.NDArray[np.intp]
 
 # Pairs that may come closer by no more than this are decided by their distance [m].
 RESOLUTION = 0.5e-3
@@ -71,6 +75,14 @@ class Closest(NamedTuple):
     time: float
 
 
+class _Interval(NamedTuple):
+    """An interval of time, and the pairs of bodies that may meet on it."""
+
+    start: float
+    end: float
+    pairs: Numbers
+
+
 class ClearanceChecker:
     """The bodies of a cell, and which pairs of them may not meet."""
 
@@ -98,20 +110,18 @@ class ClearanceChecker:
         times = np.linspace(0.0, duration, _FIRST + 1)
         every = np.arange(len(self._pairs))
         # Intervals with the pairs that are left, the earliest last.
-        left = [(times[i], times[i + 1], every) for i in reversed(range(_FIRST))]
+        left = [_Interval(times[i], times[i + 1], every) for i in reversed(range(_FIRST))]
         while left:
             batch = [left.pop() for _ in range(min(_BATCH, len(left)))]
-            decided = self._decide(motions, batch, margin)
-            halves = []
-            for (start, end, _), (pairs, contact) in zip(batch, decided, strict=True):
-                if contact is not None:
-                    if not halves:
-                        return contact
-                    # Something may be earlier: it is looked at again when that is decided.
-                    pairs = np.append(pairs, self._number_of(contact.bodies))
+            halves: list[_Interval] = []
+            for interval, (near, contact) in zip(batch, self._decide(motions, batch, margin), strict=True):
+                if contact is not None and not halves:
+                    return contact
+                # Something may be earlier than a contact: it is looked at again when that is decided.
+                pairs = near if contact is None else np.append(near, self._number_of(contact.bodies))
                 if len(pairs):
-                    middle = (start + end) / 2
-                    halves += [(start, middle, pairs), (middle, end, pairs)]
+                    middle = (interval.start + interval.end) / 2
+                    halves += [_Interval(interval.start, middle, pairs), _Interval(middle, interval.end, pairs)]
             left += reversed(halves)
         return None
 
@@ -119,13 +129,13 @@ class ClearanceChecker:
         return int(np.flatnonzero((self._pairs == bodies).all(axis=1))[0])
 
     def _decide(
-        self, motions: Mapping[str, Trajectory], batch: Sequence[tuple[float, float, Array]], margin: float
-    ) -> list[tuple[Array, Closest | None]]:
+        self, motions: Mapping[str, Trajectory], batch: Sequence[_Interval], margin: float
+    ) -> list[tuple[Numbers, Closest | None]]:
         """Return for intervals the pairs that are left, and the closest of those that meet."""
-        starts, ends = (np.array([interval[k] for interval in batch]) for k in (0, 1))
+        starts, ends = np.array([x.start for x in batch]), np.array([x.end for x in batch])
         poses, moved = self._placed(motions, starts, ends)
         centres = poses[:, :, :3, 3]
-        results = []
+        results: list[tuple[Numbers, Closest | None]] = []
         for i, (start, end, pairs) in enumerate(batch):
             a, b = self._pairs[pairs].T
             closer = moved[i, a] + moved[i, b] + margin + TOLERANCE
@@ -159,32 +169,42 @@ class ClearanceChecker:
         for name, placed in self._arms.items():
             motion = motions[name]
             frames = placed.base @ placed.arm.link_poses(motion(middles))
-            turned = _largest_changes(motion, starts, ends)
+            changes = _largest_changes(motion, starts, ends)
             for number, body in enumerate(self._bodies):
                 if body.arm == name:
                     poses[:, number] = frames[:, body.link] @ body.solid.pose
-                    moved[:, number] = self._movement(placed.arm, number, body, frames, poses[:, number], turned)
+                    carried = frames[:, : body.link + 1]
+                    moved[:, number] = _movement(
+                        placed.arm.arm, carried, poses[:, number], self._radii[number], changes
+                    )
         for number, body in enumerate(self._bodies):
             if body.arm is None:
                 poses[:, number] = body.solid.pose
         return poses, moved
 
-    def _movement(self, arm: CompiledArm, number: int, body: Body, frames: Array, pose: Array, turned: Array) -> Array:
-        """Return upper bounds (k,) of how far a point of a body moves while joints move by so much (k, n).
 
-        The joints may be moved one after the other, the outermost first: then each axis is where it was, and the body
-        is as much farther from it as it has been moved before.
-        """
-        total = np.zeros(len(frames))
-        for i in reversed(range(body.link)):
-            if arm.arm.joints[i].revolute:
-                axis = frames[:, i, :3, 2]
-                arm_of = pose[:, :3, 3] - frames[:, i, :3, 3]
-                across = np.linalg.norm(arm_of - (arm_of * axis).sum(axis=1)[:, None] * axis, axis=1)
-                total = total + turned[:, i] * (across + self._radii[number] + total)
-            else:
-                total = total + turned[:, i]
-        return total
+def _movement(arm: Arm, frames: Array, pose: Array, radius: float, changes: Array) -> Array:
+    """Return upper bounds (k,) of how far a point of a body moves while joints move.
+
+    The joints may be moved one after the other, the outermost first: then each axis is where it was, and the body is as
+    much farther from it as it has been moved before.
+
+    Args:
+        arm: that carries the body.
+        frames: (k, l + 1, 4, 4) poses of the frames up to that of the link that carries it.
+        pose: (k, 4, 4) of the body.
+        radius: of the body about its origin [m].
+        changes: (k, n) how far each joint moves [rad] or [m].
+    """
+    total = np.zeros(len(frames))
+    for i in reversed(range(frames.shape[1] - 1)):
+        lever: Array = np.ones(len(frames))
+        if arm.joints[i].revolute:
+            axis, away = frames[:, i, :3, 2], pose[:, :3, 3] - frames[:, i, :3, 3]
+            across = away - (away * axis).sum(axis=1)[:, None] * axis
+            lever = np.linalg.norm(across, axis=1) + radius + total
+        total = total + changes[:, i] * lever
+    return total
 
 
 def _largest_changes(motion: Trajectory, starts: Array, ends: Array) -> Array:
@@ -192,7 +212,6 @@ def _largest_changes(motion: Trajectory, starts: Array, ends: Array) -> Array:
     peaks = motion.segment_peaks(1)
     first = np.clip(np.searchsorted(motion.times, starts, side="right") - 1, 0, len(peaks) - 1)
     last = np.clip(np.searchsorted(motion.times, ends, side="left") - 1, 0, len(peaks) - 1)
-    fastest = np.array(
-        [peaks[i : j + 1].max(axis=0) for i, j in zip(first.tolist(), np.maximum(first, last).tolist(), strict=True)]
-    )
+    spans = zip(first.tolist(), np.maximum(first, last).tolist(), strict=True)
+    fastest = np.array([peaks[i : j + 1].max(axis=0) for i, j in spans])
     return np.asarray(fastest * ((ends - starts) / 2)[:, None])
