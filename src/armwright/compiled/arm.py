@@ -540,6 +540,7 @@ class CompiledArm:
             UnknownNameError: no such function.
             UnsupportedArmError: the arm has no such function.
         """
+        # Of two threads each may make one: they are alike, and compile once between them.
         if quantity not in self._kernels:
             self._kernels[quantity] = quantity_kernel(self.arm, quantity, self._origin, quickly=self.quickly)
         return self._kernels[quantity]
