@@ -40,7 +40,10 @@ class Loops(Protocol):
         """Return ``count`` new tables of what a body returns for each tuple of indices; not within a loop."""
 
     def fill(self, tables: Sequence[Table], sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]]) -> None:
-        """Write into tables what a body returns for each tuple of indices; not within a loop."""
+        """Write into tables what a body returns for each tuple of indices; not within a loop.
+
+        The body may read the tables at its own indices only: which of the others are written before is not defined.
+        """
 
     def table(self, *sizes: Scalar) -> Table:
         """Return a new table of so many numbers along each axis; not within a loop."""
