@@ -15,7 +15,7 @@ from numba import njit
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
-from armwright.compiled.arm import CompiledArm, compile_arm, planning_arm
+from armwright.compiled.arm import CompiledArm, can_be_compiled, compile_arm, planning_arm
 from armwright.compiled.quantities import emit_quantity, quantity_names
 from armwright.dynamics.accelerations import forward_dynamics
 from armwright.dynamics.derivatives import forward_dynamics_derivatives, inverse_dynamics_derivatives
@@ -391,6 +391,7 @@ def test_without_memory_for_code(monkeypatch: pytest.MonkeyPatch) -> None:
     if CAN_BE_LINKED:
         with pytest.warns(CompilerWarning, match="refuses memory that can be executed"):
             assert planning_arm(arm) is arm
+        assert not can_be_compiled()
 
 
 def test_arms_that_differ_in_the_sign_of_a_zero() -> None:

@@ -8,10 +8,12 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits, Link
+from armwright.compiled.arm import compile_arm
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certified_motion import CertifiedMotion, joined, limit_peaks
+from armwright.motion.solver import AnyArm
 from armwright.motion.straight import straight_line
 from armwright.motion.trajectory import Trajectory
 
@@ -127,3 +129,18 @@ def test_configurations_nearest_first(rng: np.random.Generator) -> None:
         assert len(found) > 1
         assert (np.diff(away) >= -1e-9).all()
         np.testing.assert_allclose(found[0], q, atol=1e-6)
+
+
+@pytest.mark.parametrize("arm", [PUMA, compile_arm(PUMA)], ids=["plain", "compiled"])
+def test_joints_that_stand_have_no_friction(arm: AnyArm) -> None:
+    """The velocities of joints that stand are rounding, whose sign would give them Coulomb friction."""
+    turned = np.zeros((1, 4, PUMA.n))
+    turned[0, 0] = START
+    turned[0, 2:, 4] = 0.3, -0.2
+    trembling = turned.copy()
+    trembling[0, 1, :4] = 1e-16, -1e-15, 1e-16, 1e-14
+    still, rounded = (
+        limit_peaks(arm, Trajectory(times=[0.0, 1.0], coefficients=each))["effort"] for each in (turned, trembling)
+    )
+
+    np.testing.assert_allclose(rounded, still, rtol=1e-9)

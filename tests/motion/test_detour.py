@@ -47,6 +47,21 @@ def test_the_line_names_the_cause(through_the_wrist: tuple[Array, Array]) -> Non
     assert 0 < stopped.value.fraction < 1
 
 
+def test_a_detour_without_memory_for_code(
+    through_the_wrist: tuple[Array, Array], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the system refuses memory for code, a detour is found with the plain functions."""
+    arm = load_arm("puma560-seed")
+    compiled = line_or_detour(arm, *through_the_wrist, method="damped")
+    monkeypatch.setattr("armwright.motion.detour.can_be_compiled", lambda: False)
+    monkeypatch.setattr("armwright.motion.detour.compile_arm", None)
+
+    plain = line_or_detour(arm, *through_the_wrist, method="damped")
+
+    assert plain.method == "damped"
+    assert plain.trajectory.duration == pytest.approx(compiled.trajectory.duration)
+
+
 @pytest.mark.parametrize("by", ["via", "damped"])
 def test_a_detour(through_the_wrist: tuple[Array, Array], by: str) -> None:
     """By a via pose and by damped rates the tool gets there, inside all limits, at a price that the report states."""

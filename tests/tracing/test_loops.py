@@ -370,3 +370,64 @@ def test_root_of_a_negative_number(run: Runner) -> None:
     (found,) = run(_written_roots, [x], x.shape)
 
     np.testing.assert_array_equal(found, [0, 0, 0, 0, 2])
+
+
+def _chosen_indices(loops: Loops, x: Table, *results: Table) -> None:
+    chosen, carried, either = results
+    first = x[0]
+    loops.fill([chosen], chosen.shape, lambda i: [x[select(first < 0.0, i, i + 1)]])
+    loops.fill([carried], carried.shape, lambda i: [x[loops.walk(2, (i,), lambda _, at: (at + 1,))[0]]])
+    loops.fill([either], either.shape, lambda i: [x[loops.when(first < 0.0, lambda: (i,), lambda: (i + 3,))[0]]])
+
+
+def test_chosen_and_carried_indices(run: Runner) -> None:
+    """An index may be chosen between two, or carried: such numbers are taken one by one."""
+    x = np.arange(12.0)
+
+    chosen, carried, either = run(_chosen_indices, [x], (9,), (9,), (9,))
+
+    np.testing.assert_array_equal(chosen, x[1:10])
+    np.testing.assert_array_equal(carried, x[2:11])
+    np.testing.assert_array_equal(either, x[3:12])
+
+
+def test_columns_by_index() -> None:
+    """A part of a table that is another for each number of the innermost loop is no vector."""
+
+    def routine(loops: Loops, x: Table, result: Table) -> None:
+        loops.fill([result], result.shape, lambda j: [x.part(1, j)[1]])
+
+    x, result = np.arange(12.0).reshape(3, 4), np.empty(4)
+
+    loops._by_addresses(function_address(EmittedLoops(4).module(routine, [2, 1]), "routine"), x, result)
+
+    np.testing.assert_array_equal(result, x[1])
+
+
+def _turned(loops: Loops, x: Table, sums: Table) -> None:
+    rows, columns, depth = x.shape
+    loops.fill([sums], [columns, rows], lambda j, i: [loops.largest(depth, lambda k: x[i, j, k])])
+
+
+def test_axes_in_any_order(run: Runner, rng: np.random.Generator) -> None:
+    """Loops may run over the axes of a table in any order, also where the innermost one stays the last."""
+    x = rng.normal(size=(3, 4, 5))
+
+    np.testing.assert_array_equal(run(_turned, [x], (4, 3))[0], x.max(axis=2).T)
+
+
+def _all_but_nine(loops: Loops, x: Table, result: Table) -> None:
+    loops.fill([result], [result.shape[0] - 9], lambda i: [x[i] + loops.number(i)])
+
+
+@pytest.mark.parametrize("lanes", [2, 4])
+def test_less_than_nothing_to_fill(lanes: int) -> None:
+    """A size below 0 is a loop without steps, and not one that hardly ends."""
+    routine = function_address(EmittedLoops(lanes).module(_all_but_nine, [1, 1]), "routine")
+    x, result = np.ones(10), np.full(10, -7.0)
+
+    loops._by_addresses(routine, x, result[:1])
+    assert (result == -7.0).all()
+
+    loops._by_addresses(routine, x, result)
+    assert result[:2].tolist() == [1.0, -7.0]

@@ -64,13 +64,18 @@ def compile_arm(arm: Arm, *, device: str | None = None, quickly: bool = False) -
     return compiled
 
 
+def can_be_compiled() -> bool:
+    """Whether the system allows memory for compiled code, as far as that is known before."""
+    return not CAN_BE_LINKED or can_be_placed()
+
+
 def planning_arm(arm: Arm) -> CompiledArm | Arm:
     """Return what to plan a short program of an arm with: the arm compiled quickly, or itself where nothing can be.
 
     Warns:
         CompilerWarning: the system refuses memory for compiled code.
     """
-    if not CAN_BE_LINKED or can_be_placed():
+    if can_be_compiled():
         return compile_arm(arm, quickly=True)
     warnings.warn(
         "this system refuses memory that can be executed (execmem of SELinux), so equations are not compiled; planning "
@@ -541,6 +546,7 @@ class CompiledArm:
             UnknownNameError: no such function.
             UnsupportedArmError: the arm has no such function.
         """
+        # Of two threads each may make one: they are alike, and compile once between them.
         if quantity not in self._kernels:
             self._kernels[quantity] = quantity_kernel(self.arm, quantity, self._origin, quickly=self.quickly)
         return self._kernels[quantity]

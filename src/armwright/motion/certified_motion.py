@@ -24,7 +24,7 @@ from armwright.tracing.scalar import Scalar, select
 # Efforts are sampled so often along a motion, and at the ends and in the middle of every segment, as the first ones of
 # a motion are short; those that come as near to a limit as this part of it are sampled closely.
 _SAMPLES, _NEAR = 101, 0.8
-# A joint that moves at less than this part of its top speed stands.
+# A joint that moves at less than this part of the top speed of all stands.
 _STANDS = 1e-9
 
 
@@ -253,8 +253,9 @@ def _sampled_states(loops: Loops, *tables: Table) -> None:
     written(even, times, lambda i: loops.segment(times, times[i], m))
     written(even + m + 1, middles, lambda i: i + 0)
     # The sign of the speed of a joint that stands is rounding, and would give it Coulomb friction.
-    (top,) = loops.each([n], lambda j: [loops.largest(even + 2 * m + 1, lambda i: abs(qd[i, j]))])
-    (moving,) = loops.each(qd.shape, lambda i, j: [select(abs(qd[i, j]) > _STANDS * top[j], qd[i, j], 0.0)])
+    (tops,) = loops.each([n], lambda j: [loops.largest(even + 2 * m + 1, lambda i: abs(qd[i, j]))])
+    fastest = loops.largest(n, lambda j: tops[j])
+    (moving,) = loops.each(qd.shape, lambda i, j: [select(abs(qd[i, j]) > _STANDS * fastest, qd[i, j], 0.0)])
     loops.fill([qd], qd.shape, lambda i, j: [moving[i, j]])
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike
-from armwright.compiled.arm import compile_arm
+from armwright.compiled.arm import can_be_compiled, compile_arm
 from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.forward_kinematics import forward
@@ -162,7 +162,7 @@ def line_or_detour(
     if requested is None or (method == "damped" and obstacle.cause == "reach"):
         raise obstacle
     # So many poses are asked for in a search that it is worth compiling the arm for it.
-    arm = compile_arm(solver.arm) if isinstance(arm, Arm) else arm
+    arm = compile_arm(solver.arm) if isinstance(arm, Arm) and can_be_compiled() else arm
     detour = _damped(arm, requested, q, damping, obstacle) if method == "damped" else None
     if method == "via":
         detour = _by_via(arm, requested, q, obstacle, allowed=allowed, speed=speed)

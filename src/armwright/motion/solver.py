@@ -66,6 +66,8 @@ def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:
     """
     first, *others = inputs
     lead = first.shape[:-axes]
+    if len(lead) == 1 and all(x.shape[:-1] == lead for x in others):
+        return getattr(arm, name)(*inputs)
     rows = [x.reshape(-1, x.shape[-1]) if x.shape[:-1] == lead else _repeated(x, lead) for x in others]
     results = getattr(arm, name)(first.reshape(-1, *first.shape[-axes:]), *rows)
     if isinstance(results, tuple):

@@ -11,7 +11,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
-from armwright.kinematics.inverse_kinematics.solution import violations
+from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.motion.certified_motion import CertifiedMotion, fastest, standstill
 from armwright.motion.obstruction import PathError
 from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, check_reach, report_speed, report_step
@@ -96,7 +96,7 @@ def certified_line(
     """
     solver = solver_of(arm)
     q, B = single_configuration(solver.arm, q_start, "q_start"), exact_pose(X_goal)
-    for violation in violations(solver.arm, q):
+    for violation in violations_of(solver.arm, q.tolist()):
         reason = str(violation)
         raise PathError("limits", 0, 0.0, f"at the start {reason}", joint=violation.joint, reason=reason)
     A = np.asarray(solver.forward(q))

@@ -161,8 +161,8 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
         float(run.along.max()),
         grid.allowed / float(run.times[-1]),
     )
-    slower = over ** -np.arange(terms.shape[1], dtype=np.float64)
-    trajectory = Trajectory.of_planner(run.times * over, terms * slower[:, None])
+    terms *= (over ** -np.arange(terms.shape[1], dtype=np.float64))[:, None]
+    trajectory = Trajectory.of_planner(run.times * over, terms)
     factor = trajectory.duration / _allowed(grid.even + _RAMP)
     because = _binding(arm.n, run) if factor > 1 else None
     return TimedPath(trajectory, factor, because, run, speed / over, acceleration / over**2)

@@ -88,7 +88,7 @@ class EmittedLoops:
             condition, *choices = values
             kind = self._common(choices)
             by = self._truths if condition.kind == self._truths else "i1"
-            if by == self._truths and kind in ("i64", _LANES):
+            if kind == _LANES or (by == self._truths and kind == "i64"):
                 raise _NotSideBySideError
             if by == self._truths and kind in ("double", "i1"):
                 kind = self._vector_of(kind)
@@ -185,6 +185,13 @@ class EmittedLoops:
     def _kind(self, x: Scalar) -> str:
         return self._values[self.node(x)].kind
 
+    def _one_by_one(self, values: Sequence[Scalar]) -> list[str]:
+        """Return the types of values that come from one of several blocks, which indices side by side cannot."""
+        kinds = [self._kind(x) for x in values]
+        if _LANES in kinds:
+            raise _NotSideBySideError
+        return kinds
+
     # ---- loops ----
 
     def each(
@@ -233,7 +240,7 @@ class EmittedLoops:
         mark = len(self._lines), len(self._values), self._block, self._depth
         length = self._text(size, "i64")
         shift = self._width.bit_length() - 1
-        vectors = self._name(f"lshr i64 {self._name(f'add i64 {length}, {self._width - 1}')}, {shift}")
+        vectors = self._name(f"ashr i64 {self._name(f'add i64 {length}, {self._width - 1}')}, {shift}")
 
         def step(k: Scalar) -> tuple[()]:
             first = self._name(f"shl i64 {self._text(k, 'i64')}, {shift}")
@@ -416,7 +423,7 @@ class EmittedLoops:
         """Write a loop; what is carried has its own types, or given ones."""
         self._count += 1
         name = f"loop{self._count}"
-        kinds = kinds or [self._kind(x) for x in carry]
+        kinds = kinds or self._one_by_one(carry)
         mark = len(self._lines), len(self._values), self._block
         starts, length = [self._text(x, kind) for x, kind in zip(carry, kinds, strict=True)], self._text(size, "i64")
         first = self._name(f"sub i64 {length}, 1") if reverse else "0"
@@ -461,7 +468,7 @@ class EmittedLoops:
         self._jump(f"br i1 {self._text(condition, 'i1')}, label %{name}_a, label %{name}_b", f"{name}_a")
         self._depth += 1
         first = then()
-        kinds = [self._kind(x) for x in first]
+        kinds = self._one_by_one(first)
         a, a_end = [self._text(x, kind) for x, kind in zip(first, kinds, strict=True)], self._block
         self._jump(f"br label %{name}", f"{name}_b")
         b, b_end = [self._text(x, kind) for x, kind in zip(otherwise(), kinds, strict=True)], self._block
@@ -591,6 +598,8 @@ class EmittedTable:
 
     def part(self, axis: int, k: Scalar) -> EmittedTable:
         """Return the table without an axis, at one place of it."""
+        if self._loops._kind(k) == _LANES:  # noqa: SLF001 - of one module
+            raise _NotSideBySideError
         pointer = self._address((*[0] * axis, k, *[0] * (len(self._lengths) - axis - 1)))
         lengths, strides = (list(x[:axis]) + list(x[axis + 1 :]) for x in (self._lengths, self._strides))
         return EmittedTable(self._loops, pointer, lengths, strides)

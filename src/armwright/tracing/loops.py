@@ -40,7 +40,10 @@ class Loops(Protocol):
         """Return ``count`` new tables of what a body returns for each tuple of indices; not within a loop."""
 
     def fill(self, tables: Sequence[Table], sizes: Sequence[Scalar], body: Callable[..., Sequence[Scalar]]) -> None:
-        """Write into tables what a body returns for each tuple of indices; not within a loop."""
+        """Write into tables what a body returns for each tuple of indices; not within a loop.
+
+        The body may read the tables at its own indices only: which of the others are written before is not defined.
+        """
 
     def table(self, *sizes: Scalar) -> Table:
         """Return a new table of so many numbers along each axis; not within a loop."""
@@ -263,12 +266,12 @@ class _PlainTable:
             return self._items[key]
         if type(key) is slice:
             return self.array[key]
-        lengths, places, last, in_order = [1] * _AXES, [], -1, True
+        lengths, places, axes = [1] * _AXES, [], list[int]()
         for index in key if type(key) is tuple else (key,):
             kind = type(index)
             if kind is _Index:
-                axis = index.axis
-                lengths[axis], last, in_order = index.size, axis, in_order and axis > last
+                lengths[index.axis] = index.size
+                axes.append(index.axis)
                 places.append(index.places)
             elif kind is np.ndarray:
                 return self._gathered(key if type(key) is tuple else (key,))
@@ -278,7 +281,8 @@ class _PlainTable:
                 places.append(index)
         values = self.array[tuple(places)]
         # An inner loop may run over an axis of the table before that of an outer one.
-        return (values if in_order else values.T).reshape(lengths)
+        in_order = sorted(axes)
+        return (values if axes == in_order else values.transpose([axes.index(k) for k in in_order])).reshape(lengths)
 
     def _gathered(self, key: tuple[Any, ...]) -> Any:
         """Return the elements at places that differ from index to index."""

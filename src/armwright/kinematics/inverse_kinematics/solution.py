@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import attrs
 
@@ -169,9 +169,13 @@ class NoSolutionError(ArmwrightError, ValueError):
 
 def violations(arm: Arm, q: ArrayLike) -> tuple[Violation, ...]:
     """Return the joints that one configuration (n,) puts outside their limits, in order."""
-    q = joint_array(q, arm.n)
+    return violations_of(arm, joint_array(q, arm.n).tolist())
+
+
+def violations_of(arm: Arm, positions: Sequence[float]) -> tuple[Violation, ...]:
+    """Return the same of n joint positions that have been checked."""
     violated = []
-    for i, (joint, value) in enumerate(zip(arm.joints, q.tolist(), strict=True), 1):
+    for i, (joint, value) in enumerate(zip(arm.joints, positions, strict=True), 1):
         limit = min(max(value, joint.limits.lower), joint.limits.upper)
         if abs(value - limit) > _AT_LIMIT * max(1.0, abs(limit)):
             violated.append(Violation(joint=i, value=value, limit=limit, revolute=joint.revolute, name=joint.name))
