@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from armwright.arm.solid_entries import shape_in
 from armwright.cell.entries import read_name, read_pose, refuse_too_many
 from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, Spread, table
-from armwright.errors import ArmwrightError
 from armwright.files.document import Table
-from armwright.spatial.shapes import LARGEST_SIZE, Box, Cylinder, Shape, Sphere
+from armwright.spatial.shapes import LARGEST_SIZE
 
 # A coefficient of friction beyond this is that of glue.
 _MAX_FRICTION = 10.0
@@ -35,7 +35,7 @@ def read_fixtures(scene: Table) -> dict[str, Fixture]:
             name = read_name(entry, "name", fixtures, entry.text("name"))
             fixtures[name] = Fixture(
                 name=name,
-                shape=_shape(entry, {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere"}[kind]),
+                shape=shape_in(entry, {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere"}[kind]),
                 pose=read_pose(entry, "at"),
                 friction=_friction(entry),
             )
@@ -83,7 +83,7 @@ def read_parts(parts: Table) -> dict[str, Part]:
         entry.allow("marker")
         result[name] = Part(
             name=name,
-            shape=_shape(entry, entry.choice("shape", _SHAPES, default="box")),
+            shape=shape_in(entry, entry.choice("shape", _SHAPES, default="box")),
             mass=entry.number("mass_kg", lower=1e-6, upper=_MAX_MASS),
             friction=_friction(entry),
             pose=read_pose(entry, "at"),
@@ -123,22 +123,6 @@ def read_gripper(entry: Table) -> Gripper:
     )
     entry.refuse_unknown_keys()
     return gripper
-
-
-def _shape(entry: Table, kind: str) -> Shape:
-    """Read a solid; the keys of the other kinds are known, so that a message can name them."""
-    entry.allow("size_mm", "diameter_mm", "height_mm")
-    try:
-        if kind == "box":
-            return Box(size=entry.vector("size_mm", 3) * 1e-3)
-        radius = entry.positive("diameter_mm") * 0.5e-3
-        return (
-            Sphere(radius=radius)
-            if kind == "sphere"
-            else Cylinder(radius=radius, length=entry.positive("height_mm") * 1e-3)
-        )
-    except ArmwrightError as error:
-        raise error if hasattr(error, "path") else entry.error(None, str(error)) from error
 
 
 def _friction(entry: Table, default: float = 0.8) -> float:

@@ -1,0 +1,121 @@
+"""The scene, the parts and the grippers of cell files: what they mean, and what is said of their mistakes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.cell.model import Cell
+from armwright.cell.reader import read_cell
+from armwright.errors import FileFormatError
+from armwright.spatial.shapes import Box, Cylinder, Sphere
+
+ARM = """[arms.ARM_1]
+hand = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.25]
+"""
+HERE = "[1,0,0, 0,1,0, 0,0,1, 0.5,0.1,0.2]"
+
+
+def cell(folder: Path, text: str) -> Cell:
+    (folder / "cell.toml").write_text(f"{ARM}{text}", encoding="utf-8")
+    return read_cell(folder / "cell.toml")
+
+
+def test_a_scene(tmp_path: Path) -> None:
+    """A table is a box whose top is where it says; other bodies are about their poses, in metres."""
+    fixtures = cell(
+        tmp_path,
+        f"""[scene]
+table = {{ z = 0.03, from = [0.15, 0.7], to = [1.35, -0.5], thickness_mm = 40 }}
+boxes = [{{ name = "nest", at = {HERE}, size_mm = [24, 30, 100], friction = 0.3 }}]
+cylinders = [{{ name = "POST", at = {HERE}, diameter_mm = 60, length_mm = 800 }}]
+spheres = [{{ name = "BALL", at = {HERE}, diameter_mm = 50 }}]
+""",
+    ).fixtures
+
+    assert list(fixtures) == ["TABLE", "NEST", "POST", "BALL"]
+    table, nest = fixtures["TABLE"], fixtures["NEST"]
+    assert isinstance(table.shape, Box)
+    assert isinstance(nest.shape, Box)
+    np.testing.assert_allclose(table.shape.size, (1.2, 1.2, 0.04), atol=1e-15)
+    np.testing.assert_allclose(table.pose[:3, 3], (0.75, 0.1, 0.01), atol=1e-15)
+    np.testing.assert_allclose(nest.shape.size, (0.024, 0.03, 0.1), atol=1e-15)
+    np.testing.assert_array_equal(nest.pose[:3, 3], (0.5, 0.1, 0.2))
+    assert (table.friction, nest.friction) == (0.8, 0.3)
+    assert fixtures["POST"].shape == Cylinder(radius=0.03, length=0.8)
+    assert fixtures["BALL"].shape == Sphere(radius=0.025)
+
+
+def test_parts(tmp_path: Path) -> None:
+    """A part has mass, friction, grasp, marker and symmetry; the camera answers with it."""
+    read = cell(
+        tmp_path,
+        f"""[parts.Block]
+size_mm = [40, 40, 40]
+mass_kg = 0.2
+at = {HERE}
+spread_mm = 30
+spread_deg = 90
+grasp = [1,0,0, 0,-1,0, 0,0,-1, 0,0,0.01]
+marker = {{ id = 3, size_mm = 30, at = [1,0,0, 0,1,0, 0,0,1, 0,0,0.02] }}
+symmetry = 4
+[visions]
+OBJ = {{ part = "block" }}
+OLD = [{HERE}]
+""",
+    )
+    block = read.parts["BLOCK"]
+
+    assert (block.mass, block.friction, block.symmetry) == (0.2, 0.8, 4)
+    assert (block.spread.position, block.spread.yaw) == (0.03, pytest.approx(np.pi / 2))
+    assert block.grasp[2, 3] == 0.01
+    assert block.marker is not None
+    assert (block.marker.number, block.marker.size, block.marker.pose[2, 3]) == (3, 0.03, 0.02)
+    assert read.seen_parts == {"OBJ": "BLOCK"}
+    assert list(read.visions) == ["OLD"]
+
+
+def test_grippers(tmp_path: Path) -> None:
+    """A gripper has a kind, a force and an opening; without the table nothing is known of it."""
+    (tmp_path / "one").mkdir()
+
+    gripper = (
+        cell(tmp_path, '[arms.ARM_1.gripper]\nkind = "suction"\nforce_N = 45\nopening_mm = 60\n').arms["ARM_1"].gripper
+    )
+
+    assert gripper is not None
+    assert (gripper.kind, gripper.force, gripper.opening, gripper.friction) == ("suction", 45, 0.06, 1.0)
+    assert cell(tmp_path / "one", "").arms["ARM_1"].gripper is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[scene]\ntable = { z = 0, from = [0, 0], to = [0, 1] }\n", "to: the corners of a table must differ in x and"),
+        ("[scene]\ntable = { from = [0, 0], to = [1, 1] }\n", "scene, table, z: missing, expected a number"),
+        (f'[scene]\nboxes = [{{ name = "A", at = {HERE} }}]\n', "boxes 1: missing, expected size_mm or size_m"),
+        (f'[scene]\nspheres = [{{ name = "A B", at = {HERE}, diameter_mm = 1 }}]\n', "'A B' cannot name a frame"),
+        ("[scene]\nboxs = []\n", "boxs: unknown key; did you mean 'boxes'?"),
+        (f"[parts.A]\nsize_mm = [1, 1, 1]\nat = {HERE}\n", "parts, A, mass_kg: missing, expected a number"),
+        ('[parts.A]\nshape = "ball"\n', "expected one of box, cylinder, sphere, got the text 'ball'"),
+        (
+            "\n".join(
+                f"[parts.{name}]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\nmarker = {{ id = 7, size_mm = 9 }}"
+                for name in "AB"
+            ),
+            "parts, B, marker, id: A and B have the same marker 7",
+        ),
+        (
+            f"[parts.A]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\nsymmetry = 1.5\n",
+            "symmetry: expected a whole number, got 1.5",
+        ),
+        ('[visions]\nOBJ = { part = "BLOK" }\n', "OBJ, part: BLOK is not a part of the cell"),
+        ("[arms.ARM_1.gripper]\nforce_N = 0\n", "gripper, force_N: expected 0.001 to 100000, got 0"),
+    ],
+)
+def test_mistakes(text: str, message: str, tmp_path: Path) -> None:
+    """Every mistake is told with its table and its key."""
+    with pytest.raises(FileFormatError) as caught:
+        cell(tmp_path, text)
+
+    assert message in str(caught.value)
