@@ -103,7 +103,7 @@ def test_grippers(tmp_path: Path) -> None:
                 f"[parts.{name}]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\nmarker = {{ id = 7, size_mm = 9 }}"
                 for name in "AB"
             ),
-            "parts, B, marker, id: A and B have the same marker 7",
+            "parts, B, marker, id: the parts A and B have the same marker 7",
         ),
         (
             f"[parts.A]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\nsymmetry = 1.5\n",
