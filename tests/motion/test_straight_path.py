@@ -34,7 +34,7 @@ def test_a_tool_beyond_an_end(run: Runner, along: float) -> None:
     angle, one = 0.2, np.ones(1)
     seen = np.array([[[0.0, along, 0.0, 0.0]] * 2])
     poses = np.broadcast_to(np.eye(4), (1, 2, 4, 4)).copy()
-    inputs = [np.array([[0.0, 0.1]]), poses, seen, 0.1 * one, *[0 * one] * 6, angle * one, one]
+    inputs = [np.array([[0.0, 0.1]]), poses, seen, 0.1 * one, *[0 * one] * 5, angle * one, one]
 
     _, sines, *_ = run(_errors, inputs, (1,), (2, 1), (1,), (1,), (1,))
 
@@ -48,7 +48,7 @@ def test_a_tool_that_gathers_speed(run: Runner) -> None:
     angle, one = 0.3, np.ones(1)
     sampled = np.array([[[0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]])
     poses = np.broadcast_to(np.eye(4), (1, 2, 4, 4)).copy()
-    inputs = [np.array([[0.0, 1.0]]), poses, sampled, one, 2 * one, *[0 * one] * 5, angle * one, one]
+    inputs = [np.array([[0.0, 1.0]]), poses, sampled, one, 2 * one, *[0 * one] * 4, angle * one, one]
 
     _, sines, *_ = run(_errors, inputs, (1,), (2, 1), (1,), (1,), (1,))
 

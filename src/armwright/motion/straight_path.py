@@ -98,13 +98,9 @@ class StraightPath:
         """Of the rotations on the segments, (k, 3)."""
         return np.asarray(self.rotations / np.where(self._angles > 0, self._angles, 1.0)[:, None])
 
-    def _segment_at(self, t: Array) -> SegmentNumbers:
-        """Return the numbers of the segments (...) at times (...)."""
-        return segments_at(self.corners, t, len(self.numbers))
-
     def _along(self, t: Array) -> tuple[SegmentNumbers, Array]:
         """Return the numbers of the segments (...) at times (...), and the fractions of them."""
-        segment = self._segment_at(t)
+        segment = segments_at(self.corners, t, len(self.numbers))
         starts, inside = self.progress.times, np.minimum(np.maximum(t, 0.0), self.progress.duration)
         piece = segments_at(starts, inside, len(self.progress.coefficients))
         c0, c1, c2, c3 = self.progress.coefficients[piece, :, 0].T
@@ -121,7 +117,7 @@ class StraightPath:
         """Return bounds of the error on the intervals between times: the distance from a straight segment is convex."""
         m = len(times) - 1
         inputs = [times, *tool, self._on_line, self.corners, self._angles, self.progress.times]
-        rotation, *progress = run(_bounds, [*inputs, self.progress.coefficients[:, :, 0]], *[(m,)] * 5)
+        rotation, *progress = run(_bounds, [*inputs, self.progress.coefficients[:, :, 0]], *[(m,)] * 4)
         return ErrorBounds(tool.acceleration, rotation, progress)
 
     def error(self, samples: ToolSamples) -> TrackingError:
@@ -176,9 +172,9 @@ def _at(loops: Loops, times: Table, terms: Table, t: Scalar) -> tuple[list[Scala
 def _bounds(loops: Loops, *tables: Table) -> None:
     """Write bounds of the error on intervals: see ``StraightPath.bounds``.
 
-    Written are a bound of the second derivative of the sine of half the angle; and the segment, upper bounds of the
-    rate of progress and its change, and the angle of the rotation on the segment. Each interval lies within one cubic
-    of the progress, whose second derivative is largest at an end of the interval.
+    Written are a bound of the second derivative of the sine of half the angle; and upper bounds of the rate of progress
+    and its change, and the angle of the rotation on the segment. Each interval lies within one cubic of the progress,
+    whose second derivative is largest at an end of the interval.
     """
     times, a_tool, omega, alpha, on_line, corners, angles, starts, terms, *written = tables
     m, line = written[0].shape[0], on_line[0]
@@ -196,7 +192,7 @@ def _bounds(loops: Loops, *tables: Table) -> None:
         by_tool = a_tool[i] / select(line > 0, line, 1.0)
         nearest = half_angle_bound(omega[i], alpha[i], angle * by_tool, angle * fast)
         both = select(line > 0, larger(planned, nearest), planned)
-        return [both, loops.number(segment), fast, bend, angle]
+        return [both, fast, bend, angle]
 
     loops.fill(written, [m], of_interval)
 
@@ -230,8 +226,8 @@ def _errors(loops: Loops, *tables: Table) -> None:
     Written are bounds of the distance, bounds of the sine of half the angle and the largest one at the samples, the
     largest distance there, when that is, and how far the tool runs back.
     """
-    times, poses, sampled, steps, a_tool, omega, alpha, _, rates, changes, angles, on_line = tables[:12]
-    position, sines, largest, at, facts = tables[12:]
+    times, poses, sampled, steps, a_tool, omega, alpha, rates, changes, angles, on_line = tables[:11]
+    position, sines, largest, at, facts = tables[11:]
     (m, each), line = times.shape, on_line[0]
     length = select(line > 0, line, 1.0)
     rows = poses.shaped(m * each, 16)

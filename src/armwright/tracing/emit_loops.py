@@ -8,11 +8,11 @@ bits as with NumPy but where sums are long. What it takes of memory for its own 
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from armwright.tracing.graph import Traced
+from armwright.tracing.llvm_builder import bits
 from armwright.tracing.scalar import Scalar, larger, select, smaller
 
 # For numbers of a type, and what the functions of that type are called.
@@ -149,7 +149,7 @@ class EmittedLoops:
         """Return what stands for a value as one of a type."""
         if x.constant is not None:
             if kind == "double":
-                return _constant(float(x.constant))
+                return bits(float(x.constant))
             if kind in ("i64", "i1"):
                 return str(int(x.constant)) if kind == "i64" else str(bool(x.constant)).lower()
         if x.kind == kind:
@@ -642,8 +642,3 @@ class EmittedTable:
                 further = loops._product(index, stride)  # noqa: SLF001
                 place = further if place == "0" else loops._name(f"add i64 {place}, {further}")  # noqa: SLF001
         return loops._name(f"getelementptr double, ptr {self._pointer}, i64 {place}")  # noqa: SLF001
-
-
-def _constant(value: float) -> str:
-    (bits,) = struct.unpack("<Q", struct.pack("<d", value))
-    return f"0x{bits:016X}"

@@ -70,12 +70,12 @@ def function_address(ir: str | Callable[[], str], name: str, origin: str = "", *
             before: for code of which a call takes so little, or of which there are so few, that its speed does not
             matter. The bits of its results are the same.
     """
-    reference = _reference(name, origin and f"{origin} {quickly}")
+    reference = _reference(name, origin, quickly=quickly)
     if reference and (known := _REFERRED.get(reference)):
         return known
     key = _referred(reference) if reference else None
     if key is None and reference and quickly:
-        key = _referred(_reference(name, f"{origin} {False}"))
+        key = _referred(_reference(name, origin, quickly=False))
     address = None if key is None else _loaded(key)
     if address is None:
         text = ir if isinstance(ir, str) else ir()
@@ -90,9 +90,9 @@ def function_address(ir: str | Callable[[], str], name: str, origin: str = "", *
     return address
 
 
-def _reference(name: str, origin: str) -> str:
+def _reference(name: str, origin: str, *, quickly: bool) -> str:
     around = surroundings() if origin else ""
-    return hashlib.sha256(f"{name}\n{origin}\n{around}".encode()).hexdigest() if around else ""
+    return hashlib.sha256(f"{name}\n{origin} {quickly}\n{around}".encode()).hexdigest() if around else ""
 
 
 def _referred(reference: str) -> str | None:
