@@ -1,0 +1,112 @@
+"""What a camera makes of points: a pinhole, and the distortion of its lens.
+
+Source:
+    Brown (1971), Close-range camera calibration; with the coefficients and pixels of OpenCV: x to the right, y down,
+    z forward, the centre of the first pixel at (0, 0).
+"""
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, ArrayLike, exact_shape, floats
+
+# Numbers of distortion: k1, k2, p1, p2, k3.
+_COEFFICIENTS = 5
+# Steps by which distortion is taken away, and when no more are needed.
+_STEPS, _SETTLED = 50, 1e-13
+
+
+def _as_pair(value: ArrayLike) -> Array:
+    return exact_shape(value, (2,), "focal and centre", 1e7)
+
+
+def _as_distortion(value: ArrayLike) -> Array:
+    return exact_shape(value, (_COEFFICIENTS,), "distortion", 1e3)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Lens:
+    """A pinhole camera with a lens.
+
+    Attributes:
+        width: of its pictures [px].
+        height: of its pictures [px].
+        focal: (2,) focal lengths along x and y [px].
+        centre: (2,) the pixel on the optical axis.
+        distortion: (5,) radial k1, k2, tangential p1, p2, radial k3.
+    """
+
+    width: int
+    height: int
+    focal: Array = attrs.field(converter=_as_pair)
+    centre: Array = attrs.field(converter=_as_pair)
+    distortion: Array = attrs.field(factory=lambda: np.zeros(_COEFFICIENTS), converter=_as_distortion)
+
+    @property
+    def matrix(self) -> Array:
+        """The camera matrix (3, 3)."""
+        (fx, fy), (cx, cy) = self.focal, self.centre
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+    def project(self, points: ArrayLike) -> Array:
+        """Return the pixels (..., 2) of points (..., 3) in the frame of the camera, which lie before it (z > 0)."""
+        points = floats(points, "points")
+        return self._distorted(points[..., :2] / points[..., 2:]) * self.focal + self.centre
+
+    def rays(self, pixels: ArrayLike) -> Array:
+        """Return the directions (..., 3) with z = 1 in which the camera sees pixels (..., 2)."""
+        seen = (floats(pixels, "pixels") - self.centre) / self.focal
+        flat = seen.copy()
+        if self.distortion.any():
+            # Newton's steps with the derivative of what the lens does.
+            for _ in range(_STEPS):
+                step = np.linalg.solve(self._derivative(flat), (seen - self._distorted(flat))[..., None])[..., 0]
+                flat = flat + step
+                if np.abs(step).max(initial=0.0) < _SETTLED:
+                    break
+        return np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
+
+    def _distorted(self, flat: Array) -> Array:
+        """Return where points of the plane z = 1 (..., 2) are seen, in that plane."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = flat[..., 0], flat[..., 1]
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        return np.stack(
+            [
+                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+            ],
+            axis=-1,
+        )
+
+    def _derivative(self, flat: Array) -> Array:
+        """Return the derivatives (..., 2, 2) of the distorted point by the point."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = flat[..., 0], flat[..., 1]
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))
+        cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
+        return np.stack(
+            [
+                np.stack([radial + x * x * slope + 2 * p1 * y + 6 * p2 * x, cross], axis=-1),
+                np.stack([cross, radial + y * y * slope + 6 * p1 * y + 2 * p2 * x], axis=-1),
+            ],
+            axis=-2,
+        )
+
+
+def simple_lens(width: int, height: int, fovy: float, distortion: ArrayLike = (0.0,) * _COEFFICIENTS) -> Lens:
+    """Return a lens with square pixels whose axis goes through the middle of the picture.
+
+    Args:
+        width: of the picture [px].
+        height: of the picture [px].
+        fovy: vertical field of view without distortion [rad].
+        distortion: (5,) k1, k2, p1, p2, k3.
+    """
+    focal = height / 2 / np.tan(fovy / 2)
+    # The centre of the first pixel is at (0, 0), so the middle lies half a pixel before half the size.
+    centre = (width - 1) / 2, (height - 1) / 2
+    return Lens(width=width, height=height, focal=(focal, focal), centre=centre, distortion=distortion)
