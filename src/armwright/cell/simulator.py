@@ -83,12 +83,27 @@ class Simulator:
         other._answers = {name: list(answers) for name, answers in self._answers.items()}
         return other
 
+    def advance(self, now: float) -> None:
+        """Let time go by: in this cell nothing goes wrong."""
+
     def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) of an arm."""
         motion = self._motions[arm]
         return motion.trajectory(motion.trajectory_time(now))
 
-    def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
+    def sent_configuration(self, arm: str, now: float) -> Array:
+        """Return the joint positions (n,) of an arm: it is where it is sent to."""
+        return self.configuration(arm, now)
+
+    def start_motion(
+        self,
+        arm: str,
+        trajectory: Trajectory,
+        now: float,
+        tip: Array,
+        *,
+        guarded: bool = False,  # noqa: ARG002 - the plane is the same for all
+    ) -> None:
         """Let an arm follow a trajectory that begins at its configuration."""
         gap = np.abs(trajectory(0.0) - self.configuration(arm, now)).max()
         assert gap <= _SAME_CONFIGURATION, f"{arm} is {gap:.3g} away from the start of its trajectory"  # noqa: S101
