@@ -3,6 +3,7 @@
 from typing import NamedTuple, Protocol
 
 from armwright.arrays import Array
+from armwright.cell.part_poses import PartPoses
 from armwright.errors import ArmwrightError
 from armwright.motion.trajectory import Trajectory
 
@@ -61,7 +62,7 @@ class Hardware(Protocol):
         remains constant.
         """
 
-    def move_fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:
+    def move_fingers(self, arm: str, now: float, *, closed: bool, width: float | None = None) -> float:
         """Close or open the fingers of an arm, completely or to a width [m]; return the time it takes.
 
         Raises:
@@ -75,7 +76,10 @@ class Hardware(Protocol):
             DeviceError: there is no such device.
         """
 
-    def locate(self, frame: str) -> tuple[Array, float]:
+    def part_poses(self) -> PartPoses:
+        """Return where the parts are believed to be, and on whose hands. It is not to be changed."""
+
+    def locate(self, frame: str, now: float) -> tuple[Array, float]:
         """Let the camera locate the object of a frame; return its pose in the world and the time it takes.
 
         Raises:
