@@ -3,6 +3,7 @@
 from typing import NamedTuple, Protocol, Self, runtime_checkable
 
 from armwright.arrays import Array
+from armwright.cell.part_poses import PartPoses
 from armwright.errors import ArmwrightError
 from armwright.motion.trajectory import Trajectory
 
@@ -55,9 +56,7 @@ class Hardware(Protocol):
     def sent_configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) that an arm is sent to at a time, which may be to come: motions begin there."""
 
-    def start_motion(
-        self, arm: str, trajectory: Trajectory, now: float, tip: Array, *, guarded: bool = False
-    ) -> None:
+    def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array, *, guarded: bool = False) -> None:
         """Let an arm follow a trajectory that begins where it has been sent, instead of its current motion.
 
         Args:
@@ -91,12 +90,13 @@ class Hardware(Protocol):
         """
 
     def move_fingers(
-        self, arm: str, *, closed: bool, width: float | None = None, frame: str | None = None
+        self, arm: str, now: float, *, closed: bool, width: float | None = None, frame: str | None = None
     ) -> float:
         """Close or open the fingers of an arm; return the time it takes.
 
         Args:
             arm: its name.
+            now: the time [s].
             closed: whether they close.
             width: to which they move [m]; None for as far as they can.
             frame: the frame that they close on, if the program says so.
@@ -112,7 +112,10 @@ class Hardware(Protocol):
             DeviceError: there is no such device.
         """
 
-    def locate(self, frame: str) -> tuple[Array, float]:
+    def part_poses(self) -> PartPoses:
+        """Return where the parts are believed to be, and on whose hands. It is not to be changed."""
+
+    def locate(self, frame: str, now: float) -> tuple[Array, float]:
         """Let the camera locate the object of a frame; return its pose in the world and the time it takes.
 
         Raises:
