@@ -54,7 +54,7 @@ class Hardware(Protocol):
         """Return the joint positions (n,) that the sensors of an arm read."""
 
     def sent_configuration(self, arm: str, now: float) -> Array:
-        """Return the joint positions (n,) that an arm is sent to at a time, which may be to come: motions begin there."""
+        """Return the joint positions (n,) that an arm is sent to, now or at a time to come: motions begin there."""
 
     def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array, *, guarded: bool = False) -> None:
         """Let an arm follow a trajectory that begins where it has been sent, instead of its current motion.

@@ -90,9 +90,11 @@ class Contacts:
         if not data.ncon:
             return None
         geoms = data.contact.geom
-        suspicious = np.flatnonzero(self._unwanted[geoms[:, 0], geoms[:, 1]])
+        suspicious = self._unwanted[geoms[:, 0], geoms[:, 1]]
+        if not suspicious.any():
+            return None
         worst = None
-        for number in suspicious.tolist():
+        for number in np.flatnonzero(suspicious).tolist():
             force = self.force(data, number)
             if force >= (least if worst is None else worst.force):
                 a, b = geoms[number].tolist()

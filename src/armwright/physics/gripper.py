@@ -52,6 +52,11 @@ def gripper_solids(gripper: Gripper) -> list[GripperSolid]:
     return solids
 
 
+def gripper_length(gripper: Gripper) -> float:
+    """Return how far a gripper reaches from the tool point back along a [m]."""
+    return _CUP_HEIGHT if gripper.kind == "suction" else _PALM_HEIGHT + float(_PALM[2])
+
+
 def _at(shape: Shape, y: float, z: float) -> Solid:
     return Solid(shape=shape, pose=homogeneous(np.eye(3), (0.0, y, z)))
 
@@ -156,8 +161,10 @@ class GripperDrive:
         sides = ("suction",) if gripper.kind == "suction" else ("left", "right")
         self._actuators: npt.NDArray[np.intp] = np.array([model.actuator(f"{name}/{side}").id for side in sides])
         self._fingers = gripper.kind == "fingers"
+        self.positions: npt.NDArray[np.intp] = np.array([], dtype=np.intp)
         if self._fingers:
             self.positions = np.array([model.joint(f"{name}/{side}").qposadr[0] for side in sides])
+        self._addresses: list[int] = self.positions.tolist() if self._fingers else []
         self._from = self._to = gripper.opening / 2 if self._fingers else 0.0
         self._tick, self._ticks = 0, 0
 
@@ -191,7 +198,7 @@ class GripperDrive:
 
     def opening(self, data: Any) -> float:
         """Return the distance between the fingers [m]; 0 for suction."""
-        return float(data.qpos[self.positions].sum()) if self._fingers else 0.0
+        return float(sum(data.qpos[position] for position in self._addresses))
 
     def copy(self) -> GripperDrive:
         """Return a drive in the same state."""

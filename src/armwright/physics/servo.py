@@ -55,14 +55,14 @@ class Sent:
         self.trajectory, self.tick = trajectory, tick
         count = math.ceil(trajectory.duration / period - _TICK_TOLERANCE) + 1
         t = np.minimum(np.arange(count) * period, trajectory.duration)
-        self._table = np.stack([trajectory(t, order) for order in range(3)])
+        self._q, self._qd, self._qdd = (trajectory(t, order) for order in range(3))
         # Then the arm stands.
-        self._table[1:, -1] = 0.0
+        self._qd[-1] = self._qdd[-1] = 0.0
 
     def at(self, tick: int) -> Reference:
         """Return where the joints are sent at a tick."""
-        index = min(max(tick - self.tick, 0), self._table.shape[1] - 1)
-        return Reference(*self._table[:, index])
+        index = min(max(tick - self.tick, 0), len(self._q) - 1)
+        return Reference(self._q[index], self._qd[index], self._qdd[index])
 
     def configuration(self, time: float, period: float) -> Array:
         """Return the positions (n,) at any time from its beginning on."""
@@ -144,7 +144,7 @@ class ArmServo:
             tau = tau + self._dry * direction + self._lean * np.abs(direction)
             # What a motor cannot give is not to be asked for twice.
             self._sums += error * self._period * (np.abs(tau) < self._effort)
-        tau = np.clip(tau, -self._effort, self._effort)
+        tau = np.minimum(np.maximum(tau, -self._effort), self._effort)
         data.ctrl[self.indices.motors] = tau
         return Measured(q, qd, tau)
 

@@ -15,7 +15,7 @@ from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.cell.scene import Gripper, Part
 from armwright.physics.geoms import add_geom, place, quaternion
-from armwright.physics.gripper import add_gripper
+from armwright.physics.gripper import add_gripper, gripper_length
 from armwright.physics.plant import add_arm, finish, new_world
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Solid, centroid, farthest, inertia
@@ -30,6 +30,8 @@ _MAX_ARMS = 28
 # Contacts of parts and furniture: sliding, turning, rolling.
 _ROLLING = (0.005, 1e-4)
 _CONDIM = 4
+# Time constant of contacts with what stands [s].
+_SOFT = 0.02
 # How far below everything that stands the floor lies on which lost parts fall, and its half size [m].
 _BELOW, _FLOOR = 0.5, 20.0
 # The plate under a plane that yields: light, so that it adds nothing to what presses on it [kg], and damped.
@@ -76,8 +78,8 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
         affinity = _ALL - bit - _HAND
         bits = {"contype": bit, "conaffinity": affinity}
         arm = cell_arm.plant or cell_arm.arm
-        plant = add_arm(spec, name, arm, cell_arm.base, arm_solids(arm), **bits)
         gripper = cell_arm.gripper or Gripper()
+        plant = add_arm(spec, name, arm, cell_arm.base, arm_solids(arm, gripper_length(gripper)), **bits)
         hand = {"contype": bit | _HAND, "conaffinity": affinity}
         add_gripper(spec, name, plant.tool, gripper, spec.option.timestep, **hand)
         plants.append(plant)
@@ -90,21 +92,31 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     return WorldModel(cell=cell, model=model, substeps=substeps, parts=parts, plate=plate)
 
 
-def arm_solids(arm: Arm) -> tuple[tuple[Solid, ...], ...]:
-    """Return the solids of the base of an arm in its base frame, and of its links in theirs: known or guessed."""
+def arm_solids(arm: Arm, gripper: float) -> tuple[tuple[Solid, ...], ...]:
+    """Return the solids of the base of an arm in its base frame, and of its links in theirs: known or guessed.
+
+    Args:
+        arm: the arm.
+        gripper: how far its gripper reaches back from the tool point [m].
+    """
     known = any(link.solids for link in arm.links)
-    return (arm.base_solids, *([link.solids for link in arm.links] if known else guessed_solids(arm)))
+    return (arm.base_solids, *([link.solids for link in arm.links] if known else guessed_solids(arm, gripper)))
 
 
 def _surface(friction: float) -> dict[str, Any]:
     return {"friction": (friction, *_ROLLING), "condim": _CONDIM}
 
 
+def _furniture(friction: float) -> dict[str, Any]:
+    """Return the options of what stands: softer than pads, whose own stiffness would make every touch a blow."""
+    return {**_surface(friction), "priority": 2, "solref": (_SOFT, 1.0)}
+
+
 def _add_standing(spec: Any, cell: Cell) -> None:
     for name, fixture in cell.fixtures.items():
         solid = Solid(shape=fixture.shape, pose=fixture.pose)
         bits = {"contype": _STANDING, "conaffinity": _ALL}
-        add_geom(spec, spec.worldbody, name, solid, **bits, **_surface(fixture.friction))
+        add_geom(spec, spec.worldbody, name, solid, **bits, **_furniture(fixture.friction))
 
 
 def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
@@ -162,7 +174,7 @@ def _add_plate(spec: Any, cell: Cell) -> bool:
         # Links of an arm may stand in the plane; what it holds and holds with may not.
         contype=0,
         conaffinity=_PART | _HAND,
-        **_surface(0.8),
+        **_furniture(0.8),
     )
     return True
 
