@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.hardware import DeviceError, PeakContact
 from armwright.cell.model import Cell
+from armwright.cell.observations import Observations
 from armwright.cell.part_poses import PartPoses
 from armwright.errors import closest, counted
 from armwright.kinematics.forward_kinematics import forward
@@ -257,6 +258,10 @@ class Simulator:
     def part_poses(self) -> PartPoses:
         """Return where the parts are, and on whose hands. It is not to be changed."""
         return self._parts
+
+    def observations(self) -> Observations:
+        """Return where the parts were."""
+        return Observations(parts=self._parts.tracks)
 
     def _hands(self, now: float) -> dict[str, Array]:
         """Return the pose (4, 4) of each hand in the world."""

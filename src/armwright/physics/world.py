@@ -18,19 +18,21 @@ from armwright.arm.model import STANDARD_GRAVITY
 from armwright.arrays import Array
 from armwright.cell.hardware import Mishap, PeakContact
 from armwright.cell.model import Cell
+from armwright.cell.observations import MeasuredStream, Observations
 from armwright.cell.part_poses import PartPoses
 from armwright.cell.scene import Gripper, Part
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError, closest
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics import mishaps
 from armwright.physics.contacts import Contacts
 from armwright.physics.gripper import GripperDrive
-from armwright.physics.measured import Log, MeasuredStream
+from armwright.physics.measured import Log
 from armwright.physics.plant import arm_indices
 from armwright.physics.servo import ArmServo, Sent, TorqueLaw
 from armwright.physics.world_model import WorldModel, in_hand, part_pose, tool_pose, world_model
-from armwright.spatial.poses import homogeneous, inverse
+from armwright.spatial.poses import homogeneous, inverse, to_noap
 from armwright.spatial.rotations import rotation_from_vector
 
 # How long a held part may be off the pads, and an arm off its track [s].
@@ -39,6 +41,8 @@ _LOST, _OFF_TRACK = 0.05, 0.02
 _LOOK, _PAUSE = 0.01, 0.1
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
+# Ticks between poses of the tool that are compared.
+_TIP_TICKS = 10
 # In wrists, the noise of moments by that of forces [m].
 _MOMENT_NOISE = 0.1
 
@@ -100,7 +104,7 @@ class PhysicsCell:
             InvalidValueError: things stand inside each other at the start, or a law is for no arm of the cell.
         """
         self._cell, self._believed = cell, Simulator(cell)
-        self._rng = np.random.default_rng(seed)
+        self._seed, self._rng = seed, np.random.default_rng(seed)
         self._world = world_model(cell, drawn_parts(cell, self._rng) if parts is None else parts)
         self._contacts = Contacts(self._world)
         self._data = _initial_data(self._world)
@@ -375,14 +379,24 @@ class PhysicsCell:
         """Return the pose (4, 4) of a part in the world, as it is now."""
         return part_pose(self._data, part)
 
-    def measured(self) -> tuple[MeasuredStream, ...]:
-        """Return what the servos did so far."""
-        return self._log.streams()
+    def observations(self) -> Observations:
+        """Return what the servos measured, where the parts were, and the largest errors."""
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
 
-    @property
-    def log(self) -> Log:
-        """What has been recorded."""
-        return self._log
+        measured = self._log.streams()
+        facts = {
+            "engine": "MuJoCo",
+            "version": mujoco.__version__,
+            "step": self._cell.period / self._world.substeps,
+            "seed": self._seed,
+            "tracking": {
+                stream.arm: np.abs(stream.q - stream.sent).max(axis=0, initial=0.0).tolist() for stream in measured
+            },
+            "tip": {stream.arm: _tip_error(self._cell, stream) for stream in measured},
+            "slip": self._log.worst_slip,
+            "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
+        }
+        return Observations(parts=self._log.tracks(), measured=measured, facts=facts)
 
 
 def drawn_parts(cell: Cell, rng: np.random.Generator) -> dict[str, Part]:
@@ -407,6 +421,13 @@ def _initial_data(world: WorldModel) -> Any:
     for name, arm in world.cell.arms.items():
         data.qpos[arm_indices(world.model, name, arm.arm.n).positions] = arm.start
     return data
+
+
+def _tip_error(cell: Cell, stream: MeasuredStream) -> float:
+    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m]."""
+    arm = cell.arms[stream.arm].arm
+    sent, there = (forward(arm, q[::_TIP_TICKS])[:, :3, 3] for q in (stream.sent, stream.q))
+    return float(np.linalg.norm(sent - there, axis=1).max(initial=0.0))
 
 
 def _tracking_limits(cell: Cell, arm: str) -> Array:

@@ -119,7 +119,7 @@ class Machine:
             streams=streams,
             trees=tuple(state.trees),
             configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
-            parts=self.hardware.part_poses().tracks,
+            observations=self.hardware.observations(),
         )
 
     # ---- names and values ------------------------------------------------------------------------------------------
