@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array
+from armwright.physics.gripper import LIP_TOUCHES
 from armwright.physics.world_model import FLOOR, PLATE, WorldModel
 
 # Parts, fixtures and arms that overlap by more at the start stand inside one another [m].
@@ -68,10 +70,11 @@ class Contacts:
             return
         self._owners.append(arm)
         self._hand[number] = not (what.startswith(("link", "base")))
-        if what.endswith("pad") or what == "cup":
+        if what.endswith("pad") or what.startswith("lip"):
             self._pads[arm].append(number)
         label = what.partition("/")[0].replace("link", "link ")
-        self.names.append(f"{arm} {'finger' if what.endswith(('pad', 'finger')) else label}")
+        label = "finger" if what.endswith(("pad", "finger")) else "cup" if what.startswith("lip") else label
+        self.names.append(f"{arm} {label}")
 
     def hold(self, held: dict[str, str]) -> None:
         """Take note of what arms hold: parts by arm. What they hold belongs to them."""
@@ -111,17 +114,18 @@ class Contacts:
         return float(abs(force[0]))
 
     def gripped(self, data: Any, arm: str) -> str | None:
-        """Return the part that both pads of an arm touch, or that its cup does; None without one."""
+        """Return the part that both pads of an arm touch, or most of the lip of its cup; None without one."""
         if not data.ncon:
             return None
         geoms = data.contact.geom
-        touching: list[set[int]] = []
+        touches: Counter[int] = Counter()
         for pad in self._pads[arm]:
             first, second = geoms[:, 0] == pad, geoms[:, 1] == pad
             others = {*geoms[first, 1].tolist(), *geoms[second, 0].tolist()}
-            touching.append({other for other in others if self._parts[other]})
-        common = set.intersection(*touching) if touching else set()
-        return self.names[min(common)] if common else None
+            touches.update(other for other in others if self._parts[other])
+        needed = min(len(self._pads[arm]), LIP_TOUCHES)
+        held = min((other for other, count in touches.items() if count >= needed), default=None)
+        return None if held is None else self.names[held]
 
     def touches(self, data: Any, part: str) -> list[str]:
         """Return what a part touches."""

@@ -157,7 +157,7 @@ def _add_plate(spec: Any, cell: Cell) -> bool:
     if plane.height is None:
         return False
     plate = spec.worldbody.add_body(name=PLATE, pos=(0.0, 0.0, plane.height), gravcomp=1.0)
-    plate.explicitinertial, plate.mass, plate.inertia = True, _PLATE_MASS, (1.0, 1.0, 1.0)
+    plate.explicitinertial, plate.mass, plate.inertia, plate.ipos = True, _PLATE_MASS, np.ones(3), np.zeros(3)
     plate.add_joint(
         name=PLATE,
         type=mujoco.mjtJoint.mjJNT_SLIDE,
