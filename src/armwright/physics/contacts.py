@@ -54,6 +54,10 @@ class Contacts:
         self._parts: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
         self._pads: dict[str, list[int]] = {name: [] for name in world.cell.arms}
         self._part_geoms = {name: world.model.geom(name).id for name in world.parts}
+        # What parts press with by their weight [N].
+        self._weights = np.zeros(world.model.ngeom)
+        for name, part in world.parts.items():
+            self._weights[self._part_geoms[name]] = part.mass * float(np.linalg.norm(world.cell.gravity))
         self._tools = {name: world.model.body(f"{name}/tool").id for name in world.cell.arms}
         for number in range(world.model.ngeom):
             self._add_geom(world, number)
@@ -89,7 +93,10 @@ class Contacts:
         self._holders = owners
 
     def unwanted(self, data: Any, least: float) -> Touch | None:
-        """Return the hardest contact of an arm with what it should not touch, of at least a force [N]."""
+        """Return the hardest contact of an arm with what it should not touch, of at least a force [N].
+
+        A part in the hand may press with its own weight beside: it stood on something before it was lifted.
+        """
         if not data.ncon:
             return None
         geoms = data.contact.geom
@@ -99,9 +106,9 @@ class Contacts:
         worst = None
         for number in np.flatnonzero(suspicious).tolist():
             force = self.force(data, number)
-            if force >= (least if worst is None else worst.force):
-                a, b = geoms[number].tolist()
-                mine, other = (a, b) if self._holders[a] != _UNOWNED else (b, a)
+            a, b = geoms[number].tolist()
+            mine, other = (a, b) if self._holders[a] != _UNOWNED else (b, a)
+            if force - self._weights[[a, b]].max() >= least and (worst is None or force > worst.force):
                 worst = Touch(str(self._holders[mine]), self.names[mine], self.names[other], force)
         return worst
 

@@ -39,6 +39,8 @@ from armwright.spatial.rotations import rotation_from_vector
 _LOST, _OFF_TRACK = 0.05, 0.02
 # Held parts are looked at so often [s]; a contact counts as over after so long [s].
 _LOOK, _PAUSE = 0.01, 0.1
+# How long an arm is left alone that has had a mishap [s]: it brakes.
+_STOP = 0.2
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
 # Ticks between poses of the tool that are compared.
@@ -60,6 +62,7 @@ class _Hand:
         expected: the part that it closes on; None where the program does not say.
         guarded: whether the program looks out for contact during the motion.
         off_track: for how many ticks the arm has not been where it was sent.
+        stopping_until: tick up to which the arm is stopped because of a mishap, and others are no news.
         quiet_until: tick up to which contacts are no news.
         deepest: how deep the arm has pressed into the plane since its motion began [m].
     """
@@ -72,6 +75,7 @@ class _Hand:
     expected: str | None = None
     guarded: bool = False
     off_track: int = 0
+    stopping_until: int = 0
     quiet_until: int = 0
     deepest: float = 0.0
 
@@ -175,9 +179,19 @@ class PhysicsCell:
         while self._tick < end:
             self._step()
             mishap = self._watch()
-            if mishap is not None:
+            if mishap is not None and self._is_news(mishap):
                 return mishap
         return None
+
+    def _is_news(self, mishap: Mishap) -> bool:
+        """Whether a program must be told of a mishap: not while its arm is stopped because of another."""
+        hand = None if mishap.arm is None else self._hands[mishap.arm]
+        if hand is None:
+            return True
+        if self._tick < hand.stopping_until:
+            return False
+        hand.stopping_until = self._tick + round(_STOP / self._cell.period)
+        return True
 
     @property
     def _now(self) -> float:
@@ -306,7 +320,8 @@ class PhysicsCell:
         hand = self._hands[arm]
         if not guarded:
             # What it pressed on while it was guarded, it may press on until it is away.
-            hand.quiet_until = self._tick + (round(_PAUSE / self._cell.period) if hand.guarded else 0)
+            quiet = self._tick + (round(_PAUSE / self._cell.period) if hand.guarded else 0)
+            hand.quiet_until = max(hand.quiet_until, quiet)
         hand.guarded, hand.deepest = guarded, 0.0
 
     def contact_time(self, arm: str) -> None:
