@@ -132,6 +132,16 @@ class Cell:
         """How far a path past several frames may be from the straight legs between them [m]."""
         return _CORNER_DEVIATIONS * self.deviation if self.corner is None else self.corner
 
+    @property
+    def seen_frames(self) -> frozenset[str]:
+        """The frames that the camera has answers for."""
+        return frozenset({*self.visions, *self.seen_parts})
+
+    @property
+    def collisions_matter(self) -> bool:
+        """Whether there is anything in the cell that an arm could run into: fixtures, parts or another arm."""
+        return bool(self.fixtures or self.parts) or len(self.arms) > 1
+
     def tree(self) -> FrameTree:
         """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.
 
