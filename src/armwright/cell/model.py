@@ -106,6 +106,7 @@ class Cell:
         deviation: allowed distance from straight lines [m].
         corner: how far a path past several frames may be from the straight legs between them [m]; 20 deviations by
             default, see ``corner_deviation``.
+        clearance: distance to other bodies below which a stage of a MOVE gets a warning [m]; 0 for none.
         period: of the servo [s].
         around: the kind of detour of an infeasible straight line, by ``via`` poses or ``damped`` least squares; None
             for no detour.
@@ -127,6 +128,7 @@ class Cell:
     vision_time: float = 0.1
     deviation: float = 1e-3
     corner: float | None = None
+    clearance: float = 0.0
     period: float = 1e-3
     around: Around | None = None
 
@@ -142,6 +144,16 @@ class Cell:
     def corner_deviation(self) -> float:
         """How far a path past several frames may be from the straight legs between them [m]."""
         return _CORNER_DEVIATIONS * self.deviation if self.corner is None else self.corner
+
+    @property
+    def seen_frames(self) -> frozenset[str]:
+        """The frames that the camera has answers for."""
+        return frozenset({*self.visions, *self.seen_parts})
+
+    @property
+    def collisions_matter(self) -> bool:
+        """Whether there is anything in the cell that an arm could run into: fixtures, parts or another arm."""
+        return bool(self.fixtures or self.parts) or len(self.arms) > 1
 
     def tree(self) -> FrameTree:
         """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.

@@ -18,6 +18,7 @@ from armwright.motion.efforts import without_rounding
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
+from armwright.physics.collisions import CheckedBodies, StageClearance
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Span
@@ -80,6 +81,7 @@ class RunStage:
             [N].
         peak_time: (n,) when, since it began [s].
         stopped: whether it was stopped on its path.
+        clearance: how near it was to come to other bodies; None where that is not looked at.
     """
 
     t0: float
@@ -93,6 +95,7 @@ class RunStage:
     peak_effort: Array
     peak_time: Array
     stopped: bool = False
+    clearance: StageClearance | None = None
 
     @property
     def duration(self) -> float:
@@ -192,6 +195,7 @@ class Recording:
             changes the last in every two-thousandth of the run.
         configurations: by arm, the configuration (n,) at the end.
         observations: what the cell left beside: where its parts were, measurements and pictures.
+        checked: what was looked at for collisions; None where nothing was, because the cell has nothing to run into.
         failure: why it did not come to its end; None where it did.
     """
 
@@ -204,6 +208,7 @@ class Recording:
     trees: tuple[tuple[float, FrameTree], ...]
     configurations: Mapping[str, Array]
     observations: Observations = attrs.field(factory=Observations)
+    checked: CheckedBodies | None = None
     failure: Failure | None = None
 
     @property
