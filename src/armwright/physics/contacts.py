@@ -74,10 +74,10 @@ class Contacts:
             return
         self._owners.append(arm)
         self._hand[number] = not (what.startswith(("link", "base")))
-        if what.endswith("pad") or what.startswith("lip"):
+        if what.endswith("finger") or what.startswith("lip"):
             self._pads[arm].append(number)
         label = what.partition("/")[0].replace("link", "link ")
-        label = "finger" if what.endswith(("pad", "finger")) else "cup" if what.startswith("lip") else label
+        label = "finger" if what.endswith("finger") else "suction cup" if what.startswith("lip") else label
         self.names.append(f"{arm} {label}")
 
     def hold(self, held: dict[str, str]) -> None:

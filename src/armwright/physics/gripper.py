@@ -6,7 +6,7 @@ that is limited, so what they hold slides when its weight and inertia exceed wha
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,16 +14,11 @@ import numpy.typing as npt
 from armwright.arrays import Array
 from armwright.cell.scene import Gripper
 from armwright.physics.geoms import add_geom
+from armwright.physics.hand_solids import gripper_solids
 from armwright.spatial.poses import homogeneous
-from armwright.spatial.shapes import Box, Cylinder, Shape, Solid, Sphere
+from armwright.spatial.shapes import Solid, Sphere
 
-# Half lengths of the pads along n, o and a of the tool [m].
-_PAD = np.array([0.01, 0.004, 0.015])
-# What carries the pads: their height, and that of the palm above the tool point [m].
-_BONE_LENGTH, _PALM_HEIGHT, _PALM = 0.07, 0.1, np.array([0.03, 0.0, 0.024])
-# A cup of suction: its radius and height [m].
-_CUP_RADIUS, _CUP_HEIGHT = 0.015, 0.02
-# Its lip, as balls: their number, radius, and distance from its axis [m].
+# The lip of a cup, as balls: their number, radius, and distance from its axis [m].
 LIP, _LIP_RADIUS, _LIP_DISTANCE = 4, 2e-3, 13e-3
 # A cup takes hold of what is so near [m], where so many balls touch a face so flat: by the cosine of its tilt.
 _NEAR, LIP_TOUCHES, _FLAT = 1e-3, 3, 0.99
@@ -36,47 +31,6 @@ _INSIDE = 0.01
 # A soft constraint of one geom with what it touches: rolling and torsional friction are small.
 _ROLLING = (0.005, 1e-4)
 _STIFF = (0.95, 0.99, 0.001, 0.5, 2.0)
-
-
-class GripperSolid(NamedTuple):
-    """A solid of a gripper in the frame of the tool, with its fingers open."""
-
-    name: str
-    solid: Solid
-
-
-def gripper_solids(gripper: Gripper) -> list[GripperSolid]:
-    """Return the solids of a gripper in the frame of the tool, with its fingers open."""
-    if gripper.kind == "suction":
-        return [GripperSolid("cup", _at(Cylinder(radius=_CUP_RADIUS, length=_CUP_HEIGHT), 0.0, -_CUP_HEIGHT / 2))]
-    solids = [GripperSolid("palm", _palm(gripper))]
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        shift = homogeneous(np.eye(3), (0.0, sign * gripper.opening / 2, 0.0))
-        solids += [GripperSolid(f"{side} finger", solid.moved(shift)) for solid in _finger(sign)]
-    return solids
-
-
-def gripper_length(gripper: Gripper) -> float:
-    """Return how far a gripper reaches from the tool point back along a [m]."""
-    return _CUP_HEIGHT if gripper.kind == "suction" else _PALM_HEIGHT + float(_PALM[2])
-
-
-def _at(shape: Shape, y: float, z: float) -> Solid:
-    return Solid(shape=shape, pose=homogeneous(np.eye(3), (0.0, y, z)))
-
-
-def _palm(gripper: Gripper) -> Solid:
-    size = np.array([_PALM[0], gripper.opening + 8 * _PAD[1], _PALM[2]])
-    return _at(Box(size=size), 0.0, -_PALM_HEIGHT - _PALM[2] / 2)
-
-
-def _finger(sign: float) -> list[Solid]:
-    """Return the pad of a finger, and what carries it."""
-    bone = np.array([0.016, 2 * _PAD[1], _BONE_LENGTH])
-    return [
-        _at(Box(size=2 * _PAD), sign * _PAD[1], -_PAD[2]),
-        _at(Box(size=bone), sign * 2 * _PAD[1], -2 * _PAD[2] - _BONE_LENGTH / 2),
-    ]
 
 
 def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: float, **geoms: Any) -> None:
@@ -99,20 +53,23 @@ def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: flo
         "priority": 1,
     }
     if gripper.kind == "suction":
-        _add_cup(spec, name, tool, geoms | pads)
+        _add_cup(spec, name, tool, gripper, geoms | pads)
         return
-    add_geom(spec, tool, f"{name}/palm", _palm(gripper), mass=0.0, **geoms)
-    for side, sign in (("left", 1.0), ("right", -1.0)):
+    left, right, palm = gripper_solids(gripper, 0.0)
+    add_geom(spec, tool, f"{name}/palm", Solid(shape=palm.shape, pose=palm.pose), mass=0.0, **geoms)
+    for side, sign, pad in (("left", 1.0, left), ("right", -1.0, right)):
         finger = _add_finger(spec, tool, f"{name}/{side}", sign, gripper)
-        pad, bone = _finger(sign)
-        add_geom(spec, finger, f"{name}/{side} pad", pad, **{**geoms, **pads, "mass": 0.0})
-        add_geom(spec, finger, f"{name}/{side} finger", bone, mass=0.0, **geoms)
+        solid = Solid(shape=pad.shape, pose=pad.pose)
+        add_geom(spec, finger, f"{name}/{side} finger", solid, mass=0.0, **geoms | pads)
     _couple(spec, name)
 
 
-def _add_cup(spec: Any, name: str, tool: Any, options: dict[str, Any]) -> None:
-    shape = Cylinder(radius=_CUP_RADIUS, length=_CUP_HEIGHT - _LIP_RADIUS)
-    add_geom(spec, tool, f"{name}/cup", _at(shape, 0.0, -(_CUP_HEIGHT + _LIP_RADIUS) / 2), mass=0.0, **options)
+def _add_cup(spec: Any, name: str, tool: Any, gripper: Gripper, options: dict[str, Any]) -> None:
+    """Add a cup, which stands a little behind its lip."""
+    behind = homogeneous(np.eye(3), (0.0, 0.0, -_LIP_RADIUS))
+    for it in gripper_solids(gripper, 0.0):
+        part = it.name.removeprefix("suction ")
+        add_geom(spec, tool, f"{name}/{part}", Solid(shape=it.shape, pose=behind @ it.pose), mass=0.0, **options)
     for i in range(LIP):
         angle = 2 * np.pi * i / LIP
         where = (_LIP_DISTANCE * np.cos(angle), _LIP_DISTANCE * np.sin(angle), -_LIP_RADIUS)

@@ -386,7 +386,9 @@ class PhysicsCell:
         part = self._cell.seen_parts.get(frame)
         if part is None:
             return self._believed.locate(frame, now)
-        return part_pose(self._data, part) @ self._cell.parts[part].grasp, self._cell.vision_time
+        X_WP = part_pose(self._data, part)
+        self._believed.part_poses().see(part, X_WP, now)
+        return X_WP @ self._cell.parts[part].grasp, self._cell.vision_time
 
     # ---- results -------------------------------------------------------------------------------------------------
 

@@ -9,13 +9,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from armwright.arm.guessed_solids import guessed_solids
-from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.cell.scene import Gripper, Part
+from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.geoms import add_geom, place, quaternion
-from armwright.physics.gripper import add_gripper, gripper_length
+from armwright.physics.gripper import add_gripper
 from armwright.physics.plant import add_arm, finish, new_world
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Solid, centroid, farthest, inertia
@@ -79,7 +78,7 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
         bits = {"contype": bit, "conaffinity": affinity}
         arm = cell_arm.plant or cell_arm.arm
         gripper = cell_arm.gripper or Gripper()
-        plant = add_arm(spec, name, arm, cell_arm.base, arm_solids(arm, gripper_length(gripper)), **bits)
+        plant = add_arm(spec, name, arm, cell_arm.base, arm_bodies(name, arm, gripper), **bits)
         hand = {"contype": bit | _HAND, "conaffinity": affinity}
         add_gripper(spec, name, plant.tool, gripper, spec.option.timestep, **hand)
         plants.append(plant)
@@ -90,17 +89,6 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     plate = _add_plate(spec, cell)
     model = finish(spec, tuple(plants))
     return WorldModel(cell=cell, model=model, substeps=substeps, parts=parts, plate=plate)
-
-
-def arm_solids(arm: Arm, gripper: float) -> tuple[tuple[Solid, ...], ...]:
-    """Return the solids of the base of an arm in its base frame, and of its links in theirs: known or guessed.
-
-    Args:
-        arm: the arm.
-        gripper: how far its gripper reaches back from the tool point [m].
-    """
-    known = any(link.solids for link in arm.links)
-    return (arm.base_solids, *([link.solids for link in arm.links] if known else guessed_solids(arm, gripper)))
 
 
 def _surface(friction: float) -> dict[str, Any]:

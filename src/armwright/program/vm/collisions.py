@@ -91,7 +91,7 @@ def _course(machine: Machine, arm: str) -> Trajectory:
     mover = machine.moving_process(arm)
     if mover is not None and mover.motion is not None and mover.motion.rest_tick is None:
         parts += [stage.planned.trajectory for stage in mover.motion.stages]
-    return join(parts) if parts else hold(machine.hardware.configuration(arm, machine.now), 0.0)
+    return join(parts) if parts else hold(machine.hardware.sent_configuration(arm, machine.now), 0.0)
 
 
 def _rest_of_stage(machine: Machine, arm: str) -> Trajectory | None:

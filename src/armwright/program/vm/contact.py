@@ -75,7 +75,9 @@ def _send_and_watch(machine: Machine, motion: Motion, trajectory: Trajectory) ->
 
 def send_trajectory(machine: Machine, motion: Motion, trajectory: Trajectory) -> ToolWrenches:
     """Let the arm of a motion follow a trajectory instead of what it does now; return what will push on its hand."""
-    machine.hardware.start_motion(motion.arm, trajectory, machine.now, motion.X_HM, guarded=bool(motion.guards))
+    machine.hardware.start_motion(
+        motion.arm, trajectory, machine.now, motion.X_HM, guarded=any(guard.reads_force for guard in motion.guards)
+    )
     return _record_wrenches(machine, motion.arm)
 
 
