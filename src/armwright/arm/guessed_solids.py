@@ -31,7 +31,7 @@ def guessed_solids(arm: Arm) -> tuple[tuple[Solid, ...], ...]:
     """
     radii = guessed_radii(arm)
     return tuple(
-        tuple(_along(arm, i, float(radii[i]))) or (Solid(shape=Sphere(radius=float(radii[i]))),) for i in range(arm.n)
+        tuple(_along(arm, i, float(radii[i]))) or (_ball(float(radii[i])),) for i in range(arm.n)
     )
 
 
@@ -54,4 +54,8 @@ def _capsule(a: Array, b: Array, radius: float) -> Solid:
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)
     R = np.stack([x, np.cross(z, x), z], axis=1)
-    return Solid(shape=Capsule(radius=radius, length=length), pose=homogeneous(R, (a + b) / 2))
+    return Solid(shape=Capsule(radius=radius, length=length), pose=homogeneous(R, (a + b) / 2), guessed=True)
+
+
+def _ball(radius: float) -> Solid:
+    return Solid(shape=Sphere(radius=radius), guessed=True)
