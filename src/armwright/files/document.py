@@ -123,11 +123,11 @@ class Table:
             raise self.error(key, f"expected a whole number, got {value:g}")
         return round(value)
 
-    def flag(self, key: str, default: Any = _MISSING) -> bool:
+    def flag(self, key: str, *, default: bool = False) -> bool:
         """Return ``true`` or ``false``.
 
         Raises:
-            FileFormatError: it is missing without a default, or neither of them.
+            FileFormatError: it is neither of them.
         """
         value = self._value(key, default, "true or false")
         if not isinstance(value, bool):
@@ -165,17 +165,6 @@ class Table:
         if value is not default and not isinstance(value, str):
             raise self.error(key, f"expected a text in quotes, got {_value_text(value)}")
         return str(value)
-
-    def flag(self, key: str) -> bool:
-        """Return a truth value; false when it is missing.
-
-        Raises:
-            FileFormatError: it is something else.
-        """
-        value = self._value(key, False, "true or false")  # noqa: FBT003 - a value of the file
-        if not isinstance(value, bool):
-            raise self.error(key, f"expected true or false, got {_value_text(value)}")
-        return value
 
     def texts(self, key: str) -> list[str]:
         """Return a list of strings.
