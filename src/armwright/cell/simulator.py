@@ -228,11 +228,15 @@ class Simulator:
     def locate(self, frame: str) -> tuple[Array, float]:
         """Return the next answer of the camera for a frame, in the world, and the time it takes.
 
-        The answers of the cell file come one after the other; where it states so, the last one is repeated.
+        A marker of the scene is where it is. The answers of the cell file come one after the other; where it states so,
+        the last one is repeated.
 
         Raises:
             DeviceError: the cell file has no answer for this frame, or no more.
         """
+        sight = self._cell.sights.get(frame)
+        if sight is not None and sight.kind == "marker":
+            return self._cell.markers[sight.name].pose @ sight.relation, self._cell.vision_time
         answers = self._answers.get(frame)
         if not answers:
             if count := len(self._cell.visions.get(frame, ())):
@@ -241,7 +245,7 @@ class Simulator:
                     f"{counted(count, 'answer')} for it; "
                     'with `after_last = "same"` under [camera] the last one stays'
                 )
-            known = ", ".join(sorted(self._answers)) or "nothing"
+            known = ", ".join(sorted({*self._answers, *self._cell.sights})) or "nothing"
             raise DeviceError(f"the camera found nothing for {frame}; in cell '{self._cell.name}' it finds {known}")
         last = self._cell.camera_repeats and len(answers) == 1
         answer = answers[0] if last else answers.pop(0)
