@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,6 +16,7 @@ from armwright.errors import MissingExtraError
 from armwright.files.output import write_file
 from armwright.physics.graphics import graphics, load_mujoco
 from armwright.physics.markers import opencv
+from armwright.spatial.lens import Lens
 from armwright.spatial.poses import homogeneous
 
 # Red, green and blue (height, width, 3).
@@ -22,6 +24,8 @@ Picture: TypeAlias = npt.NDArray[np.uint8]
 
 # Everything is drawn with so many pixels for each of the picture, along either side, and averaged.
 _FINER = 2
+# Pixels between those whose directions are computed, and how far sizes are off by rounding [px].
+_SPACING, _ROUNDING = 10, 1e-6
 # What is nearer or farther is not drawn [m].
 _NEAREST, _FARTHEST = 0.01, 100.0
 # Groups of geometries that are drawn: the rest is for contact only.
@@ -67,6 +71,7 @@ class Photographer:
 
     Attributes:
         graphics: the OpenGL that draws, ``egl`` or ``osmesa``.
+        model: the MjModel.
     """
 
     def __init__(self, model: Any, cameras: Mapping[str, Camera]) -> None:
@@ -80,7 +85,7 @@ class Photographer:
             MissingExtraError: OpenGL or OpenCV is missing.
         """
         mujoco = load_mujoco()
-        self._mujoco, self._cv2, self._model = mujoco, opencv(), model
+        self._mujoco, self._cv2, self.model = mujoco, opencv(), model
         self._sights = {name: _View(camera) for name, camera in cameras.items()}
         self.graphics, context = graphics()
         self._scene = mujoco.MjvScene(model, _most_geometries(model))
@@ -116,10 +121,10 @@ class Photographer:
 
     def _drawing_context(self, width: int, height: int) -> Any:
         """Return what a drawing of MuJoCo needs, without smoothing of edges: pixels are averaged here."""
-        quality = self._model.vis.quality
+        quality = self.model.vis.quality
         samples, quality.offsamples = quality.offsamples, 0
         try:
-            drawing = self._mujoco.MjrContext(self._model, self._mujoco.mjtFontScale.mjFONTSCALE_100.value)
+            drawing = self._mujoco.MjrContext(self.model, self._mujoco.mjtFontScale.mjFONTSCALE_100.value)
         finally:
             quality.offsamples = samples
         self._mujoco.mjr_setBuffer(self._mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, drawing)
@@ -130,9 +135,9 @@ class Photographer:
         """Return a picture of the field of a lens, without distortion."""
         mujoco, scene = self._mujoco, self._scene
         camera = mujoco.MjvCamera()
-        camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, self._model.camera(view.camera.name).id
+        camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, self.model.camera(view.camera.name).id
         self._context.make_current()
-        mujoco.mjv_updateScene(self._model, data, self._options, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
+        mujoco.mjv_updateScene(self.model, data, self._options, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
         (left, top), (right, bottom) = view.field * _NEAREST
         for eye in scene.camera:
             eye.frustum_near, eye.frustum_far = _NEAREST, _FARTHEST
@@ -160,17 +165,29 @@ class _View:
 
     def __init__(self, camera: Camera) -> None:
         """Find the field of the lens of a camera."""
-        lens = camera.lens
-        self.camera, self.field = camera, lens.field()
-        span = self.field[1] - self.field[0]
-        width, height = np.ceil(span * lens.focal * _FINER - 1e-6).astype(int).tolist()
-        self.size = (width, height)
-        self.maps: tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]] | None = None
-        if lens.distortion.any():
-            x, y = ((np.arange(size * _FINER) + 0.5) / _FINER - 0.5 for size in (lens.width, lens.height))
-            seen = lens.rays(np.stack(np.meshgrid(x, y), axis=-1))[..., :2]
-            found = (seen - self.field[0]) / span * self.size - 0.5
-            self.maps = np.ascontiguousarray(found[..., 0], np.float32), np.ascontiguousarray(found[..., 1], np.float32)
+        self.camera, self.field = camera, camera.lens.field()
+        span = np.ptp(self.field, axis=0) * camera.lens.focal * _FINER
+        self.size = int(np.ceil(span[0] - _ROUNDING)), int(np.ceil(span[1] - _ROUNDING))
+        self.maps: list[npt.NDArray[np.float32]] | None = None
+        if camera.lens.distortion.any():
+            scaled = zip(_directions(camera.lens), self.field[0], np.ptp(self.field, axis=0), self.size, strict=True)
+            self.maps = [((x - least) / width * size - 0.5).astype(np.float32) for x, least, width, size in scaled]
+
+
+@lru_cache(maxsize=8)
+def _directions(lens: Lens) -> tuple[Array, Array]:
+    """Return the x and the y of the directions with z = 1 of all pixels of a picture that is finer than that of a lens.
+
+    A lens distorts smoothly, so that a spline through some of the pixels has the others.
+    """
+    from scipy.interpolate import RectBivariateSpline  # noqa: PLC0415 - few lenses distort
+
+    sizes = lens.width, lens.height
+    x, y = (np.linspace(-0.5, size - 0.5, max(8, size // _SPACING)) for size in sizes)
+    known = lens.rays(np.stack(np.meshgrid(x, y), axis=-1))
+    columns, rows = ((np.arange(size * _FINER) + 0.5) / _FINER - 0.5 for size in sizes)
+    every = [RectBivariateSpline(y, x, known[..., axis])(rows, columns) for axis in range(2)]
+    return every[0], every[1]
 
 
 def _exposed(pixels: Picture, camera: Camera, seed: int | Sequence[int]) -> Picture:

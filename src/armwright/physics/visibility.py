@@ -12,7 +12,7 @@ from armwright.cell.scene import Camera
 from armwright.physics.graphics import load_mujoco
 from armwright.physics.markers import marker_corners
 from armwright.physics.pictures import DRAWN_GROUPS, Picture, camera_pose
-from armwright.spatial.poses import homogeneous
+from armwright.spatial.poses import homogeneous, inverse
 
 # A picture whose pixels are on average below this is dark, of 255.
 _DARK = 12.0
@@ -22,7 +22,7 @@ _SMALLEST, _FLATTEST = 12.0, 0.26
 _POINTS, _BEFORE = 7, 1e-3
 
 
-def why_unseen(model: Any, data: Any, camera: Camera, picture: Picture, marker: str, size: float) -> str:
+def why_unseen(model: Any, data: Any, camera: Camera, picture: Picture, *, marker: str, size: float) -> str:
     """Return why a marker is not found in a picture, as what follows "the camera does not see it: ".
 
     Args:
@@ -36,24 +36,34 @@ def why_unseen(model: Any, data: Any, camera: Camera, picture: Picture, marker: 
     if picture.mean() < _DARK:
         return "it is dark"
     X_WC, site = camera_pose(data, camera.name), data.site(marker)
-    X_CM = np.linalg.inv(X_WC) @ homogeneous(site.xmat.reshape(3, 3), site.xpos)
+    X_CM = inverse(X_WC) @ homogeneous(site.xmat.reshape(3, 3), site.xpos)
     corners = marker_corners(size) @ X_CM[:3, :3].T + X_CM[:3, 3]
+    elevation = -float(X_CM[:3, 2] @ X_CM[:3, 3]) / float(np.linalg.norm(X_CM[:3, 3]))
     if (corners[:, 2] <= 0).all():
         return "it is behind the camera"
     if not _within(camera, corners):
         return "it is not wholly in the picture"
-    across = -float(X_CM[:3, 2] @ X_CM[:3, 3]) / float(np.linalg.norm(X_CM[:3, 3]))
-    if across <= 0:
+    if elevation <= 0:
         return "it faces away from the camera"
-    hidden = _hidden_by(model, data, X_WC, corners)
-    if hidden:
+    if hidden := _hidden_by(model, data, X_WC, corners):
         return f"{hidden} is in front of it"
-    if across < _FLATTEST:
-        return f"it is looked at under a flat angle of {np.degrees(np.arcsin(across)):.0f} degrees"
+    return _too_small(camera, corners, elevation)
+
+
+def _too_small(camera: Camera, corners: Array, elevation: float) -> str:
+    """Return what a marker lacks that nothing hides.
+
+    Args:
+        camera: that looks at it.
+        corners: (4, 3) of the marker in the frame of the camera.
+        elevation: sine of the angle under which it is looked at.
+    """
+    if elevation < _FLATTEST:
+        return f"it is looked at under an angle of only {np.degrees(np.arcsin(elevation)):.0f} degrees"
     pixels = camera.lens.project(corners)
     side = float(np.linalg.norm(pixels - np.roll(pixels, 1, axis=0), axis=1).min())
     if side < _SMALLEST:
-        return f"it is too far away: its shortest side has {side:.0f} pixels"
+        return f"it is too small in the picture, with a side of {side:.0f} pixels"
     return "it is not told from what is around it"
 
 

@@ -62,7 +62,9 @@ class Lens:
         if self.distortion.any():
             # Newton's steps with the derivative of what the lens does.
             for _ in range(_STEPS):
-                step = np.linalg.solve(self._derivative(flat), (seen - self._distorted(flat))[..., None])[..., 0]
+                (a, b), (c, d) = np.moveaxis(self._derivative(flat), (-2, -1), (0, 1))
+                x, y = np.moveaxis(seen - self._distorted(flat), -1, 0)
+                step = np.stack([d * x - b * y, a * y - c * x], axis=-1) / (a * d - b * c)[..., None]
                 flat = flat + step
                 if np.abs(step).max(initial=0.0) < _SETTLED:
                     break
@@ -81,10 +83,7 @@ class Lens:
         x, y = (np.linspace(-0.5, size - 0.5, _GRID) for size in (self.width, self.height))
         pixels = np.stack(np.meshgrid(x, y), axis=-1)
         with np.errstate(all="ignore"):
-            try:
-                rays = self.rays(pixels)
-            except np.linalg.LinAlgError:
-                return False
+            rays = self.rays(pixels)
             back = np.abs(self.project(rays) - pixels).max() if np.isfinite(rays).all() else np.inf
             return bool(back < _SAME_PIXEL and (np.linalg.det(self._derivative(rays[..., :2])) > 0).all())
 
