@@ -120,8 +120,7 @@ def test_another_height() -> None:
     with pytest.raises(DeviceError) as caught:
         target_pose(corners, SIMPLE, TOP.pose, TARGET)
     assert str(caught.value) == (
-        "marker 3 of BLOCK is seen, but not where it should be: it looks 40 mm higher than for BLOCK at the height of "
-        "its vision"
+        "marker 3 of BLOCK is seen, but at another height: it looks 40 mm higher than in the vision of BLOCK"
     )
     with pytest.raises(DeviceError, match="it looks 30 mm lower"):
         target_pose(

@@ -24,8 +24,9 @@ _LEFT_OUT = 0.12
 _REFINEMENTS = 3
 # Less between black and white is no edge, of 255.
 _LEAST_CONTRAST = 5.0
-# A marker is not at the height where it is looked for if it is so much larger or smaller than there.
-_WRONG_SIZE = 0.03
+# A marker is not at the height where it is looked for if it is so much larger or smaller than there, and is tilted if
+# its corners are so far from those of a square.
+_WRONG_SIZE, _WRONG_SHAPE = 0.03, 0.05
 # Rays that meet a horizontal plane under a flatter angle do not say where, as the sine of it.
 _FLAT = 0.02
 # The second pose of a square must fit so much worse for the first to be believed.
@@ -177,17 +178,18 @@ def _standing_pose(rays: Array, eye: Array, target: Target, height: float) -> Ar
     seen = eye[:2] + ((heights - eye[2]) / rays[:, 2])[:, None] * rays[:, :2]
     here, there = arms[:, :2] - arms[:, :2].mean(axis=0), seen - seen.mean(axis=0)
     cosine, sine = (here * there).sum(), (here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]).sum()
-    larger = np.hypot(cosine, sine) / (here**2).sum() - 1
-    if not abs(larger) < _WRONG_SIZE:
+    R = elementary_rotation(2, float(np.arctan2(sine, cosine)))
+    larger = float(np.hypot(cosine, sine) / (here**2).sum())
+    if np.linalg.norm(there - larger * here @ R[:2, :2].T) > _WRONG_SHAPE * np.linalg.norm(there):
+        raise DeviceError(f"marker {number} of {name} is seen, but tilted: {name} does not stand as at the start")
+    if not abs(larger - 1) < _WRONG_SIZE:
         # What is nearer to the camera looks larger.
-        off = larger * (eye[2] - heights.mean()) / (1 + larger)
+        off = (1 - 1 / larger) * float(eye[2] - heights.mean()) * 1e3
         raise DeviceError(
-            f"marker {number} of {name} is seen, but not where it should be: it looks {abs(off) * 1e3:.0f} mm "
-            f"{'higher' if off > 0 else 'lower'} than for {name} at the height of its vision"
+            f"marker {number} of {name} is seen, but at another height: it looks {abs(off):.0f} mm "
+            f"{'higher' if off > 0 else 'lower'} than in the vision of {name}"
         )
-    R = elementary_rotation(2, float(np.arctan2(sine, cosine))) @ target.start[:3, :3]
-    middle = elementary_rotation(2, float(np.arctan2(sine, cosine)))[:2, :2] @ arms[:, :2].mean(axis=0)
-    return homogeneous(R, (*(seen.mean(axis=0) - middle), height))
+    return homogeneous(R @ target.start[:3, :3], (*(seen.mean(axis=0) - R[:2, :2] @ arms[:, :2].mean(axis=0)), height))
 
 
 def _free_pose(rays: Array, X_WC: Array, target: Target) -> Array:

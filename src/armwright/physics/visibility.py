@@ -14,8 +14,8 @@ from armwright.physics.markers import marker_corners
 from armwright.physics.pictures import DRAWN_GROUPS, Picture, camera_pose
 from armwright.spatial.poses import homogeneous, inverse
 
-# A picture whose pixels are on average below this is dark, of 255.
-_DARK = 12.0
+# Where nine of ten pixels of a marker are below this, it is dark, of 255.
+_DARK = 30.0
 # Sides of a marker that is found [px], and the flattest angle under which it is looked at, as the sine of it.
 _SMALLEST, _FLATTEST = 12.0, 0.26
 # Points of a marker that are looked at, along each side, and what is in front of them by more than this [m].
@@ -33,8 +33,6 @@ def why_unseen(model: Any, data: Any, camera: Camera, picture: Picture, *, marke
         marker: name of its site in the model.
         size: length of the sides of its black square [m].
     """
-    if picture.mean() < _DARK:
-        return "it is dark"
     X_WC, site = camera_pose(data, camera.name), data.site(marker)
     X_CM = inverse(X_WC) @ homogeneous(site.xmat.reshape(3, 3), site.xpos)
     corners = marker_corners(size) @ X_CM[:3, :3].T + X_CM[:3, 3]
@@ -47,20 +45,24 @@ def why_unseen(model: Any, data: Any, camera: Camera, picture: Picture, *, marke
         return "it faces away from the camera"
     if hidden := _hidden_by(model, data, X_WC, corners):
         return f"{hidden} is in front of it"
-    return _too_small(camera, corners, elevation)
+    return _indistinct(camera, picture, corners, elevation)
 
 
-def _too_small(camera: Camera, corners: Array, elevation: float) -> str:
+def _indistinct(camera: Camera, picture: Picture, corners: Array, elevation: float) -> str:
     """Return what a marker lacks that nothing hides.
 
     Args:
         camera: that looks at it.
+        picture: with the marker.
         corners: (4, 3) of the marker in the frame of the camera.
         elevation: sine of the angle under which it is looked at.
     """
     if elevation < _FLATTEST:
         return f"it is looked at under an angle of only {np.degrees(np.arcsin(elevation)):.0f} degrees"
     pixels = camera.lens.project(corners)
+    (left, top), (right, bottom) = pixels.min(axis=0).astype(int), pixels.max(axis=0).astype(int) + 1
+    if np.quantile(picture[top:bottom, left:right], 0.9) < _DARK:
+        return "it is dark"
     side = float(np.linalg.norm(pixels - np.roll(pixels, 1, axis=0), axis=1).min())
     if side < _SMALLEST:
         return f"it is too small in the picture, with a side of {side:.0f} pixels"
