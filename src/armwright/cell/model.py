@@ -11,7 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
-from armwright.cell.scene import Fixture, Gripper, Part
+from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import one_pose
@@ -95,7 +95,9 @@ class Cell:
         frames: by name, in upper case.
         fixtures: bodies that stand where they are, by name.
         parts: bodies that grippers hold and move, by name.
-        seen_parts: by frame name, the part whose grasp pose the camera answers with.
+        markers: of the scene, by name, with their poses in the world.
+        cameras: that take pictures, by name.
+        sights: by frame name, what a camera looks for: parts, and markers of the scene.
         visions: other answers of the camera by frame name, in order, (4, 4) relative to the camera.
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
@@ -118,7 +120,9 @@ class Cell:
     frames: Mapping[str, Node] = attrs.field(factory=dict)
     fixtures: Mapping[str, Fixture] = attrs.field(factory=dict)
     parts: Mapping[str, Part] = attrs.field(factory=dict)
-    seen_parts: Mapping[str, str] = attrs.field(factory=dict)
+    markers: Mapping[str, Marker] = attrs.field(factory=dict)
+    cameras: Mapping[str, Camera] = attrs.field(factory=dict)
+    sights: Mapping[str, Sight] = attrs.field(factory=dict)
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False
@@ -141,6 +145,11 @@ class Cell:
         object.__setattr__(self, "arms", arms)
 
     @property
+    def seen_parts(self) -> Mapping[str, str]:
+        """By frame name, the part whose grasp pose a camera answers with."""
+        return {name: sight.name for name, sight in self.sights.items() if sight.kind == "part"}
+
+    @property
     def corner_deviation(self) -> float:
         """How far a path past several frames may be from the straight legs between them [m]."""
         return _CORNER_DEVIATIONS * self.deviation if self.corner is None else self.corner
@@ -148,7 +157,7 @@ class Cell:
     @property
     def seen_frames(self) -> frozenset[str]:
         """The frames that the camera has answers for."""
-        return frozenset({*self.visions, *self.seen_parts})
+        return frozenset({*self.visions, *self.sights})
 
     @property
     def collisions_matter(self) -> bool:

@@ -245,6 +245,10 @@ class Table:
         """Whether the value of a key is a table."""
         return isinstance(self._data.get(key), dict)
 
+    def is_text(self, key: str) -> bool:
+        """Whether the value of a key is a text."""
+        return isinstance(self._data.get(key), str)
+
     def allow(self, *keys: str) -> None:
         """Make optional keys known: ``refuse_unknown_keys`` may name them as the nearest to a misspelt one."""
         self._read.update(keys)
