@@ -15,7 +15,10 @@ from armwright.cell.scene import Gripper, Part
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.geoms import add_geom, place, quaternion
 from armwright.physics.gripper import add_gripper
+from armwright.physics.markers import add_marker
+from armwright.physics.pictures import add_camera, add_lights
 from armwright.physics.plant import add_arm, finish, new_world
+from armwright.physics.vision import marker_name
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Solid, centroid, farthest, inertia
 
@@ -87,6 +90,7 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     for part in parts.values():
         _add_part(spec, part)
     plate = _add_plate(spec, cell)
+    _add_cameras(spec, cell, {plant.name: plant.tool for plant in plants})
     model = finish(spec, tuple(plants))
     return WorldModel(cell=cell, model=model, substeps=substeps, parts=parts, plate=plate)
 
@@ -123,6 +127,20 @@ def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
         conaffinity=_PART,
         **_surface(1.0),
     )
+
+
+def _add_cameras(spec: Any, cell: Cell, tools: Mapping[str, Any]) -> None:
+    """Add the cameras of a cell, light, and the markers that they look for."""
+    if not cell.cameras:
+        return
+    add_lights(spec)
+    for camera in cell.cameras.values():
+        add_camera(spec.worldbody if camera.on is None else tools[camera.on], camera)
+    for name, marker in cell.markers.items():
+        add_marker(spec, spec.worldbody, marker, marker_name(name))
+    for name, part in cell.parts.items():
+        if part.marker is not None:
+            add_marker(spec, spec.body(name), part.marker, marker_name(name))
 
 
 def _add_part(spec: Any, part: Part) -> None:
