@@ -30,9 +30,7 @@ def guessed_solids(arm: Arm) -> tuple[tuple[Solid, ...], ...]:
     slide begins where it is at its lower limit.
     """
     radii = guessed_radii(arm)
-    return tuple(
-        tuple(_along(arm, i, float(radii[i]))) or (_ball(float(radii[i])),) for i in range(arm.n)
-    )
+    return tuple(tuple(_along(arm, i, float(radii[i]))) or (_ball(float(radii[i])),) for i in range(arm.n))
 
 
 def _along(arm: Arm, i: int, radius: float) -> list[Solid]:

@@ -150,7 +150,7 @@ class Table:
         Raises:
             FileFormatError: it is something else.
         """
-        value = self._value(key, False, "true or false")  # noqa: FBT003 - a value of the file
+        value = self._value(key, False, "true or false")
         if not isinstance(value, bool):
             raise self.error(key, f"expected true or false, got {_value_text(value)}")
         return value
