@@ -94,6 +94,13 @@ def self_pairs(arm: Arm, bodies: Iterable[Body] | None = None, held: Iterable[Bo
     return SelfPairs(tuple(checked), tuple(left_out))
 
 
+def random_configurations(arm: Arm) -> Array:
+    """Return the configurations (10000, n) that tell which bodies always touch: within limits, the same every time."""
+    lower, upper = ranges(arm)
+    draws = np.random.default_rng(_SEED).random((CONFIGURATIONS, arm.n))
+    return np.asarray(lower + draws * (upper - lower))
+
+
 def _neighbours(arm: Arm, a: int, b: int) -> str:
     """Say why two bodies are neighbours."""
     if b == arm.n + 1 and a == arm.n:
@@ -106,15 +113,13 @@ def _neighbours(arm: Arm, a: int, b: int) -> str:
 
 
 class _Touching:
-    """The bodies of an arm in random configurations within the limits of its joints."""
+    """The bodies of an arm in random configurations."""
 
     def __init__(self, arm: Arm, solids: Sequence[Sequence[Solid]]) -> None:
         self._solids = solids
         self._distances: Distances | None = None
         self._numbers: dict[tuple[int, int], int] = {}
-        lower, upper = ranges(arm)
-        draws = np.random.default_rng(_SEED).random((CONFIGURATIONS, arm.n))
-        self._frames = link_poses(arm, lower + draws * (upper - lower))
+        self._frames = link_poses(arm, random_configurations(arm))
         # What the tool holds is in the frame of the last link.
         self._frames[:, arm.n + 1] = self._frames[:, arm.n]
 
