@@ -14,9 +14,9 @@ from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.clearance import RESOLUTION, Body
-from armwright.physics.self_collision import random_configurations, self_pairs
+from armwright.physics.self_collision import random_configurations, self_pairs, touch_bounds
 from armwright.spatial.poses import homogeneous
-from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
+from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, farthest
 from oracles.arms import random_arm, random_pose
 from oracles.solids import coal_distance, coal_shape, random_shape
 from samples import Sample
@@ -82,24 +82,62 @@ def test_pairs_of_random_arms(sample: Sample) -> None:
     assert apart > 0
 
 
-def test_a_pair_that_is_seldom_apart() -> None:
-    """A pair that touches in all but 1 of 500 configurations is checked; one that touches in all is not."""
-    # A ball on a lever of 1 m goes round another: they are apart in the last thousandths of the range of joint 2.
-    joints = [Joint(kind="revolute", limits=LIMITS), Joint(kind="prismatic", limits=Limits(lower=0, upper=1.002))]
-    for radius, checked in ((0.5, True), (0.502, False)):
-        ball = [Solid(shape=Sphere(radius=radius))]
-        arm = Arm(
-            name="lever",
-            joints=[*joints, Joint(kind="revolute", limits=LIMITS)],
-            links=[Link(), Link(solids=ball), Link()],
-        )
-        arm = attrs.evolve(
-            arm, base_solids=ball, links=[Link(solids=[Solid(shape=Sphere(radius=0.01))]), *arm.links[1:]]
-        )
+@pytest.mark.parametrize("shape", [Sphere(radius=0.5), Cylinder(radius=0.1, length=1), Box(size=(0.3, 0.2, 1))])
+def test_a_pair_that_is_seldom_apart(shape: Sphere | Cylinder | Box) -> None:
+    """A pair that touches in all but 1 of 1000 configurations is checked; one that touches in all is not."""
+    # Solids 1 m high, one of which a slide lifts above the other: they part at its upper end.
+    solid, small = [Solid(shape=shape)], [Solid(shape=Sphere(radius=0.01))]
+    for upper, checked in ((1.0015, True), (1.0004, False)):
+        joints = [
+            Joint(kind="revolute", limits=LIMITS),
+            Joint(kind="prismatic", limits=Limits(lower=0, upper=upper)),
+        ]
+        arm = Arm(name="lift", joints=joints, links=[Link(solids=small), Link(solids=solid)], base_solids=solid)
 
         pairs = self_pairs(arm)
 
         assert ((0, 2) in pairs.checked) is checked
+
+
+@pytest.mark.drawn(0.1)
+def test_what_capsules_tell(sample: Sample) -> None:
+    """Solids that touch for sure do, and solids that may not do not: in poses near contact, by coal."""
+    wrong, told, poses = 0, 0, 40
+    for rng in sample.cases(300):
+        one, other = (Solid(shape=random_shape(rng), pose=random_pose(rng)) for _ in range(2))
+        frames = np.array([random_pose(rng) for _ in range(poses)])
+        others = np.array([random_pose(rng) for _ in range(poses)])
+        # The origins of the solids are as far apart as a part of their sizes.
+        size = farthest(one.shape) + farthest(other.shape)
+        apart = (others @ other.pose)[:, :3, 3] - (frames @ one.pose)[:, :3, 3]
+        wanted = rng.uniform(0, size, (poses, 1)) * apart / np.linalg.norm(apart, axis=1, keepdims=True)
+        others[:, :3, 3] += wanted - apart
+
+        surely, maybe = touch_bounds(one, other, frames, others)
+
+        shapes = coal_shape(one.shape), coal_shape(other.shape)
+        distances = np.array(
+            [
+                coal_distance(shapes[0], X @ one.pose, shapes[1], Y @ other.pose)
+                for X, Y in zip(frames, others, strict=True)
+            ]
+        )
+        wrong += int((surely & (distances > RESOLUTION + ITERATED)).sum())
+        wrong += int((~maybe & (distances < RESOLUTION - ITERATED)).sum())
+        told += int((surely | ~maybe).sum())
+        assert not (surely & ~maybe).any()
+    sample.record("touching solids told by capsules", told, wrong)
+    assert wrong == 0
+    assert told > 0
+
+
+def test_nothing_is_known_of_the_inside_of_a_mesh() -> None:
+    """A mesh may have a hole: that a body is at its origin does not tell that they touch."""
+    mesh, ball = Solid(shape=TETRAHEDRON), Solid(shape=Sphere(radius=0.01))
+
+    surely, maybe = touch_bounds(mesh, ball, np.eye(4)[None], np.eye(4)[None])
+
+    assert (surely.tolist(), maybe.tolist()) == ([False], [True])
 
 
 def test_links_that_look_like_nothing() -> None:
@@ -120,7 +158,9 @@ def test_links_that_look_like_nothing() -> None:
 def test_what_the_tool_holds() -> None:
     """A gripper is fixed to the last link, and is checked against the others; a wide one always meets the wrist."""
     ball = Link(solids=[Solid(shape=Sphere(radius=0.05))])
-    arm = Arm(name="held", joints=[Joint(kind="revolute", a=0.3, limits=LIMITS)] * 3, links=[ball] * 3)
+    joints = [Joint(kind="revolute", a=0.3, limits=LIMITS)] * 3
+    # The gripper is in the frame of the last link, wherever the tool is.
+    arm = Arm(name="held", joints=joints, links=[ball] * 3, tool=homogeneous(np.eye(3), (2.0, 0.0, 0.0)))
     bodies = arm_bodies("held", arm)
 
     def pairs_with(size: float) -> tuple[tuple[tuple[int, int], ...], list[tuple[int, int]]]:

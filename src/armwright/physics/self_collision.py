@@ -134,7 +134,7 @@ class _Touching:
         unknown: list[tuple[tuple[int, int], tuple[int, int], Flags]] = []
         for i, one in enumerate(self._solids[a]):
             for j, other in enumerate(self._solids[b]):
-                surely, maybe = _touch(one, other, frames_a, frames_b)
+                surely, maybe = touch_bounds(one, other, frames_a, frames_b)
                 touch |= surely
                 if (maybe & ~surely).any():
                     unknown.append(((a, i), (b, j), maybe & ~surely))
@@ -162,10 +162,16 @@ class _Rod(NamedTuple):
     axis: int = 2
 
 
-def _touch(one: Solid, other: Solid, frames: Array, others: Array) -> tuple[Flags, Flags]:
+def touch_bounds(one: Solid, other: Solid, frames: Array, others: Array) -> tuple[Flags, Flags]:
     """Return in which configurations (k,) two solids touch for sure, and in which they may.
 
     Capsules within the solids, and capsules around them, tell: for capsules and spheres that is all.
+
+    Args:
+        one: a solid.
+        other: another one.
+        frames: (k, 4, 4) poses of the frame of the first.
+        others: (k, 4, 4) poses of that of the second.
     """
     X, Y = frames @ one.pose, others @ other.pose
     inner = _gap(_within(one.shape), X, _within(other.shape), Y)
