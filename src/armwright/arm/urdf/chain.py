@@ -14,7 +14,7 @@ from armwright.arm.urdf.robot import Robot, UrdfJoint, axis_of, body_of
 from armwright.arrays import Array
 from armwright.errors import one_of
 from armwright.files.limits import limit, limit_message
-from armwright.spatial.shapes import Solid
+from armwright.spatial.shapes import LARGEST_SIZE, Solid
 
 # Of links and joints, a message lists this many.
 _MAX_LISTED = 50
@@ -103,7 +103,8 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
     for joint in _joint_path(robot, root, base):
         X_RB = X_RB @ joint.origin
     if unread:
-        notes += (f"shapes that are meshes, or have no extent, are not read: those of the links {_listed(unread)}",)
+        kinds = f"boxes, cylinders, spheres and capsules up to {LARGEST_SIZE:g} m"
+        notes += (f"of shapes, {kinds} are read; links with others: {_listed(unread)}",)
     solids = tuple(solid for body in standing for solid in body.solids)
     return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, base_solids=solids, notes=notes)
 
