@@ -1,0 +1,105 @@
+"""Boards that cameras on arms see: where their corners are, and pictures of them, drawn without a renderer."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.calibration.arm_readings import ArmAccuracy, ArmReadings
+from armwright.calibration.board import Board, BoardView, BoardViews, board_views
+from armwright.kinematics.forward_kinematics import forward
+from armwright.spatial.lens import Lens
+from armwright.spatial.poses import homogeneous, inverse
+from armwright.spatial.rotations import rotation_from_vector
+
+CHARUCO = Board(columns=9, rows=7, square=0.03, marker=0.022)
+WIDTH, HEIGHT = 640, 480
+# The board faces the camera: its z points away, as the camera's does.
+_MIN_FACING = np.cos(np.radians(55))
+
+
+class Scene(NamedTuple):
+    """A camera, an arm and a board, and what they are like in truth.
+
+    Attributes:
+        lens: of the camera.
+        readings: of the arm, where it says that it is.
+        eye_in_hand: whether the camera is on the hand.
+        camera: (4, 4) its pose, on the hand or in the base frame.
+        board: (4, 4) pose of the board, in the base frame or on the hand.
+        seen: (m, 4, 4) poses of the board in the frame of the camera, where the arm truly is.
+    """
+
+    lens: Lens
+    readings: ArmReadings
+    eye_in_hand: bool
+    camera: Array
+    board: Array
+    seen: Array
+
+
+def random_lens(rng: np.random.Generator) -> Lens:
+    """Return a lens of 45 to 65 degrees with a centre and a distortion of its own."""
+    focal = rng.uniform(500, 700) * (1 + rng.uniform(-0.01, 0.01, 2))
+    centre = [319.5, 239.5] + rng.uniform(-12, 12, 2)
+    distortion = rng.uniform(-1, 1, 5) * [0.15, 0.05, 0.002, 0.002, 0.0]
+    return Lens(width=WIDTH, height=HEIGHT, focal=focal, centre=centre, distortion=distortion)
+
+
+def random_scene(
+    rng: np.random.Generator, arm: Arm, pictures: int, *, eye_in_hand: bool, accuracy: ArmAccuracy, board: Board = CHARUCO
+) -> Scene:
+    """Return a scene in which the arm moves about a random configuration so that the camera sees the board."""
+    lens = random_lens(rng)
+    while True:
+        q0 = rng.uniform(-2, 2, arm.n)
+        camera = homogeneous(rotation_from_vector(rng.uniform(-1.5, 1.5, 3)), rng.uniform(-0.1, 0.1, 3))
+        size = np.array([board.columns, board.rows, 0]) * board.square
+        middle = homogeneous(rotation_from_vector(rng.uniform(-0.3, 0.3, 3)), [0, 0, rng.uniform(0.4, 0.55)])
+        first = middle @ homogeneous(np.eye(3), -size / 2)
+        spread = np.where(np.arange(arm.n) < arm.n - 3, 0.12, 0.4)
+        hand = forward(arm, q0)
+        if eye_in_hand:
+            fixed = hand @ camera @ first
+        else:
+            # The roles of the two are exchanged: the board is on the hand, and the camera beside.
+            camera, fixed = hand @ camera @ inverse(first), camera
+        q = q0 + rng.standard_normal((4000, arm.n)) * spread
+        q = np.array([row for row, X in zip(q, _seen(forward(arm, q), camera, fixed, eye_in_hand), strict=True) if _good(lens, board, X)])
+        if len(q) >= pictures:
+            break
+    readings = ArmReadings(arm=arm, q=q[:pictures], accuracy=accuracy)
+    truly = readings.hand(rng.standard_normal((pictures, readings.corrections)))[0]
+    return Scene(lens, readings, eye_in_hand, camera, fixed, _seen(truly, camera, fixed, eye_in_hand))
+
+
+def projected(rng: np.random.Generator, scene: Scene, noise: float, board: Board = CHARUCO) -> BoardViews:
+    """Return where corners are seen that are in the picture, with noise [px]."""
+    views = []
+    for k, X in enumerate(scene.seen):
+        pixels = scene.lens.project(board.points @ X[:3, :3].T + X[:3, 3]) + noise * rng.standard_normal((len(board.points), 2))
+        inside = np.flatnonzero(((pixels > 3) & (pixels < [WIDTH - 4, HEIGHT - 4])).all(axis=1))
+        views.append(BoardView(name=f"picture_{k:02d}", corners=inside, pixels=pixels[inside]))
+    return board_views(board, (WIDTH, HEIGHT), views)
+
+
+def truth(scene: Scene) -> Array:
+    """Return the numbers of the lens."""
+    return np.concatenate([scene.lens.focal, scene.lens.centre, scene.lens.distortion])
+
+
+def _seen(hand: Array, camera: Array, board: Array, eye_in_hand: bool) -> Array:
+    return inverse(camera) @ (inverse(hand) if eye_in_hand else hand) @ board
+
+
+def _good(lens: Lens, board: Board, X: Array) -> bool:
+    points = board.points @ X[:3, :3].T + X[:3, 3]
+    if points[:, 2].min() < 0.2 or X[2, 2] < _MIN_FACING:
+        return False
+    pixels = lens.project(points)
+    inside = ((pixels > 8) & (pixels < [WIDTH - 9, HEIGHT - 9])).all(axis=1)
+    return bool(inside.mean() > 0.7)
