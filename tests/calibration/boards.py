@@ -103,3 +103,60 @@ def _good(lens: Lens, board: Board, X: Array) -> bool:
     pixels = lens.project(points)
     inside = ((pixels > 8) & (pixels < [WIDTH - 9, HEIGHT - 9])).all(axis=1)
     return bool(inside.mean() > 0.7)
+
+
+# ---- pictures ------------------------------------------------------------------------------------------------------
+
+# Samples along each side of a pixel, whose mean is what the pixel sees; and pixels of the printed board per square.
+_SAMPLES, _PRINTED = 4, 80
+_WHITE, _BLACK, _GREY = 215.0, 35.0, 128.0
+
+
+def printed(board: Board) -> Array:
+    """Return the board as printed, with white paper of one square around it."""
+    import cv2
+
+    if board.marker is None:
+        y, x = np.mgrid[: board.rows, : board.columns]
+        squares = np.where((x + y) % 2 == 0, 0, 255).astype(np.uint8)
+        image = np.kron(squares, np.ones((_PRINTED, _PRINTED), dtype=np.uint8))
+    else:
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{board.dictionary}"))
+        made = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square, board.marker, dictionary)
+        image = made.generateImage((board.columns * _PRINTED, board.rows * _PRINTED))
+    padded = np.pad(image, _PRINTED, constant_values=255)
+    return _BLACK + (_WHITE - _BLACK) / 255 * padded.astype(np.float32)
+
+
+def photographed(rng: np.random.Generator, board: Board, lens: Lens, X_CO: Array, noise: float) -> Array:
+    """Return the picture (height, width) that a lens makes of a board, with noise of its grey values."""
+    import cv2
+
+    rays = _fine_rays(lens)
+    # A ray meets the plane of the board where H takes it.
+    H = np.linalg.inv(np.column_stack([X_CO[:3, 0], X_CO[:3, 1], X_CO[:3, 3]]))
+    meets = rays @ H.T.astype(np.float32)
+    scale = _PRINTED / board.square
+    # The first sample of the print is in the middle of its first cell.
+    x, y = (meets[..., i] / meets[..., 2] * scale + _PRINTED - 0.5 for i in (0, 1))
+    fine = cv2.remap(printed(board), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=_GREY)
+    picture = cv2.resize(fine, (lens.width, lens.height), interpolation=cv2.INTER_AREA)
+    return (picture + noise * rng.standard_normal(picture.shape)).round().clip(0, 255).astype(np.uint8)
+
+
+_RAYS: dict[int, tuple[Lens, Array]] = {}
+
+
+def _fine_rays(lens: Lens) -> Array:
+    """Return the rays of all samples of a picture, interpolated between those of every eighth pixel."""
+    from scipy.interpolate import RectBivariateSpline
+
+    if id(lens) not in _RAYS:
+        u, v = np.arange(-8, lens.width + 16, 8.0), np.arange(-8, lens.height + 16, 8.0)
+        coarse = lens.rays(np.stack(np.meshgrid(u, v), axis=-1))
+        step = (np.arange(_SAMPLES) + 0.5) / _SAMPLES - 0.5
+        fine_u, fine_v = ((np.arange(n)[:, None] + step).ravel() for n in (lens.width, lens.height))
+        rays = [RectBivariateSpline(v, u, coarse[..., i])(fine_v, fine_u).astype(np.float32) for i in (0, 1)]
+        _RAYS.clear()
+        _RAYS[id(lens)] = lens, np.stack([*rays, np.ones_like(rays[0])], axis=-1)
+    return _RAYS[id(lens)][1]

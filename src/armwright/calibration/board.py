@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import attrs
@@ -142,7 +142,14 @@ class BoardViews:
         return attrs.evolve(self, views=tuple(self.views[i] for i in numbers))
 
 
-def board_views(board: Board, size: tuple[int, int], views: Sequence[BoardView], *, least: int = 3) -> BoardViews:
+def board_views(
+    board: Board,
+    size: tuple[int, int],
+    views: Sequence[BoardView],
+    *,
+    least: int = 3,
+    left_out: Mapping[str, str] | None = None,
+) -> BoardViews:
     """Return the pictures that show enough of a board; the others are left out by name.
 
     Args:
@@ -150,6 +157,7 @@ def board_views(board: Board, size: tuple[int, int], views: Sequence[BoardView],
         size: width and height of the pictures [px].
         views: of the pictures.
         least: how many pictures are needed.
+        left_out: other pictures, which do not show it, with the reason.
 
     Raises:
         InvalidValueError: a corner is none of the board, twice in a picture, or outside of the picture; two pictures
@@ -157,7 +165,7 @@ def board_views(board: Board, size: tuple[int, int], views: Sequence[BoardView],
         TooFewError: too few pictures show enough corners.
     """
     width, height = size
-    kept, left_out = list[BoardView](), dict[str, str]()
+    kept, left_out = list[BoardView](), dict(left_out or {})
     for view in views:
         if view.name in (*left_out, *(other.name for other in kept)):
             raise InvalidValueError(f"expected one picture of each name, got several of {view.name}")

@@ -1,0 +1,54 @@
+"""Reading pictures: PNG and JPEG as grey values, whose size is looked at before they are unpacked."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from armwright.errors import FileFormatError
+from armwright.files.inputs import read_bytes
+from armwright.files.limits import limit, limit_message
+
+GreyPicture: TypeAlias = npt.NDArray[np.uint8]
+
+FORMATS = ("PNG", "JPEG")
+# Names of pictures by how they end.
+ENDINGS = (".png", ".jpg", ".jpeg")
+_MEGAPIXEL = 1_000_000
+
+
+def read_grey_picture(path: Path | str) -> GreyPicture:
+    """Return the grey values (height, width) of a picture, as it is stored: no mark of orientation turns it.
+
+    Args:
+        path: of a PNG or JPEG file.
+
+    Raises:
+        FileFormatError: the file is missing, larger than the limit, no such picture, or broken; or the picture has more
+            pixels than the limit.
+    """
+    from PIL import Image  # noqa: PLC0415 - costs a tenth of a second, and only pictures need it
+
+    data = read_bytes(path, "picture_mb")
+    try:
+        with warnings.catch_warnings():
+            # Pictures within our own limit are read.
+            warnings.simplefilter("ignore")
+            picture = Image.open(io.BytesIO(data), formats=FORMATS)
+            width, height = picture.size
+            if width * height > limit("picture_megapixels") * _MEGAPIXEL:
+                size = f"{width:,} x {height:,} pixels"
+                raise FileFormatError(path, None, "", f"too large: {limit_message('picture_megapixels', size)}")
+            if picture.mode.startswith("I"):
+                # Sixteen bits for each pixel, of which the upper eight are kept.
+                return np.asarray(np.asarray(picture, dtype=np.uint32) >> 8, dtype=np.uint8)
+            return np.array(picture.convert("L"))
+    except FileFormatError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a decoder of broken data raises whatever it runs into
+        raise FileFormatError(path, None, "", "expected a picture as PNG or JPEG; this file is none, or broken") from error
