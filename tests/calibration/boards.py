@@ -51,7 +51,13 @@ def random_lens(rng: np.random.Generator) -> Lens:
 
 
 def random_scene(
-    rng: np.random.Generator, arm: Arm, pictures: int, *, eye_in_hand: bool, accuracy: ArmAccuracy, board: Board = CHARUCO
+    rng: np.random.Generator,
+    arm: Arm,
+    pictures: int,
+    *,
+    eye_in_hand: bool,
+    accuracy: ArmAccuracy,
+    board: Board = CHARUCO,
 ) -> Scene:
     """Return a scene in which the arm moves about a random configuration so that the camera sees the board."""
     lens = random_lens(rng)
@@ -69,7 +75,13 @@ def random_scene(
             # The roles of the two are exchanged: the board is on the hand, and the camera beside.
             camera, fixed = hand @ camera @ inverse(first), camera
         q = q0 + rng.standard_normal((4000, arm.n)) * spread
-        q = np.array([row for row, X in zip(q, _seen(forward(arm, q), camera, fixed, eye_in_hand), strict=True) if _good(lens, board, X)])
+        q = np.array(
+            [
+                row
+                for row, X in zip(q, _seen(forward(arm, q), camera, fixed, eye_in_hand), strict=True)
+                if _good(lens, board, X)
+            ]
+        )
         if len(q) >= pictures:
             break
     readings = ArmReadings(arm=arm, q=q[:pictures], accuracy=accuracy)
@@ -81,7 +93,9 @@ def projected(rng: np.random.Generator, scene: Scene, noise: float, board: Board
     """Return where corners are seen that are in the picture, with noise [px]."""
     views = []
     for k, X in enumerate(scene.seen):
-        pixels = scene.lens.project(board.points @ X[:3, :3].T + X[:3, 3]) + noise * rng.standard_normal((len(board.points), 2))
+        pixels = scene.lens.project(board.points @ X[:3, :3].T + X[:3, 3]) + noise * rng.standard_normal(
+            (len(board.points), 2)
+        )
         inside = np.flatnonzero(((pixels > 3) & (pixels < [WIDTH - 4, HEIGHT - 4])).all(axis=1))
         views.append(BoardView(name=f"picture_{k:02d}", corners=inside, pixels=pixels[inside]))
     return board_views(board, (WIDTH, HEIGHT), views)

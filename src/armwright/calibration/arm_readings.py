@@ -24,6 +24,14 @@ def _deviations(value: ArrayLike | None) -> Array | None:
     return deviations
 
 
+def _position(value: float) -> float:
+    return positive(value, "position", "m")
+
+
+def _orientation(value: float) -> float:
+    return positive(value, "orientation", "rad")
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class ArmAccuracy:
     """Standard deviations of where an arm is, about where its joint positions put it.
@@ -34,8 +42,8 @@ class ArmAccuracy:
         joints: (n,) of each joint [rad] or [m], or one for all; in place of the two above.
     """
 
-    position: float = attrs.field(default=1e-4, converter=lambda value: positive(value, "position", "m"))
-    orientation: float = attrs.field(default=5e-4, converter=lambda value: positive(value, "orientation", "rad"))
+    position: float = attrs.field(default=1e-4, converter=_position)
+    orientation: float = attrs.field(default=5e-4, converter=_orientation)
     joints: Array | None = attrs.field(default=None, converter=_deviations)
 
     def scaled(self, factor: float) -> ArmAccuracy:

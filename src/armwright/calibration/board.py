@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array, ArrayLike, integer, positive, read_only
+from armwright.arrays import Array, integer, positive, read_only
 from armwright.errors import InvalidValueError, ShapeError, TooFewError, counted
 
 Numbers: TypeAlias = npt.NDArray[np.int64]
@@ -24,11 +24,15 @@ MIN_CORNERS = 6
 _MIN_WIDTH = 0.4
 
 
-def _count(value: int, attribute: attrs.Attribute[int]) -> int:
-    result = integer(value, f"{attribute.name} of the board", least=3)
+def _count(value: int) -> int:
+    result = integer(value, "squares along a side of the board", least=3)
     if result > _MAX_SQUARES:
-        raise InvalidValueError(f"{attribute.name} of the board: expected at most {_MAX_SQUARES} squares, got {result}")
+        raise InvalidValueError(f"squares along a side of the board: expected at most {_MAX_SQUARES}, got {result}")
     return result
+
+
+def _square(value: float) -> float:
+    return positive(value, "square of the board", "m")
 
 
 @attrs.frozen(kw_only=True)
@@ -46,9 +50,9 @@ class Board:
         dictionary: of the markers, such as ``4X4_50``.
     """
 
-    columns: int = attrs.field(converter=attrs.Converter(_count, takes_field=True))
-    rows: int = attrs.field(converter=attrs.Converter(_count, takes_field=True))
-    square: float = attrs.field(converter=lambda value: positive(value, "square of the board", "m"))
+    columns: int = attrs.field(converter=_count)
+    rows: int = attrs.field(converter=_count)
+    square: float = attrs.field(converter=_square)
     marker: float | None = None
     dictionary: str = USUAL_DICTIONARY
 
@@ -130,12 +134,12 @@ class BoardViews:
     @property
     def points(self) -> Array:
         """(c, 3) of each corner, its point of the board [m]."""
-        return self.board.points[np.concatenate([view.corners for view in self.views])]
+        return np.asarray(self.board.points[np.concatenate([view.corners for view in self.views])])
 
     @property
     def pixels(self) -> Array:
         """(c, 2) where each corner is seen."""
-        return np.concatenate([view.pixels for view in self.views])
+        return np.asarray(np.concatenate([view.pixels for view in self.views]))
 
     def take(self, numbers: Sequence[int]) -> BoardViews:
         """Return some of the pictures, by their numbers from 0."""
@@ -218,6 +222,6 @@ def _insufficient(board: Board, view: BoardView) -> str:
 
 def _area_scale(board: Board, view: BoardView) -> float:
     """Return how areas of the board grow in the picture; it is negative in a mirror image."""
-    flat: ArrayLike = np.column_stack([board.points[view.corners, :2], np.ones(len(view.corners))])
-    affine, *_ = np.linalg.lstsq(flat, view.pixels)
+    flat = np.column_stack([board.points[view.corners, :2], np.ones(len(view.corners))])
+    affine = np.linalg.pinv(flat) @ view.pixels
     return float(np.linalg.det(affine[:2]))

@@ -66,13 +66,13 @@ def views_of_pictures(
     if not paths:
         raise TooFewError(f"expected {least} pictures or more, got none")
     find, views, missing = board_finder(board), list[BoardView](), dict[str, str]()
-    size: tuple[int, int] | None = None
+    size = 0, 0
     for number, path in enumerate(map(file_path, paths), 1):
         if progress is not None:
             progress(f"looking for the board in picture {number} of {len(paths)}")
         picture = read_grey_picture(path)
         height, width = picture.shape
-        if size is None:
+        if number == 1:
             size = width, height
             if min(size) < _MIN_SIDE:
                 raise FileFormatError(path, None, "", f"expected a picture of a board, got {width} x {height} pixels")
@@ -85,7 +85,6 @@ def views_of_pictures(
             missing[path.name] = "the board is not found"
         else:
             views.append(found)
-    assert size is not None
     if not views:
         raise TooFewError(
             f"the board is not found in any of {len(paths)} pictures; check the numbers of squares (columns x rows, "

@@ -93,7 +93,7 @@ class CameraIntrinsics:
             notes.append(f"{counted(self.wrong_corners, 'corner')} left out, far from where the others put them")
         if self.coverage < _MIN_COVERAGE:
             notes.append(
-                f"the corners are in {self.coverage:.0%} of the picture only; in the rest the distortion is extrapolated"
+                f"the corners are in {self.coverage:.0%} of the picture only; elsewhere the distortion is extrapolated"
             )
         return tuple(notes)
 
@@ -159,9 +159,7 @@ def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
     errors = np.ravel(errors)[:9]
     if not (np.isfinite(values).all() and np.isfinite(errors).all() and (values[:2] > 0).all()):
         raise _undetermined(views, None, None)
-    lens = Lens(
-        width=views.width, height=views.height, focal=values[:2], centre=values[2:4], distortion=values[4:]
-    )
+    lens = Lens(width=views.width, height=views.height, focal=values[:2], centre=values[2:4], distortion=values[4:])
     residuals = np.concatenate(
         [
             view.pixels - cv2.projectPoints(object_points, rotation, translation, matrix, distortion)[0][:, 0]

@@ -63,7 +63,8 @@ class HandEyeCalibration:
         by_picture: (m,) the same of each picture.
         names: of all m pictures.
         wrong: numbers of pictures that contradict the others; they do not count.
-        residuals: (c, 2) of the corners of the other pictures, seen minus expected [px].
+        views: the other pictures.
+        residuals: (c, 2) of their corners, seen minus expected [px].
         readings: of the arm, at all pictures.
     """
 
@@ -79,6 +80,7 @@ class HandEyeCalibration:
     by_picture: Array
     names: tuple[str, ...]
     wrong: tuple[int, ...]
+    views: BoardViews
     residuals: Array
     readings: ArmReadings
 
@@ -102,16 +104,14 @@ class HandEyeCalibration:
         if self.disagreement**2 * freedom <= chi2.isf(_SIGNIFICANCE, freedom):
             return ()
         accuracy = self.readings.accuracy.scaled(self.disagreement)
-        better = (
+        stated = (
             f"an accuracy of {accuracy.position * 1e3:.2g} mm and {accuracy.orientation * 1e3:.2g} mrad"
             if accuracy.joints is None
             else f"standard deviations of the joints {self.disagreement:.2g} times as large"
         )
-        return (
-            f"the pictures are {self.disagreement:.3g} times as far from where the arm puts the camera as its accuracy "
-            f"allows, so that the standard errors are too small. Calibrate the arm, check the length of the squares, "
-            f"or give {better}",
-        )
+        much = f"{self.disagreement:.3g} times as far from where the arm puts the camera as its accuracy allows"
+        remedy = f"Calibrate the arm, check the length of the squares, or give {stated}"
+        return (f"the pictures are {much}, so that the standard errors are too small. {remedy}",)
 
 
 def calibrate_hand_eye(
@@ -169,9 +169,6 @@ def calibrate_hand_eye(
     fit, used, squares = _fit_without_wrong(problem, state, _not_far(distances))
     spread = _mean_square(squares[used], len(used))
     _refuse_contradiction(views.names, used, spread)
-    final = problem.take(used)
-    residuals = final.residuals(fit.state)
-    assert residuals is not None
     return HandEyeCalibration(
         eye_in_hand=eye_in_hand,
         camera=fit.state.camera,
@@ -185,7 +182,8 @@ def calibrate_hand_eye(
         by_picture=np.sqrt(squares / 6),
         names=views.names,
         wrong=tuple(i for i in range(len(views)) if i not in used),
-        residuals=residuals,
+        views=views.take(used),
+        residuals=fit.residuals,
         readings=readings,
     )
 

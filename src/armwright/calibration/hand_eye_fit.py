@@ -53,10 +53,12 @@ class HandEyeFit(NamedTuple):
     Attributes:
         state: these.
         covariance: (p, p) of a twist of the camera, one of the board, and of the numbers of the lens that are fitted.
+        residuals: (c, 2) of the corners, seen minus expected [px].
     """
 
     state: HandEyeState
     covariance: Array
+    residuals: Array
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -98,24 +100,26 @@ class HandEyeProblem:
         Raises:
             ContradictionError: the guess, or every way on from it, puts the board behind the camera.
         """
-        cost = self._cost(state)
-        if not np.isfinite(cost):
+        residuals = self.residuals(state)
+        if residuals is None:
             raise ContradictionError(_TOO_NEAR)
+        cost = self._cost(state, residuals)
         for _ in range(_STEPS):
             step, corrections, information = self._step(state)
             covariance = _inverse(information)
             for halving in range(_HALVINGS):
                 part = 0.5**halving
                 tried = self._moved(state, part * step, part * corrections)
-                if (new := self._cost(tried)) <= cost:
-                    state, cost = tried, new
+                new = self.residuals(tried)
+                if new is not None and (lower := self._cost(tried, new)) <= cost:
+                    state, residuals, cost = tried, new, lower
                     break
             else:
                 # No shorter step helps: this is the minimum, to rounding.
-                return HandEyeFit(state, covariance)
+                return HandEyeFit(state, covariance, residuals)
             if halving == 0 and np.all(np.abs(step) <= _SETTLED * np.sqrt(np.diag(covariance))):
-                return HandEyeFit(state, covariance)
-        return HandEyeFit(state, _inverse(self._step(state)[2]))
+                return HandEyeFit(state, covariance, residuals)
+        return HandEyeFit(state, _inverse(self._step(state)[2]), residuals)
 
     # ---- inside ----------------------------------------------------------------------------------------------------
 
@@ -123,10 +127,7 @@ class HandEyeProblem:
         """Return the poses that stand between camera and board."""
         return np.asarray(inverse(hand)) if self.eye_in_hand else hand
 
-    def _cost(self, state: HandEyeState) -> float:
-        residuals = self.residuals(state)
-        if residuals is None:
-            return np.inf
+    def _cost(self, state: HandEyeState, residuals: Array) -> float:
         return float(np.sum((residuals / self.sigma) ** 2) + np.sum(state.corrections**2))
 
     def _moved(self, state: HandEyeState, step: Array, corrections: Array) -> HandEyeState:

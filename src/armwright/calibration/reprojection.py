@@ -96,7 +96,7 @@ def refined_board_pose(lens: Lens, points: Array, pixels: Array, X_CO: Array) ->
         J = (by_point @ X_CO[:3, :3] @ moved_points(points)).reshape(-1, 6)
         residuals = pixels - lens.project(seen)
         information = J.T @ J
-        step = np.linalg.lstsq(J, residuals.ravel())[0]
+        step = np.asarray(np.linalg.lstsq(J, residuals.ravel())[0], dtype=np.float64)
         X_CO = moved(X_CO, step)
         if np.abs(step).max() < _SETTLED:
             break

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,9 @@ import numpy.typing as npt
 from armwright.errors import FileFormatError
 from armwright.files.inputs import read_bytes
 from armwright.files.limits import limit, limit_message
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 GreyPicture: TypeAlias = npt.NDArray[np.uint8]
 
@@ -41,14 +44,19 @@ def read_grey_picture(path: Path | str) -> GreyPicture:
             warnings.simplefilter("ignore")
             picture = Image.open(io.BytesIO(data), formats=FORMATS)
             width, height = picture.size
-            if width * height > limit("picture_megapixels") * _MEGAPIXEL:
-                size = f"{width:,} x {height:,} pixels"
-                raise FileFormatError(path, None, "", f"too large: {limit_message('picture_megapixels', size)}")
-            if picture.mode.startswith("I"):
-                # Sixteen bits for each pixel, of which the upper eight are kept.
-                return np.asarray(np.asarray(picture, dtype=np.uint32) >> 8, dtype=np.uint8)
-            return np.array(picture.convert("L"))
-    except FileFormatError:
-        raise
-    except Exception as error:  # noqa: BLE001 - a decoder of broken data raises whatever it runs into
-        raise FileFormatError(path, None, "", "expected a picture as PNG or JPEG; this file is none, or broken") from error
+            too_large = width * height > limit("picture_megapixels") * _MEGAPIXEL
+            grey = np.zeros((0, 0), dtype=np.uint8) if too_large else _grey(picture)
+    except Exception as error:  # a decoder of broken data raises whatever it runs into
+        message = "expected a picture as PNG or JPEG; this file is none, or broken"
+        raise FileFormatError(path, None, "", message) from error
+    if too_large:
+        size = f"{width:,} x {height:,} pixels"
+        raise FileFormatError(path, None, "", f"too large: {limit_message('picture_megapixels', size)}")
+    return grey
+
+
+def _grey(picture: "Image.Image") -> GreyPicture:
+    if picture.mode.startswith("I"):
+        # Sixteen bits for each pixel, of which the upper eight are kept.
+        return np.asarray(np.asarray(picture, dtype=np.uint32) >> 8, dtype=np.uint8)
+    return np.array(picture.convert("L"))

@@ -81,7 +81,10 @@ class Lens:
         r2 = x * x + y * y
         xy2, x2, y2 = 2 * x * y, r2 + 2 * x * x, r2 + 2 * y * y
         shape = np.stack(
-            [np.stack([x * r2, x * r2**2, xy2, x2, x * r2**3], -1), np.stack([y * r2, y * r2**2, y2, xy2, y * r2**3], -1)],
+            [
+                np.stack([x * r2, x * r2**2, xy2, x2, x * r2**3], -1),
+                np.stack([y * r2, y * r2**2, y2, xy2, y * r2**3], -1),
+            ],
             axis=-2,
         )
         seen = self._distorted(flat)
