@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
@@ -45,7 +44,7 @@ class Scene(NamedTuple):
 def random_lens(rng: np.random.Generator) -> Lens:
     """Return a lens of 45 to 65 degrees with a centre and a distortion of its own."""
     focal = rng.uniform(500, 700) * (1 + rng.uniform(-0.01, 0.01, 2))
-    centre = [319.5, 239.5] + rng.uniform(-12, 12, 2)
+    centre = np.array([319.5, 239.5]) + rng.uniform(-12, 12, 2)
     distortion = rng.uniform(-1, 1, 5) * [0.15, 0.05, 0.002, 0.002, 0.0]
     return Lens(width=WIDTH, height=HEIGHT, focal=focal, centre=centre, distortion=distortion)
 
@@ -78,7 +77,7 @@ def random_scene(
         q = np.array(
             [
                 row
-                for row, X in zip(q, _seen(forward(arm, q), camera, fixed, eye_in_hand), strict=True)
+                for row, X in zip(q, _seen(forward(arm, q), camera, fixed, eye_in_hand=eye_in_hand), strict=True)
                 if _good(lens, board, X)
             ]
         )
@@ -86,7 +85,7 @@ def random_scene(
             break
     readings = ArmReadings(arm=arm, q=q[:pictures], accuracy=accuracy)
     truly = readings.hand(rng.standard_normal((pictures, readings.corrections)))[0]
-    return Scene(lens, readings, eye_in_hand, camera, fixed, _seen(truly, camera, fixed, eye_in_hand))
+    return Scene(lens, readings, eye_in_hand, camera, fixed, _seen(truly, camera, fixed, eye_in_hand=eye_in_hand))
 
 
 def projected(rng: np.random.Generator, scene: Scene, noise: float, board: Board = CHARUCO) -> BoardViews:
@@ -106,7 +105,7 @@ def truth(scene: Scene) -> Array:
     return np.concatenate([scene.lens.focal, scene.lens.centre, scene.lens.distortion])
 
 
-def _seen(hand: Array, camera: Array, board: Array, eye_in_hand: bool) -> Array:
+def _seen(hand: Array, camera: Array, board: Array, *, eye_in_hand: bool) -> Array:
     return inverse(camera) @ (inverse(hand) if eye_in_hand else hand) @ board
 
 

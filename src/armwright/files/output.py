@@ -34,7 +34,8 @@ FORMAT = "armwright results 1"
 _RESULT_NAMES = re.compile(
     r"(motion|samples|path|corners|dh_\w+)\.csv|events\.jsonl|(frames|move|errors|measures|tables|summary)\.json|"
     r"report\.html|arm\.(toml|urdf)|camera\.toml|move\.(gif|mp4)|"
-    r"(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|verification|bearings|error|spectrum|forces|energy)\.svg"
+    r"(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|verification|bearings|error|"
+    r"spectrum|forces|energy)\.svg"
 )
 # A record that is larger is none of ours [bytes], and hashes are worked out in pieces [bytes].
 _LARGEST_RECORD, _PIECE = 200_000_000, 1 << 20

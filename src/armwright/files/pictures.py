@@ -55,7 +55,7 @@ def read_grey_picture(path: Path | str) -> GreyPicture:
     return grey
 
 
-def _grey(picture: "Image.Image") -> GreyPicture:
+def _grey(picture: Image.Image) -> GreyPicture:
     if picture.mode.startswith("I"):
         # Sixteen bits for each pixel, of which the upper eight are kept.
         return np.asarray(np.asarray(picture, dtype=np.uint32) >> 8, dtype=np.uint8)

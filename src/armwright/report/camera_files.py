@@ -1,4 +1,4 @@
-"""The files of a calibration of a camera: the lines of a cell file, its numbers, the corners, a page and its figures."""
+"""The files of a calibration of a camera: lines of a cell file, all numbers, the corners, a page and its figures."""
 
 import json
 from pathlib import Path
