@@ -73,14 +73,8 @@ def random_scene(
         else:
             # The roles of the two are exchanged: the board is on the hand, and the camera beside.
             camera, fixed = hand @ camera @ inverse(first), camera
-        q = q0 + rng.standard_normal((4000, arm.n)) * spread
-        q = np.array(
-            [
-                row
-                for row, X in zip(q, _seen(forward(arm, q), camera, fixed, eye_in_hand=eye_in_hand), strict=True)
-                if _good(lens, board, X)
-            ]
-        )
+        q = q0 + rng.standard_normal((2000, arm.n)) * spread
+        q = q[_shown(lens, board, _seen(forward(arm, q), camera, fixed, eye_in_hand=eye_in_hand))]
         if len(q) >= pictures:
             break
     readings = ArmReadings(arm=arm, q=q[:pictures], accuracy=accuracy)
@@ -109,13 +103,13 @@ def _seen(hand: Array, camera: Array, board: Array, *, eye_in_hand: bool) -> Arr
     return inverse(camera) @ (inverse(hand) if eye_in_hand else hand) @ board
 
 
-def _good(lens: Lens, board: Board, X: Array) -> bool:
-    points = board.points @ X[:3, :3].T + X[:3, 3]
-    if points[:, 2].min() < 0.2 or X[2, 2] < _MIN_FACING:
-        return False
-    pixels = lens.project(points)
-    inside = ((pixels > 8) & (pixels < [WIDTH - 9, HEIGHT - 9])).all(axis=1)
-    return bool(inside.mean() > 0.7)
+def _shown(lens: Lens, board: Board, X: Array) -> Array:
+    """Return at which poses of the board, which is not too oblique, most of its corners are in the picture."""
+    points = board.points @ np.swapaxes(X[:, :3, :3], 1, 2) + X[:, None, :3, 3]
+    possible = (points[..., 2].min(axis=1) > 0.2) & (X[:, 2, 2] > _MIN_FACING)
+    pixels = lens.project(np.where(possible[:, None, None], points, [0, 0, 1]))
+    inside = ((pixels > 8) & (pixels < [WIDTH - 9, HEIGHT - 9])).all(axis=2)
+    return possible & (inside.mean(axis=1) > 0.7)
 
 
 # ---- pictures ------------------------------------------------------------------------------------------------------

@@ -17,15 +17,17 @@ import math
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError, TooFewError
+from armwright.errors import ContradictionError, InvalidValueError, TooFewError
 from armwright.spatial.poses import inverse
 from armwright.spatial.rotations import nearest_rotation, rotation_vector
 
 MIN_PICTURES = 3
 # How far the hand must turn, about a second axis too [rad].
 MIN_ROTATION = math.radians(5)
+# Three pictures that turn by less about a second axis are no guess [rad].
+_LEAST_ROTATION = math.radians(1)
 # How many triples of pictures are tried.
-_MAX_TRIPLES = 400
+_MAX_TRIPLES = 150
 # A discrepancy of a millimetre counts as one of two milliradians [m/rad].
 _LENGTH = 0.5
 
@@ -75,6 +77,9 @@ def hand_eye_start(E: Array, C: Array) -> tuple[Array, Array, Array]:
 
     Returns:
         X and Z, (4, 4), and the discrepancies of the pictures (m,) [m].
+
+    Raises:
+        ContradictionError: the board does not turn as the hand does.
     """
     triples = list(itertools.islice(_triples(len(E)), _MAX_TRIPLES))
     guesses = []
@@ -86,6 +91,11 @@ def hand_eye_start(E: Array, C: Array) -> tuple[Array, Array, Array]:
         boards = E @ X @ C
         Z = _mean_pose(boards[chosen])
         guesses.append((float(np.median(_discrepancies(boards, Z))), X, Z))
+    if not guesses:
+        raise ContradictionError(
+            "the board turns less in the pictures than the hand does: are these the joint positions of the pictures, and "
+            "is the camera on the hand, or beside the arm, as stated?"
+        )
     _, X, Z = min(guesses, key=lambda guess: guess[0])
     near = np.argsort(_discrepancies(E @ X @ C, Z))[: max(MIN_PICTURES, (len(E) + 1) // 2)]
     # The better half of the pictures together is more accurate than three.
@@ -104,7 +114,7 @@ def closed_form(E: Array, C: Array) -> Array | None:
     A, B = inverse(E[j]) @ E[i], C[j] @ inverse(C[i])
     a, b = rotation_vector(A[:, :3, :3]), rotation_vector(B[:, :3, :3])
     U, s, Vt = np.linalg.svd(a.T @ b)
-    if s[1] < MIN_ROTATION**2 / 4:
+    if s[1] < _LEAST_ROTATION**2:
         return None
     X = np.eye(4)
     X[:3, :3] = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt

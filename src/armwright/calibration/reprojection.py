@@ -14,7 +14,9 @@ from armwright.spatial.lens import Lens
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector, skew_matrix
 
 # Gauss and Newton's steps of a pose, and when no more are needed [m], [rad].
-_STEPS, _SETTLED = 30, 1e-11
+_STEPS, _SETTLED = 30, 1e-9
+# Of the two poses that fit a flat board, the worse is tried too if its residuals are not as many times as large.
+_CLEARLY_WORSE = 3.0
 
 
 class BoardPose(NamedTuple):
@@ -70,11 +72,14 @@ def first_board_pose(lens: Lens, points: Array, pixels: Array) -> Array:
     """
     import cv2  # noqa: PLC0415 - an extra
 
-    _, rotations, translations, _ = cv2.solvePnPGeneric(
+    _, rotations, translations, errors = cv2.solvePnPGeneric(
         points, pixels, lens.matrix, lens.distortion, flags=cv2.SOLVEPNP_IPPE
     )
     candidates = []
-    for rotation, translation in zip(rotations, translations, strict=True):
+    limit = _CLEARLY_WORSE * float(np.min(errors))
+    for rotation, translation, error in zip(rotations, translations, np.ravel(errors), strict=True):
+        if error > limit:
+            continue
         X = np.eye(4)
         X[:3, :3], X[:3, 3] = rotation_from_vector(np.ravel(rotation)), np.ravel(translation)
         candidates.append(refined_board_pose(lens, points, pixels, X))
