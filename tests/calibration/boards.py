@@ -94,9 +94,9 @@ def projected(rng: np.random.Generator, scene: Scene, noise: float, board: Board
     return board_views(board, (WIDTH, HEIGHT), views)
 
 
-def truth(scene: Scene) -> Array:
+def lens_numbers(lens: Lens) -> Array:
     """Return the numbers of the lens."""
-    return np.concatenate([scene.lens.focal, scene.lens.centre, scene.lens.distortion])
+    return np.concatenate([lens.focal, lens.centre, lens.distortion])
 
 
 def _seen(hand: Array, camera: Array, board: Array, *, eye_in_hand: bool) -> Array:
