@@ -120,15 +120,14 @@ def _charuco_board(cv2: ModuleType, board: Board) -> Any:
 
 
 def _find_charuco(detector: Any, name: str, picture: GreyPicture) -> BoardView | None:
-    corners, numbers, _, markers = detector.detectBoard(picture)
+    corners, numbers, *_ = detector.detectBoard(picture)
     if numbers is not None and len(numbers):
         return BoardView(name=name, corners=np.ravel(numbers), pixels=_pixels(corners))
-    if markers is None or not len(markers):
-        mirrored = detector.detectBoard(np.ascontiguousarray(picture[:, ::-1]))[1]
-        if mirrored is not None and len(mirrored):
-            raise InvalidValueError(
-                f"{name}: the board is there as a mirror image; the picture was mirrored, or the board was printed so"
-            )
+    mirrored = detector.detectBoard(np.ascontiguousarray(picture[:, ::-1]))[1]
+    if mirrored is not None and len(mirrored):
+        raise InvalidValueError(
+            f"{name}: the board is there as a mirror image; the picture was mirrored, or the board was printed so"
+        )
     return None
 
 
