@@ -32,8 +32,8 @@ PRECISE = ArmAccuracy(position=1e-10, orientation=1e-10)
 SETUPS = pytest.mark.parametrize("eye_in_hand", [True, False], ids=["eye-in-hand", "eye-to-hand"])
 # Chance does this to no test.
 RARE = 1e-7
-# The truth lies within so many of the 95 % intervals.
-LEAST, MOST = 0.88, 1.0
+# The truth lies within so many of the 95 % intervals; within so many of a few numbers, which depend more on chance.
+LEAST, LEAST_OF_GROUP = 0.88, 0.84
 
 
 def errors(found: HandEyeCalibration, scene: Scene) -> Array:
@@ -172,9 +172,10 @@ def shares_within(sample: Sample, draw: object, full: int, what: str) -> None:
     groups = {"camera position": share[:, :3], "camera rotation": share[:, 3:6], "board position": share[:, 6:9]}
     groups |= {"board rotation": share[:, 9:12], "lens": share[:, 12:], "all": share}
     means = {name: float(values.mean()) for name, values in groups.items()}
-    sample.record(what, len(inside), sum(not LEAST <= mean <= MOST for mean in means.values()), **means)
+    sample.record(what, len(inside), sum(mean < LEAST_OF_GROUP for mean in means.values()), **means)
     if sample.whole:
-        assert all(LEAST <= mean <= MOST for mean in means.values()), means
+        assert means["all"] >= LEAST, means
+        assert min(means.values()) >= LEAST_OF_GROUP, means
     else:
         # With few sets, the intervals of a set are off together: a wrong covariance leaves most of them out.
         assert means["all"] > 0.4, means

@@ -127,9 +127,14 @@ class BoardViews:
         return tuple(view.name for view in self.views)
 
     @property
+    def sizes(self) -> list[int]:
+        """How many corners each picture has."""
+        return [len(view.corners) for view in self.views]
+
+    @property
     def picture(self) -> Numbers:
         """(c,) of each corner, the number of its picture."""
-        return np.repeat(np.arange(len(self.views)), [len(view.corners) for view in self.views])
+        return np.repeat(np.arange(len(self.views)), self.sizes)
 
     @property
     def points(self) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from armwright.arrays import Array, integer
-from armwright.calibration.board import BoardViews
+from armwright.calibration.board import BoardView, BoardViews, board_views
 from armwright.errors import InvalidValueError, TooFewError, counted
 from armwright.extras import import_extra
 from armwright.spatial.lens import Lens
@@ -23,14 +23,20 @@ LENS_NUMBERS = ("focal.x", "focal.y", "centre.x", "centre.y", "k1", "k2", "p1", 
 # Which of them are fitted, by how many coefficients of distortion are asked for.
 FITTED_NUMBERS = {0: (0, 1, 2, 3), 2: (0, 1, 2, 3, 4, 5), 4: (0, 1, 2, 3, 4, 5, 6, 7), 5: tuple(range(9))}
 MIN_PICTURES = 3
-# A corner is wrong if it is as many standard deviations off, a picture if its root mean square is as many times the
-# median of the pictures; both are far beyond what chance does.
-_CORNER_LIMIT, _PICTURE_LIMIT = 7.0, 4.0
-_ROUNDS = 5
+# A corner is wrong if it is as many standard deviations off, which is far beyond chance.
+_CORNER_LIMIT = 7.0
+# Most corners of a picture are off alike if the median is this part of the largest, or more.
+_ALIKE = 0.2
+_ROUNDS = 20
 # Standard deviation of a corner that tells whether pictures determine a lens, however well they fit [px].
 _LEAST_SIGMA = 0.02
 # Of a focal length, the largest standard error of a lens that is determined.
 _MAX_FOCAL_ERROR = 0.03
+# The board is tilted by this angle or more between two pictures [rad]. Noise tilts parallel boards by some degrees, and
+# errors about a lens that follows from that are meaningless.
+_MIN_TILT = math.radians(8)
+# A focal length is within these multiples of the width of the picture, and coefficients of distortion are smaller.
+_FOCAL_RANGE, _MAX_DISTORTION = (0.1, 15.0), 100.0
 # The corners should be all over this part of the picture.
 _MIN_COVERAGE = 0.5
 _CONFIDENCE = 0.95
@@ -119,15 +125,16 @@ def calibrate_intrinsics(views: BoardViews, *, coefficients: int = 5) -> CameraI
     for _ in range(_ROUNDS):
         found = _estimate(views, coefficients)
         better, removed = _without_wrong(found)
+        left_out += removed
         if better is views:
             break
-        left_out += removed
         if len(better) < MIN_PICTURES or len(better.pixels) < all_corners / 2:
             raise InvalidValueError(
                 f"half of the pictures or corners do not fit a camera: the median picture is "
                 f"{np.median(found.rms_by_picture):.2g} pixels off; is this the board, and did it stay flat?"
             )
         views = better
+    _refuse_undetermined(found)
     return attrs.evolve(found, wrong_corners=left_out)
 
 
@@ -157,7 +164,10 @@ def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
     for pose, rotation, translation in zip(poses, rotations, translations, strict=True):
         pose[:3, :3], pose[:3, 3] = cv2.Rodrigues(rotation)[0], np.ravel(translation)
     errors = np.ravel(errors)[:9]
-    if not (np.isfinite(values).all() and np.isfinite(errors).all() and (values[:2] > 0).all()):
+    low, high = np.multiply(_FOCAL_RANGE, max(size))
+    largest = np.array([high, high, high, high, *[_MAX_DISTORTION] * 5])
+    # Comparisons with NaN are false.
+    if not (np.isfinite(errors).all() and (low < values[:2]).all() and (np.abs(values) < largest).all()):
         raise _undetermined(views, None, None)
     lens = Lens(width=views.width, height=views.height, focal=values[:2], centre=values[2:4], distortion=values[4:])
     residuals = np.concatenate(
@@ -176,9 +186,6 @@ def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
             f"of {len(views)} boards; take more pictures"
         )
     sigma = math.sqrt(float(np.sum(residuals**2)) / freedom)
-    largest = float((errors[:2] / values[:2]).max()) * max(1.0, _LEAST_SIGMA / max(sigma, 1e-12))
-    if largest > _MAX_FOCAL_ERROR:
-        raise _undetermined(views, largest, poses)
     return CameraIntrinsics(
         lens=lens,
         standard_errors=errors,
@@ -192,39 +199,50 @@ def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
     )
 
 
-def _undetermined(views: BoardViews, error: float | None, poses: Array | None) -> InvalidValueError:
+def _refuse_undetermined(found: CameraIntrinsics) -> None:
+    normals = found.poses[:, :3, 2]
+    tilt = math.acos(float(np.clip((normals @ normals.T).min(), -1, 1)))
+    if tilt < _MIN_TILT:
+        raise _undetermined(found.views, None, tilt)
+    error = float((found.standard_errors[:2] / found.lens.focal).max())
+    error *= max(1.0, _LEAST_SIGMA / max(found.sigma, 1e-12))
+    if error > _MAX_FOCAL_ERROR:
+        raise _undetermined(found.views, error, tilt)
+
+
+def _undetermined(views: BoardViews, error: float | None, tilt: float | None) -> InvalidValueError:
     """Return the error that pictures do not determine a lens."""
     much = "" if error is None else f", which has a standard error of {error:.1%}"
-    tilt = ""
-    if poses is not None:
-        normals = poses[:, :3, 2]
-        angle = math.degrees(math.acos(float(np.clip((normals @ normals.T).min(), -1, 1))))
-        tilt = f": the board is tilted by {angle:.2g} degrees at most between them"
+    angle = ""
+    if tilt is not None:
+        angle = f": the board is tilted by {math.degrees(tilt):.2g} degrees at most between them"
     return InvalidValueError(
-        f"{counted(len(views), 'picture')} do not determine the focal length{much}{tilt}. Tilt the board against the "
+        f"{counted(len(views), 'picture')} do not determine the focal length{much}{angle}. Tilt the board against the "
         "camera by 20 to 45 degrees, in several directions"
     )
 
 
 def _without_wrong(found: CameraIntrinsics) -> tuple[BoardViews, int]:
-    """Return the pictures without those, and without corners, that are far off, and how many corners; or the same."""
-    views, rms = found.views, found.rms_by_picture
-    limit = _PICTURE_LIMIT * max(float(np.median(rms)), 1e-6)
-    wrong = rms > limit
-    if wrong.any():
-        worst = int(np.argmax(rms))
-        reason = f"its corners are {rms[worst]:.2g} pixels off, those of the median picture {np.median(rms):.2g}"
-        kept = views.take([i for i in range(len(views)) if i != worst])
-        return attrs.evolve(kept, left_out={**views.left_out, views.names[worst]: reason}), 0
-    distances = np.linalg.norm(found.residuals, axis=1)
+    """Return the pictures without corners that are far off, and how many; or the same pictures, if there are none.
+
+    A corner that is far off pulls the others of its picture along. Those that are half as far off as the worst are left
+    out, and the others are looked at again; a picture goes as a whole where most corners are off alike.
+    """
+    views, distances = found.views, np.linalg.norm(found.residuals, axis=1)
     # The median of the distances of a normal distribution in the plane is 1.1774 standard deviations.
-    off = distances > _CORNER_LIMIT * max(float(np.median(distances)), 1e-6) / 1.1774
-    if not off.any():
+    limit = _CORNER_LIMIT * max(float(np.median(distances)), 1e-6) / 1.1774
+    kept, left_out, count = list[BoardView](), dict(views.left_out), 0
+    for view, own in zip(views.views, np.split(distances, np.cumsum(views.sizes)[:-1]), strict=True):
+        median, largest = float(np.median(own)), float(own.max())
+        if largest <= limit:
+            kept.append(view)
+        elif median > max(limit, _ALIKE * largest):
+            left_out[view.name] = f"its corners are {median:.2g} pixels off, those of all pictures {limit:.2g} at most"
+        else:
+            near = own <= max(limit, largest / 2)
+            count += int((~near).sum())
+            kept.append(attrs.evolve(view, corners=view.corners[near], pixels=view.pixels[near]))
+    if len(kept) == len(views) and not count:
         return views, 0
-    numbers, picture = np.flatnonzero(off), views.picture
-    starts = np.searchsorted(picture, np.arange(len(views)))
-    kept_views = []
-    for i, view in enumerate(views.views):
-        keep = np.setdiff1d(np.arange(len(view.corners)), numbers[picture[numbers] == i] - starts[i])
-        kept_views.append(attrs.evolve(view, corners=view.corners[keep], pixels=view.pixels[keep]))
-    return attrs.evolve(views, views=tuple(kept_views)), int(off.sum())
+    size = views.width, views.height
+    return board_views(views.board, size, kept, least=0, left_out=left_out), count

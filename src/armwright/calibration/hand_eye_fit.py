@@ -144,7 +144,7 @@ class HandEyeProblem:
     def _step(self, state: HandEyeState) -> tuple[Array, Array, Array]:
         """Return the step of the unknowns (p,), that of the corrections (m, k), and the information (p, p)."""
         residuals, J, D = self._linearised(state)
-        sizes = [len(view.corners) for view in self.views.views]
+        sizes = self.views.sizes
         ends = np.cumsum(sizes)
         information, right = np.zeros((J.shape[-1],) * 2), np.zeros(J.shape[-1])
         eliminated = []
