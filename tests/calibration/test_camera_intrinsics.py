@@ -35,7 +35,9 @@ def views(rng: np.random.Generator, scene: Scene) -> BoardViews:
     return projected(rng, scene, NOISE)
 
 
-def test_standard_errors_are_those_of_the_linear_model(rng: np.random.Generator, scene: Scene, views: BoardViews) -> None:
+def test_standard_errors_are_those_of_the_linear_model(
+    rng: np.random.Generator, scene: Scene, views: BoardViews
+) -> None:
     """OpenCV's standard errors are those of least squares with derivatives by differences of its own projection."""
     found = calibrate_intrinsics(views)
     values, step, columns = found.values, 1e-6, list[np.ndarray]()
@@ -129,7 +131,9 @@ def test_refusals(views: BoardViews, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidValueError, match="expected 0, 2, 4 or 5, got 3"):
         calibrate_intrinsics(views, coefficients=3)
     monkeypatch.setitem(__import__("sys").modules, "cv2", None)
-    with pytest.raises(MissingExtraError, match=r"needs opencv-python-headless; install it by: pip install 'armwright\[p"):
+    with pytest.raises(
+        MissingExtraError, match=r"needs opencv-python-headless; install it by: pip install 'armwright\[p"
+    ):
         calibrate_intrinsics(views)
 
 

@@ -94,7 +94,9 @@ def cost_by_hand(scene: Scene, views: BoardViews, sigma: float, *, fit_lens: boo
             rows.append((view.pixels - pixels).ravel() / sigma)
         return np.concatenate(rows)
 
-    start = np.concatenate([vector(scene.camera), vector(scene.board), lens_numbers(scene.lens), np.zeros(6 * len(hand))])
+    start = np.concatenate(
+        [vector(scene.camera), vector(scene.board), lens_numbers(scene.lens), np.zeros(6 * len(hand))]
+    )
     if fit_lens:
         return residuals, start
     held = np.arange(12, 21)
@@ -127,7 +129,9 @@ def test_scipy_finds_the_same(rng: np.random.Generator, *, eye_in_hand: bool, fi
         assert np.abs(x[:3] - X[:3, 3]).max() < 0.01 * deviations[body : body + 3].min()
         turned = (Rotation.from_rotvec(x[3:]) * Rotation.from_matrix(X[:3, :3]).inv()).magnitude()
         assert turned < 0.01 * deviations[body + 3 : body + 6].min()
-        np.testing.assert_allclose(np.sqrt(np.diag(covariance))[body : body + 3], deviations[body : body + 3], rtol=0.01)
+        np.testing.assert_allclose(
+            np.sqrt(np.diag(covariance))[body : body + 3], deviations[body : body + 3], rtol=0.01
+        )
     if fit_lens:
         np.testing.assert_allclose(np.sqrt(np.diag(covariance))[12:21], deviations[12:], rtol=0.01)
 
@@ -199,9 +203,7 @@ def test_truth_lies_in_the_intervals_of_rendered_sets(sample: Sample) -> None:
 
     def draw(rng: np.random.Generator, eye_in_hand: bool) -> object:  # noqa: FBT001
         scene = random_scene(rng, ARM, 15, eye_in_hand=eye_in_hand, accuracy=ArmAccuracy())
-        views = [
-            find(f"{k:02d}", photographed(rng, CHARUCO, scene.lens, X, 3.0)) for k, X in enumerate(scene.seen)
-        ]
+        views = [find(f"{k:02d}", photographed(rng, CHARUCO, scene.lens, X, 3.0)) for k, X in enumerate(scene.seen)]
         kept = board_views(CHARUCO, (scene.lens.width, scene.lens.height), [view for view in views if view is not None])
         return scene, kept, scene.readings.take([int(name) for name in kept.names])
 
@@ -265,9 +267,14 @@ def test_parallel_rotations_are_refused_with_their_direction(rng: np.random.Gene
     moved = one_axis_scene(rng, scene, joint, np.radians(40))
     X = np.repeat(scene.seen[:1], 6, axis=0)
     # The last axis of the arm is z of the tool, and the first one z of the base.
-    with pytest.raises(InvalidValueError, match=r"about the direction \(0\.00, 0\.00, 1\.00\) of the (tool|base) frame"):
+    with pytest.raises(
+        InvalidValueError, match=r"about the direction \(0\.00, 0\.00, 1\.00\) of the (tool|base) frame"
+    ):
         calibrate_hand_eye(
-            projected(rng, scene._replace(seen=X), PIXEL_NOISE), moved.readings, lens=scene.lens, eye_in_hand=eye_in_hand
+            projected(rng, scene._replace(seen=X), PIXEL_NOISE),
+            moved.readings,
+            lens=scene.lens,
+            eye_in_hand=eye_in_hand,
         )
 
 

@@ -78,8 +78,8 @@ def calibrate_camera(  # noqa: PLR0917 - Typer reads one parameter per option
     its accuracy allows, the command ends with status 3 after everything is printed and written. With -o the command
     writes the camera as the lines of a cell file, all numbers, the corners, a report and figures.
 
-    **Example:** `armwright calibrate-camera pictures --squares 9x7 --square-mm 30 --marker-mm 22 --arm ur5
-    --joints joints.csv -o out/camera`
+    **Example:** `armwright calibrate-camera examples/board_corners.csv --size 640x480 --squares 9x7 --square-mm 30
+    --arm ur5 --joints examples/board_joints.csv -o out/camera`
     """
     from armwright.arrays import one_core
     from armwright.calibration import camera_calibration
