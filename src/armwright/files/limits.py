@@ -54,6 +54,9 @@ LIMITS: Mapping[str, Limit] = {
     "hanging": Limit(1000, "frames", "depth of the frame tree of a cell, from a frame to WORLD"),
     "arms": Limit(20, "arms", "arms of a cell"),
     "revolutions": Limit(1000, "revolutions", "limits of a revolute joint, as revolutions from zero"),
+    "pictures": Limit(1000, "pictures", "pictures that a camera is calibrated with"),
+    "picture_mb": Limit(50, "MB", "size of the file of a picture"),
+    "picture_megapixels": Limit(100, "megapixels", "width times height of a picture, which its file names"),
     "message_mb": Limit(16, "MB", "one message to the language server or the debug adapter"),
     "header_bytes": Limit(8192, "bytes", "the header of such a message"),
 }
