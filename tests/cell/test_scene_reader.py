@@ -97,7 +97,7 @@ def test_grippers(tmp_path: Path) -> None:
         (f'[scene]\nspheres = [{{ name = "A B", at = {HERE}, diameter_mm = 1 }}]\n', "'A B' cannot name a frame"),
         ("[scene]\nboxs = []\n", "boxs: unknown key; did you mean 'boxes'?"),
         (f"[parts.A]\nsize_mm = [1, 1, 1]\nat = {HERE}\n", "parts, A, mass_kg: missing, expected a number"),
-        ('[parts.A]\nshape = "ball"\n', "expected one of box, cylinder, sphere, got the text 'ball'"),
+        ('[parts.A]\nshape = "ball"\n', "expected one of box, cylinder, mesh, sphere, got the text 'ball'"),
         (
             "\n".join(
                 f"[parts.{name}]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\nmarker = {{ id = 7, size_mm = 9 }}"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,8 @@ ASSEMBLY_SUFFIXES = tuple(_ASSEMBLIES)
 _SMALLEST = 1e-4
 # A mesh is flat where it is thinner than this part of its length: no solid.
 _FLAT = 1e-6
+# A closed mesh with less than this part of the volume of the box around it encloses nothing, but for rounding.
+_EMPTY = 1e-9
 
 
 def read_mesh(path: Path | str, *, unit: str | None = None, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Mesh:
@@ -76,8 +79,15 @@ def read_mesh(path: Path | str, *, unit: str | None = None, scale: Sequence[floa
     if np.prod(factors) < 0:
         faces = faces[:, ::-1]
     mesh = Mesh(vertices=vertices, faces=faces, name=path.name)
-    inside_out = is_closed(mesh) and volume(mesh) < 0
-    return Mesh(vertices=vertices, faces=faces[:, ::-1], name=path.name) if inside_out else mesh
+    inside = volume(mesh) if is_closed(mesh) else math.inf
+    if abs(inside) < _EMPTY * float(np.ptp(vertices, axis=0).prod()):
+        raise FileFormatError(path, None, "", "its triangles enclose no volume")
+    return Mesh(vertices=vertices, faces=faces[:, ::-1], name=path.name) if inside < 0 else mesh
+
+
+def has_unit(path: PurePath) -> bool:
+    """Whether the files of a format have their unit, by the name of one."""
+    return path.suffix.lower() in _ASSEMBLIES
 
 
 def read_assembly(path: Path | str) -> Assembly:
