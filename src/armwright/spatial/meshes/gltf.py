@@ -152,7 +152,10 @@ def _tops(root: Table, children: list[list[int]]) -> list[int]:
     scenes = tables_in(root, "scenes")
     if not scenes:
         below = {child for row in children for child in row}
-        return [number for number in range(len(children)) if number not in below]
+        tops = [number for number in range(len(children)) if number not in below]
+        if children and not tops:
+            raise root.error("nodes", "every node is a child of another; expected one at the top")
+        return tops
     scene = scenes[index_in(root, "scene", len(scenes)) if "scene" in root else 0]
     return _indices(scene, "nodes", len(children))
 

@@ -36,7 +36,7 @@ def main(memory: int, seconds: int, largest: int, tolerance: int) -> int:
 
         data = sys.stdin.buffer.read()
         glb = cascadio.to_glb_bytes(data, cascadio.FileType.STEP, tol_linear=tolerance * 1e-3, use_parallel=False)
-    except (MemoryError, OSError, RuntimeError):
+    except (ImportError, MemoryError, OSError, RuntimeError):
         return TOO_LARGE
     if not glb:
         return NOTHING
