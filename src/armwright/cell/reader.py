@@ -12,13 +12,14 @@ from armwright.arm.load import is_path, load_arm
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array
+from armwright.cell.assembly import is_assembly
 from armwright.cell.entries import ARM_NAME, read_name, read_pose, refuse_too_many, to_pose
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane
 from armwright.cell.names import arm_name
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_parts
 from armwright.dynamics.arguments import weighed
-from armwright.errors import ArmwrightError, MeshWarning, closest
+from armwright.errors import ArmwrightError, FileFormatError, MeshWarning, closest
 from armwright.files.document import Document, Table
 from armwright.files.inputs import file_path, regular_file
 from armwright.files.limits import limit, limit_message
@@ -59,6 +60,8 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         FileFormatError: the file is missing or invalid; the message has file, line and key.
     """
     path = file_path(path)
+    if is_assembly(path):
+        raise FileFormatError(path, None, "", "expected a cell file; an assembly is for IMPORT")
     top = Document.read(path).root
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
