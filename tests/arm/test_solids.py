@@ -128,7 +128,10 @@ def test_equal_arms_may_have_other_solids(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize(
     ("solid", "message"),
     [
-        ('{kind = "ball"}', "solids 1, kind: expected one of box, capsule, cylinder, sphere, got the text 'ball'"),
+        (
+            '{kind = "ball"}',
+            "solids 1, kind: expected one of box, capsule, cylinder, mesh, sphere, got the text 'ball'",
+        ),
         ('{kind = "box"}', "solids 1: missing, expected size_mm or size_m"),
         ('{kind = "box", size_mm = [1, 0, 1]}', "solids 1: size: expected three lengths above 0"),
         ('{kind = "sphere", diameter_mm = -1}', "diameter_mm: expected a number above 0, got -1"),

@@ -1,4 +1,4 @@
-"""``armwright convert``: convert an arm from one file format to another."""
+"""``armwright convert``: convert an arm from one file format to another, or an assembly to frames."""
 
 import math
 from pathlib import Path
@@ -8,7 +8,7 @@ from typer import Option
 
 from armwright.cli.options import ArmName, Json, usage_error
 from armwright.cli.output import print_json
-from armwright.errors import counted
+from armwright.errors import counted, shown
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -27,8 +27,15 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Write an arm as URDF or as an arm file, and report what the format cannot represent.
 
+    Of an assembly in STEP or glTF, write the frames of its named components, for IMPORT.
+
     **Example:** `armwright convert puma560 -o puma560.urdf`
     """
+    from armwright.cell.assembly import is_assembly
+
+    if is_assembly(Path(arm)):
+        _convert_assembly(Path(arm), output, as_json=as_json)
+        return
     from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
     from armwright.arm.write import toml_text
     from armwright.files.output import write_file
@@ -47,6 +54,24 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     print(f"{model.name}: {counted(model.n, 'joint')} written to {output}")
     for sentence in (*notes, *lost):
         print(f"  {sentence}")
+
+
+def _convert_assembly(path: Path, output: Path, *, as_json: bool) -> None:
+    """Write the frames of an assembly, and report which have other names than their components."""
+    from armwright.cell.assembly import frames_text, read_assembly_frames
+    from armwright.files.output import write_file
+    from armwright.program.language.words import VOCABULARIES, Standard
+
+    if output.suffix.lower() != ".toml":
+        raise usage_error("-o", f"expected a name that ends in .toml for the frames of an assembly, got {output}")
+    assembly = read_assembly_frames(path, VOCABULARIES[Standard.RLO_2].reserved)
+    write_file(output, frames_text(assembly, path.name))
+    if as_json:
+        print_json({"written": str(output), "frames": list(assembly.frames), "renamed": assembly.renamed})
+        return
+    print(f"{path.name}: {counted(len(assembly.frames), 'frame')} written to {output}")
+    for name, component in assembly.renamed.items():
+        print(f"  {name} is the component {shown(component)}")
 
 
 def _locked_positions(path: str, text: str | None) -> "dict[str, float]":

@@ -57,6 +57,12 @@ LIMITS: Mapping[str, Limit] = {
     "pictures": Limit(1000, "pictures", "pictures that a camera is calibrated with"),
     "picture_mb": Limit(50, "MB", "size of the file of a picture"),
     "picture_megapixels": Limit(100, "megapixels", "width times height of a picture, which its file names"),
+    "mesh_mb": Limit(100, "MB", "size of an STL, OBJ, glTF or STEP file, with all buffers that a glTF file names"),
+    "mesh_triangles": Limit(1_000_000, "triangles", "triangles of a mesh, its instances counted one by one"),
+    "mesh_m": Limit(20, "m", "length of a mesh along any axis; a longer one is probably in another unit"),
+    "gltf_values": Limit(1_000_000, "values", "values in the JSON of a glTF file"),
+    "step_s": Limit(60, "s", "computing time for the triangles of a STEP file"),
+    "step_mb": Limit(4000, "MB", "memory of the process that reads a STEP file"),
     "message_mb": Limit(16, "MB", "one message to the language server or the debug adapter"),
     "header_bytes": Limit(8192, "bytes", "the header of such a message"),
 }

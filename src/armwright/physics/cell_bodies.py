@@ -15,7 +15,7 @@ from armwright.cell.scene import Gripper
 from armwright.physics.clearance import Body
 from armwright.physics.hand_solids import before_hand, gripper_length, gripper_solids
 from armwright.spatial.poses import inverse
-from armwright.spatial.shapes import Solid
+from armwright.spatial.shapes import Solid, convex_solids
 
 
 def has_solids(arm: Arm) -> bool:
@@ -38,10 +38,10 @@ def arm_bodies(name: str, arm: Arm, gripper: Gripper | None = None) -> list[Body
         links[-1] = tuple(solid for solid in ends if solid is not None)
     # Frame 0 of the table may be elsewhere than the base frame.
     X_0B = inverse(arm.base)
-    bodies = [Body(f"{name} base", solid.moved(X_0B), name) for solid in arm.base_solids]
+    bodies = [Body(f"{name} base", solid.moved(X_0B), name) for solid in convex_solids(arm.base_solids)]
     for number, (link, solids) in enumerate(zip(arm.links, links, strict=True), 1):
         label = f"{name} {link.name or f'link {number}'}"
-        bodies += [Body(label, solid, name, number) for solid in solids]
+        bodies += [Body(label, solid, name, number) for solid in convex_solids(solids)]
     return bodies
 
 
@@ -87,9 +87,16 @@ class CellBodies:
         }
         for roles in self._hands.values():
             self.roles += roles
-        self._fixtures = [Body(name, Solid(shape=it.shape, pose=it.pose)) for name, it in cell.fixtures.items()]
+        self._fixtures = [
+            Body(name, piece)
+            for name, it in cell.fixtures.items()
+            for piece in convex_solids([Solid(shape=it.shape, pose=it.pose)])
+        ]
         self.roles += [Role() for _ in self._fixtures]
-        self.roles += [Role(part=name) for name in cell.parts]
+        self._pieces = [
+            (name, piece) for name, it in cell.parts.items() for piece in convex_solids([Solid(shape=it.shape)])
+        ]
+        self.roles += [Role(part=name) for name, _ in self._pieces]
 
     def _add_arm(self, name: str, placed: CellArm) -> None:
         arm = placed.arm
@@ -109,13 +116,13 @@ class CellBodies:
                 solid = Solid(shape=it.shape, pose=placed.arm.tool @ it.pose)
                 bodies.append(Body(f"{name} {it.name}", solid, name, placed.arm.n))
         bodies += self._fixtures
-        for name, part in self.cell.parts.items():
+        for name, piece in self._pieces:
             carrier, X = parts.carrier(name), parts.pose(name)
             if carrier is None:
-                bodies.append(Body(name, Solid(shape=part.shape, pose=X)))
+                bodies.append(Body(name, piece.moved(X)))
             else:
                 arm = self.cell.arms[carrier].arm
-                bodies.append(Body(name, Solid(shape=part.shape, pose=arm.tool @ X), carrier, arm.n))
+                bodies.append(Body(name, piece.moved(arm.tool @ X), carrier, arm.n))
         return bodies
 
 
