@@ -13,6 +13,7 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, Excerpt, excerpt, omission_text, shorten_line, shorten_list
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Effect, Recording, RunStage
+from armwright.report.collision_text import collision_text
 from armwright.report.run_files import ending_data, summary_data
 
 
@@ -48,9 +49,10 @@ class RunSummary:
             f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, "
             f"{counted(moves, 'move')}, {counted(len(recording.stages), 'stage')}, {counted(ticks, 'servo tick')}"
         )
-        physics = physics_note(recording)
-        notes = (numbers, *physics, "Collisions are not checked.")
-        return (*shorten_list(slowed, MAX_TERMINAL_LINES, self.hint), *notes)
+        collisions = (
+            "Collisions are not checked." if recording.checked is None else f"Collisions: {collision_text(recording)}."
+        )
+        return (*shorten_list(slowed, MAX_TERMINAL_LINES, self.hint), numbers, *physics_note(recording), collisions)
 
     def as_data(self) -> dict[str, Any]:
         """Return the summary as plain data in SI units."""
