@@ -10,13 +10,16 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import base_name
-from armwright.kinematics.forward_kinematics import link_poses
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt, omission_text, shorten_line
 from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
+from armwright.report.arm_figure import arm_figure, opening_of
 from armwright.report.page import Animation, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
-from armwright.report.stick_figure import arm_record, stick_figure
+from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, moved_parts, placed_arms
+from armwright.report.shape_table import ShapeTable
+from armwright.report.stick_figure import arm_record
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -115,38 +118,41 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     fps = min(_FRAMES_PER_SECOND, _MAX_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
     arms, tree = recording.cell.arms, recording.tree
-    links = {s.arm: arms[s.arm].base @ link_poses(arms[s.arm].arm, _configurations_at(s, t)) for s in recording.streams}
-    tool_poses = {name: poses[:, -1] for name, poses in links.items()}
+    q = {s.arm: _configurations_at(s, t) for s in recording.streams}
+    tool_poses = {name: arms[name].base @ forward(arms[name].arm, rows) for name, rows in q.items()}
     hidden = {WORLD, *arms, *map(base_name, arms)}
     visible = [name for name in tree if name not in hidden and tree.has_value(name)]
     names, fewer_frames = _limit_items(visible, _MAX_FRAMES, "frames", "all in frames.json")
     changes, fewer_changes = _limit_items([*_tree_changes(recording, t)], MAX_LIST_ITEMS, "changes of the frame tree")
+    shapes = ShapeTable()
+    placed = placed_arms(recording.cell)
+    figures = {
+        name: arm_figure(name, placed[name], rows, finger_opening(recording, name, t, opening_of(placed[name])), shapes)
+        for name, rows in q.items()
+    }
+    fixtures, parts = fixture_bodies(recording.cell, shapes), moved_parts(recording, shapes)
     animation = Animation(
         fps=fps,
         t=t,
-        arms={
-            name: stick_figure(arms[name].arm, poses, _finger_opening(recording.effects, name, t))
-            for name, poses in links.items()
-        },
+        arms=figures,
         frames=list(_frame_tracks(recording, t, tool_poses, names)),
         tree=changes,
+        fixtures=fixtures,
+        parts=parts,
+        shapes=shapes.as_data(),
     )
-    return animation, [*fewer_frames, *fewer_changes]
+    all_bodies = {"bodies of the scene": recording.cell.fixtures, "parts": recording.cell.parts}
+    fewer = [
+        f"this page shows the first {MAX_BODIES} of {len(bodies):,} {name}; all in run.json"
+        for name, bodies in all_bodies.items()
+        if len(bodies) > MAX_BODIES
+    ]
+    return animation, [*fewer_frames, *fewer_changes, *fewer]
 
 
 def _configurations_at(stream: Stream, t: Array) -> Array:
     period = stream.t[1] - stream.t[0] if len(stream.t) > 1 else 1.0
     return np.asarray(stream.q[np.clip(np.round(t / period).astype(int), 0, len(stream.t) - 1)])
-
-
-def _finger_opening(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
-    """Return the opening of the fingers at each instant, 0 to 1; they are closed at the start."""
-    times, values = [0.0], [0.0]
-    for effect in effects:
-        if effect.arm == arm and effect.kind in ("OPEN", "GRASP"):
-            times += [effect.t0, effect.t1]
-            values += [values[-1], 1.0 if effect.kind == "OPEN" else 0.0]
-    return np.interp(t, times, values)
 
 
 def _frame_tracks(

@@ -61,6 +61,20 @@ class Effect:
     data: Mapping[str, Any] = attrs.field(factory=dict)
 
 
+class StageClearance(NamedTuple):
+    """The least distance between two bodies during a stage.
+
+    Attributes:
+        distance: [m]; below 0 is a depth.
+        bodies: the names of both.
+        time: when [s].
+    """
+
+    distance: float
+    bodies: tuple[str, str]
+    time: float
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class RunStage:
     """One stage of a MOVE, as it was run.
@@ -79,6 +93,7 @@ class RunStage:
             [N].
         peak_time: (n,) when, since it began [s].
         stopped: whether it was stopped on its path.
+        clearance: the least distance of what moved from what it may not meet; None where there is nothing to meet.
     """
 
     t0: float
@@ -92,6 +107,7 @@ class RunStage:
     peak_effort: Array
     peak_time: Array
     stopped: bool = False
+    clearance: StageClearance | None = None
 
     @property
     def duration(self) -> float:
@@ -159,6 +175,46 @@ class Stream:
     tau: Array
 
 
+@attrs.frozen(kw_only=True, eq=False)
+class MeasuredStream:
+    """What was measured of one arm.
+
+    Attributes:
+        arm: its name.
+        t: (k,) [s].
+        q: (k, n) joint positions [rad] or [m].
+        qd: (k, n) speeds.
+        tau: (k, n) efforts [N m] or [N].
+    """
+
+    arm: str
+    t: Array
+    q: Array
+    qd: Array
+    tau: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Picture:
+    """A picture that a camera took.
+
+    Attributes:
+        time: when [s].
+        camera: its name.
+        frame: that it was to find, as the program spells it.
+        png: the picture, a PNG file.
+        found: whether it was found.
+        text: what was found, or why nothing was.
+    """
+
+    time: float
+    camera: str
+    frame: str
+    png: bytes
+    found: bool
+    text: str = ""
+
+
 @attrs.frozen(kw_only=True)
 class Failure:
     """Why a run did not come to its end.
@@ -191,6 +247,8 @@ class Recording:
             changes the last in every two-thousandth of the run.
         configurations: by arm, the configuration (n,) at the end.
         parts: where each part of the cell was believed to be, by name.
+        measured: what was measured of each arm, where there is anything to measure.
+        pictures: that the cameras took, in order.
         failure: why it did not come to its end; None where it did.
     """
 
@@ -203,6 +261,8 @@ class Recording:
     trees: tuple[tuple[float, FrameTree], ...]
     configurations: Mapping[str, Array]
     parts: Mapping[str, PartTrack] = attrs.field(factory=dict)
+    measured: tuple[MeasuredStream, ...] = ()
+    pictures: tuple[Picture, ...] = ()
     failure: Failure | None = None
 
     @property

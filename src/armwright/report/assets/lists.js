@@ -225,6 +225,6 @@ function showTree() {
   }
   for (const [name, figure] of Object.entries(data.animation.arms)) {
     const place = tree.places.get(name);
-    if (place) place.textContent = placeText(blend(figure.points, at).slice(-3));
+    if (place) place.textContent = placeText(framesOf(figure, at).at(-1).slice(9));
   }
 }

@@ -58,7 +58,7 @@ function showReadout() {
   });
   const figure = data.animation?.arms[arm.name];
   const parts = [["hand", `${placeText(blend(arm.hand, place))} mm`]];
-  if (figure) parts.push(["gripper", gripText(figure.grip[locate(data.animation.t, now.t)[0]])]);
+  if (figure) parts.push(["gripper", gripText(gripOf(figure, locate(data.animation.t, now.t)))]);
   byId("hand").replaceChildren(
     ...parts.map(([name, text]) => make("div", {}, make("span", { textContent: name }), text)),
   );
@@ -141,6 +141,7 @@ function start() {
 // What a test, or a curious reader at the console, may ask.
 window.armwright = {
   seek,
+  bodies: () => bodiesAt(now.t).bodies,
   state: () => {
     const arm = chosenArm();
     const place = arm && presentRow(arm);

@@ -5,9 +5,7 @@ function unpack() {
     for (const key of ["q", "qd", "qdd", "tau", "hand"]) arm[key] = expand(arm[key]);
   }
   if (!data.animation) return;
-  for (const figure of Object.values(data.animation.arms)) {
-    for (const key of ["points", "hand_axes", "joint_axes"]) figure[key] = expand(figure[key]);
-  }
+  for (const figure of Object.values(data.animation.arms)) figure.q = expand(figure.q);
   for (const frame of data.animation.frames) frame.poses = expand(frame.poses);
 }
 unpack();
