@@ -34,7 +34,7 @@ FORMAT = "armwright results 1"
 _RESULT_NAMES = re.compile(
     r"(motion|samples|path|dh_\w+)\.csv|events\.jsonl|(frames|move|errors|measures|tables|summary)\.json|report\.html|"
     r"arm\.(toml|urdf)|move\.(gif|mp4)|(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|"
-    r"verification|bearings|error|spectrum|forces|energy)\.svg"
+    r"verification|bearings|error|spectrum|forces|energy)\.svg|seen-\d+\.png"
 )
 # A record that is larger is none of ours [bytes], and hashes are worked out in pieces [bytes].
 _LARGEST_RECORD, _PIECE = 200_000_000, 1 << 20

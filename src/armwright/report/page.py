@@ -29,6 +29,7 @@ _SCRIPTS = (
     "charts.js",
     "joint_charts.js",
     "lists.js",
+    "pictures.js",
     "run.js",
 )
 
@@ -70,6 +71,23 @@ class Effect:
 
 
 @attrs.frozen(kw_only=True)
+class LeastDistance:
+    """The least distance between two bodies on a stage.
+
+    Attributes:
+        distance: [m]; None where nothing comes near.
+        bound: it is no less than this anywhere [m].
+        bodies: the names of both; empty where nothing comes near.
+        t: when they are so near [s].
+    """
+
+    distance: float | None
+    bound: float
+    bodies: Sequence[str]
+    t: float
+
+
+@attrs.frozen(kw_only=True)
 class StageRow:
     """A stage of a motion.
 
@@ -86,6 +104,7 @@ class StageRow:
         hand_length: length of the path of the tool [m].
         deviation: largest distance from the straight line [m]; None without a line.
         note: a remark, such as ``slowed by joint 2 speed``.
+        clearance: the least distance to other bodies; None where there is nothing to meet.
     """
 
     t0: float
@@ -100,6 +119,7 @@ class StageRow:
     hand_length: float
     deviation: float | None = None
     note: str = ""
+    clearance: LeastDistance | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -126,6 +146,29 @@ class JointInfo:
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class MeasuredMotion:
+    """What was measured of an arm at K instants.
+
+    Attributes:
+        t: (K,) instants [s].
+        q: (K, n) positions [rad] or [m].
+        qd: (K, n) speeds.
+        tau: (K, n) torques [N m] or forces [N].
+        error: (K, n) the tracking error, measured less planned, that is largest until the next instant [rad] or [m].
+        worst: (n,) the largest tracking error of each joint in the whole run, without its sign.
+        worst_t: (n,) when it occurred [s].
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    tau: Array
+    error: Array
+    worst: Array
+    worst_t: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class ArmRecord:
     """The motion of an arm at N instants (some 2000 suffice for a screen).
 
@@ -139,6 +182,7 @@ class ArmRecord:
         qdd: (N, n) accelerations.
         tau: (N, n) torques [N m] or forces [N]; None where no dynamics was computed.
         hand: (N, 3) positions of the tool in the world [m].
+        measured: what was measured; None where nothing was.
     """
 
     name: str
@@ -150,6 +194,7 @@ class ArmRecord:
     qdd: Array
     tau: Array | None = None
     hand: Array
+    measured: MeasuredMotion | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -289,6 +334,27 @@ class Animation:
     parts: Sequence[MovedPart] = ()
 
 
+@attrs.frozen(kw_only=True)
+class SeenPicture:
+    """A picture that a camera took.
+
+    Attributes:
+        t: when [s].
+        camera: its name.
+        frame: that it was to find.
+        found: whether it was found.
+        text: what was found, or why nothing was.
+        png: the file as base64.
+    """
+
+    t: float
+    camera: str
+    frame: str
+    found: bool
+    text: str
+    png: str
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class RunPage:
     """The data of the page of a run.
@@ -307,6 +373,8 @@ class RunPage:
         stages: stages of the motion, in order.
         arms: records of the arms.
         animation: the data of the view; None without a view.
+        pictures: that cameras took, in order.
+        clearance: smaller distances of stages are marked [m].
         text_kind: kind of the text, ``Program`` or ``Poses``.
     """
 
@@ -323,6 +391,8 @@ class RunPage:
     stages: Sequence[StageRow] = ()
     arms: Sequence[ArmRecord] = ()
     animation: Animation | None = None
+    pictures: Sequence[SeenPicture] = ()
+    clearance: float = 0.0
     text_kind: Literal["Program", "Poses"] = "Program"
 
 

@@ -16,10 +16,21 @@ from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt
 from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
 from armwright.report.arm_figure import arm_figure, opening_of
-from armwright.report.page import Animation, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
+from armwright.report.page import (
+    Animation,
+    ArmRecord,
+    Effect,
+    FrameTrack,
+    LeastDistance,
+    Message,
+    RunPage,
+    StageRow,
+    TreeChange,
+)
 from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, moved_parts, placed_arms
 from armwright.report.shape_table import ShapeTable
 from armwright.report.stick_figure import arm_record
+from armwright.report.tracking import measured_motion, seen_pictures
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -49,7 +60,8 @@ def run_page_data(
     reasons = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
     errors_first = sorted(diagnostics, key=lambda diagnostic: not diagnostic.is_error)
     listed, fewer = _limit_items(errors_first, MAX_LIST_ITEMS, "messages", "all in run.json")
-    notes = (*reasons, *left_out, *fewer, *fewer_stages, *fewer_frames)
+    pictures, fewer_pictures = seen_pictures(recording.pictures)
+    notes = (*reasons, *left_out, *fewer, *fewer_stages, *fewer_frames, *fewer_pictures)
     return RunPage(
         title=f"{source.name} in {cell.name}" + ("" if failure is None else ": failed"),
         status=status,
@@ -68,12 +80,22 @@ def run_page_data(
         ],
         effects=_effects(recording),
         stages=[_stage_row(run, source.line(run.span.start)) for run in stages],
-        arms=[
-            arm_record(s.arm, cell.arms[s.arm].arm, (s.t, s.q, s.qd, s.qdd, s.tau), cell.arms[s.arm].base)
-            for s in recording.streams
-        ],
+        arms=_arm_records(recording),
         animation=animation,
+        pictures=pictures,
     )
+
+
+def _arm_records(recording: Recording) -> list[ArmRecord]:
+    measured = {stream.arm: stream for stream in recording.measured}
+    records = []
+    for s in recording.streams:
+        arm = recording.cell.arms[s.arm]
+        record = arm_record(s.arm, arm.arm, (s.t, s.q, s.qd, s.qdd, s.tau), arm.base)
+        if s.arm in measured:
+            record = attrs.evolve(record, measured=measured_motion(s, measured[s.arm]))
+        records.append(record)
+    return records
 
 
 def _limit_items(items: Sequence[_T], most: int, name: str, hint: str = EVENT_LOG_HINT) -> tuple[list[_T], list[str]]:
@@ -110,7 +132,13 @@ def _stage_row(run: RunStage, line: int) -> StageRow:
         hand_length=run.length,
         deviation=run.stage.deviation,
         note=stage_note(run),
+        clearance=_least_distance(run),
     )
+
+
+def _least_distance(run: RunStage) -> LeastDistance | None:
+    it = run.clearance
+    return it and LeastDistance(distance=it.distance, bound=it.bound, bodies=it.bodies, t=run.t0 + it.time)
 
 
 def _animation(recording: Recording) -> tuple[Animation, list[str]]:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import platform
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.errors import ExitStatus
 from armwright.files.inputs import hash_of_read_file
-from armwright.files.output import sha256, write_folder
+from armwright.files.output import Content, sha256, write_folder
 from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
@@ -22,6 +22,7 @@ from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Effect, Recording, RunStage, motion_csv_lines
 from armwright.report.page import COLLISIONS, run_page
 from armwright.report.run_data import run_page_data
+from armwright.report.run_scene import part_data, scene_data
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -29,6 +30,8 @@ from armwright.version import __version__
 _DIGITS = 12
 # Rows of motion.csv by default: some 220 MB, or an arm for a quarter of an hour at 1 ms.
 MOTION_ROWS = 1_000_000
+# Pictures that are written at most.
+MAX_PICTURES = 2_000
 
 
 @attrs.frozen(kw_only=True)
@@ -71,9 +74,7 @@ def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnost
     write_folder(folder, files, run_record(recording, diagnostics, origin))
 
 
-def run_files(
-    recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs
-) -> dict[str, str | Iterable[str]]:
+def run_files(recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs) -> dict[str, Content]:
     """Return the files of a run by name, identical for identical runs; those of a failed run end at the failure.
 
     Args:
@@ -88,7 +89,12 @@ def run_files(
         "report.html": run_page(
             run_page_data(recording, diagnostics, origin.command, omission_notes(recording, origin.motion_rows))
         ),
+        **{_picture_file(i): picture.png for i, picture in enumerate(recording.pictures[:MAX_PICTURES], 1)},
     }
+
+
+def _picture_file(number: int) -> str:
+    return f"seen-{number:04}.png"
 
 
 def frame_data(recording: Recording) -> dict[str, Any]:
@@ -246,6 +252,8 @@ def omission_notes(recording: Recording, most_rows: int) -> tuple[str, ...]:
         )
     if contacts:
         notes.append(f"run.json lists the first and the last contacts: {omission_text(contacts)}")
+    if len(recording.pictures) > MAX_PICTURES:
+        notes.append(f"the first {MAX_PICTURES:,} of {len(recording.pictures):,} pictures are written")
     return tuple(notes)
 
 
@@ -280,6 +288,19 @@ def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: 
         "left_out": list(omission_notes(recording, origin.motion_rows)),
         "versions": {"armwright": __version__, "python": platform.python_version(), "numpy": np.__version__},
         **summary_data(recording, diagnostics),
+        "scene": scene_data(recording.cell),
+        "parts": part_data(recording),
+        "pictures": [
+            {
+                "file": _picture_file(i),
+                "time": picture.time,
+                "camera": picture.camera,
+                "frame": picture.frame,
+                "found": picture.found,
+                "text": picture.text,
+            }
+            for i, picture in enumerate(recording.pictures[:MAX_PICTURES], 1)
+        ],
     }
 
 

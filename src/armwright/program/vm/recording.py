@@ -61,18 +61,21 @@ class Effect:
     data: Mapping[str, Any] = attrs.field(factory=dict)
 
 
-class StageClearance(NamedTuple):
-    """The least distance between two bodies during a stage.
+@attrs.frozen(kw_only=True)
+class StageClearance:
+    """The least distance of an arm, and what it holds, to other bodies on a stage; wanted contacts do not count.
 
     Attributes:
-        distance: [m]; below 0 is a depth.
-        bodies: the names of both.
-        time: when [s].
+        distance: the least that was found [m]; None where nothing comes near.
+        bound: it is no less than this anywhere [m].
+        bodies: the names of both bodies, that of the arm first; empty where nothing comes near.
+        time: when they are so near, since the stage began [s].
     """
 
-    distance: float
-    bodies: tuple[str, str]
-    time: float
+    distance: float | None
+    bound: float
+    bodies: tuple[str, ...] = ()
+    time: float = 0.0
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -84,7 +84,11 @@ function boundsOf(shape, X) {
   return signs.flatMap((x) =>
     signs.flatMap((y) =>
       signs.map((z) =>
-        plus(plus(plus(X.slice(9), turn.slice(0, 3), x * half[0]), turn.slice(3, 6), y * half[1]), turn.slice(6, 9), z * half[2]),
+        plus(
+          plus(plus(X.slice(9), turn.slice(0, 3), x * half[0]), turn.slice(3, 6), y * half[1]),
+          turn.slice(6, 9),
+          z * half[2],
+        ),
       ),
     ),
   );

@@ -54,11 +54,14 @@ function paintLabels() {
   pen.fillStyle = colours.quiet;
   pen.fillText(scale, taken[0].x, taken[0].y + 8);
   for (const label of joinedLabels()) {
-    const box = boxesOf(label, pen.measureText(label.text).width).find((one) => !taken.some((other) => overlap(one, other)));
+    const box = boxesOf(label, pen.measureText(label.text).width).find(
+      (one) => !taken.some((other) => overlap(one, other)),
+    );
     if (!box) continue;
     taken.push(box);
     const [x, y] = [box.x, box.y + LABEL_HEIGHT / 2];
-    if (box.far) stroke(label.p, { ...label.p, x: label.p.x < x ? x - 2 : x + box.wide + 2, y }, colours.quiet, 0.8, 0.7);
+    if (box.far)
+      stroke(label.p, { ...label.p, x: label.p.x < x ? x - 2 : x + box.wide + 2, y }, colours.quiet, 0.8, 0.7);
     pen.lineWidth = 3.5;
     pen.strokeStyle = colours.sky;
     pen.strokeText(label.text, x, y);

@@ -15,7 +15,12 @@ function boxMesh([x, y, z]) {
   for (let k = 0; k < 3; k++)
     for (const side of [-1, 1]) {
       const first = corners.length / 3;
-      for (const [u, v] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+      for (const [u, v] of [
+        [-1, -1],
+        [1, -1],
+        [1, 1],
+        [-1, 1],
+      ]) {
         const at = [0, 0, 0];
         [at[k], at[(k + 1) % 3], at[(k + 2) % 3]] = [side, u, v];
         corners.push(...at.map((value, i) => value * size[i]));
@@ -46,7 +51,14 @@ function roundMesh(rings) {
 
 function cylinderMesh(r, length) {
   const h = length / 2;
-  return roundMesh([[0, -h, 0, -1], [r, -h, 0, -1], [r, -h, 1, 0], [r, h, 1, 0], [r, h, 0, 1], [0, h, 0, 1]]);
+  return roundMesh([
+    [0, -h, 0, -1],
+    [r, -h, 0, -1],
+    [r, -h, 1, 0],
+    [r, h, 1, 0],
+    [r, h, 0, 1],
+    [0, h, 0, 1],
+  ]);
 }
 
 function capsuleMesh(r, length) {
@@ -78,7 +90,11 @@ function facetMesh(vertices, faces) {
     corners.push(...triples(vertices, v));
     normals.push(...unit(near.reduce((sum, f) => plus(sum, areas[f]), [0, 0, 0])));
   });
-  return meshOf(corners, normals, faces.map((_, i) => i));
+  return meshOf(
+    corners,
+    normals,
+    faces.map((_, i) => i),
+  );
 }
 
 function shapeMesh(shape) {

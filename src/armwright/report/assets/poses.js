@@ -45,7 +45,10 @@ function bodiesAt(t) {
   const tools = Object.fromEntries(arms.map(([name, _, frames]) => [name, frames.at(-1)]));
   const bodies = animation.fixtures.map(({ name, shape, pose }) => ({ name, shape, pose, tint: "fixture", whose: 0 }));
   animation.parts.forEach((part, whose) => {
-    const last = Math.max(0, part.times.findLastIndex((time) => time <= t + HAIR));
+    const last = Math.max(
+      0,
+      part.times.findLastIndex((time) => time <= t + HAIR),
+    );
     const arm = part.arms[last];
     const pose = arm === null ? part.poses[last] : compose(tools[arm], part.poses[last]);
     bodies.push({ name: part.name, shape: part.shape, pose, tint: "part", whose, arm });

@@ -121,10 +121,11 @@ function start() {
   fillProgram();
   fillTrace();
   fillStages();
+  fillPictures();
   byId("tree-card").hidden = !tree.changes.length;
   startView();
   startJointCharts();
-  listeners.push(showClock, showProgram, showStages, showReadout, drawView);
+  listeners.push(showClock, showProgram, showStages, showPictures, showReadout, drawView);
   if (tree.changes.length) listeners.push(showTree);
   fillArms();
   startClock({

@@ -42,7 +42,13 @@ const channels = (colour) => [1, 3, 5].map((k) => Number.parseInt(colour.slice(k
 
 function mixed(one, other, share) {
   const [a, b] = [channels(one), channels(other)];
-  return `#${a.map((v, k) => Math.round(v + share * (b[k] - v)).toString(16).padStart(2, "0")).join("")}`;
+  return `#${a
+    .map((v, k) =>
+      Math.round(v + share * (b[k] - v))
+        .toString(16)
+        .padStart(2, "0"),
+    )
+    .join("")}`;
 }
 
 // The shades of a colour as pixels, from the dark side to where the light falls.
@@ -53,7 +59,10 @@ function rampOf(colour) {
     const shades = new Uint32Array(SHADES);
     for (let i = 0; i < SHADES; i++) {
       const light = i / (SHADES - 1);
-      const shade = light < 0.62 ? mixed("#000000", colour, 0.42 + 0.58 * (light / 0.62)) : mixed(colour, "#ffffff", ((light - 0.62) / 0.38) * 0.34);
+      const shade =
+        light < 0.62
+          ? mixed("#000000", colour, 0.42 + 0.58 * (light / 0.62))
+          : mixed(colour, "#ffffff", ((light - 0.62) / 0.38) * 0.34);
       const [r, g, b] = channels(shade);
       shades[i] = (255 << 24) | (b << 16) | (g << 8) | r;
     }
@@ -180,5 +189,9 @@ function paintShadow(mesh, X, height, owner) {
   Object.assign(brush, { ramp: null, owner });
   const corners = cornersOf(mesh, X);
   if (corners.every((p) => p[2] < height + 1e-5)) return;
-  paintTriangles(mesh.faces, corners.map((p) => inCamera([p[0], p[1], height], 0)), true);
+  paintTriangles(
+    mesh.faces,
+    corners.map((p) => inCamera([p[0], p[1], height], 0)),
+    true,
+  );
 }

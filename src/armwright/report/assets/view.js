@@ -75,7 +75,8 @@ function strokeBehind(a, b, colour, width, alpha = 1) {
   const pieces = Math.min(40, Math.max(1, Math.ceil(Math.hypot(to.x - from.x, to.y - from.y) / 5)));
   const point = (k) => project(plus(a, plus(b, a, -1), k / pieces));
   pen.lineCap = pieces > 1 ? "butt" : "round";
-  for (let k = 0; k < pieces; k++) stroke(point(k), point(k + 1), colour, width, isHidden(point(k + 0.5)) ? 0.28 * alpha : alpha);
+  for (let k = 0; k < pieces; k++)
+    stroke(point(k), point(k + 1), colour, width, isHidden(point(k + 0.5)) ? 0.28 * alpha : alpha);
 }
 
 function paintFrames(place) {
