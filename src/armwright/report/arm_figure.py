@@ -144,9 +144,8 @@ def _gripper(name: str, placed: Placed, opening: float) -> Iterator[tuple[Body, 
     yield _body(f"{name} palm", homogeneous(np.eye(3), [0.0, 0.0, -1.08 * finger]), tool, "link"), palm
     for side in (-1, 1):
         pose = homogeneous(np.eye(3), [0.0, side * thick / 2, -0.45 * finger])
-        shape = Box(size=[0.26 * finger, thick, 1.1 * finger])
         body = _body(f"{name} finger", pose, tool, "joint")
-        yield attrs.evolve(body, slide=side), shape
+        yield attrs.evolve(body, slide=side), Box(size=[0.26 * finger, thick, 1.1 * finger])
 
 
 def _body(name: str, pose: Array, frame: int, tint: str) -> Body:

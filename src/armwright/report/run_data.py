@@ -138,7 +138,9 @@ def _stage_row(run: RunStage, line: int) -> StageRow:
 
 def _least_distance(run: RunStage) -> LeastDistance | None:
     it = run.clearance
-    return it and LeastDistance(distance=it.distance, bound=it.bound, bodies=it.bodies, t=run.t0 + it.time)
+    if it is None:
+        return None
+    return LeastDistance(distance=it.distance, bound=it.bound, bodies=it.bodies, t=run.t0 + it.time)
 
 
 def _animation(recording: Recording) -> tuple[Animation, list[str]]:

@@ -41,7 +41,7 @@ def measured_motion(planned: Stream, measured: MeasuredStream) -> MeasuredMotion
 def tracking_error(planned: Stream, measured: MeasuredStream) -> Array:
     """Return the measured less the planned positions (k, n), the planned ones linear between their ticks."""
     columns = [np.interp(measured.t, planned.t, q) for q in planned.q.T]
-    return measured.q - np.stack(columns, axis=1)
+    return np.asarray(measured.q - np.stack(columns, axis=1))
 
 
 def _largest_between(values: Array, rows: npt.NDArray[np.intp]) -> Array:

@@ -46,15 +46,31 @@ function topsOfBoxes() {
   return [...tops, { name: null, height: scenery.floor }];
 }
 
-function paintBodies(bodies) {
-  const below = topsOfBoxes();
-  const ownerOf = ({ name, tint }) => (tint === "fixture" ? below.findIndex((top) => top.name === name) + 1 : 0);
-  for (const body of bodies) paintMesh(meshes[body.shape], body.pose, tintOf(body), ownerOf(body));
-  below.forEach(({ name, height }, k) => {
-    if (lens.eye[2] <= height) return;
-    const owner = name === null ? FLOOR : k + 1;
-    for (const { shape, pose } of bodies) paintShadow(meshes[shape], pose, height, owner);
+function paintBodies(bodies, tops) {
+  const ownerOf = ({ name, tint }) => (tint === "fixture" ? tops.findIndex((top) => top.name === name) + 1 : 0);
+  const corners = bodies.map(({ shape, pose }) => cornersOf(meshes[shape], pose));
+  bodies.forEach((body, i) => {
+    paintMesh(meshes[body.shape], corners[i], body.pose, tintOf(body), ownerOf(body));
   });
+  tops.forEach(({ name, height }, k) => {
+    if (lens.eye[2] <= height) return;
+    bodies.forEach(({ shape }, i) => {
+      paintShadow(meshes[shape], corners[i], height, name === null ? FLOOR : k + 1);
+    });
+  });
+}
+
+function paintSolids(bodies, width, height) {
+  const tops = topsOfBoxes();
+  const stands = ({ tint }) => tint === "fixture";
+  sizeSurface(width, height);
+  const key = JSON.stringify([camera, surface.wide, surface.high, colours.fixture, colours.quiet]);
+  paintStanding(key, () => paintBodies(bodies.filter(stands), tops));
+  paintBodies(
+    bodies.filter((body) => !stands(body)),
+    tops,
+  );
+  showSurface(width, height);
 }
 
 function stroke(a, b, colour, width, alpha = 1) {
@@ -166,9 +182,7 @@ function drawView() {
   labels = [];
   const { place, bodies, arms } = bodiesAt(now.t);
   paintFloor();
-  clearSurface(width, height);
-  paintBodies(bodies);
-  showSurface(width, height);
+  paintSolids(bodies, width, height);
   paintWorldAxes();
   paths.forEach((pieces, i) => {
     paintPath(pieces, i === now.arm);
