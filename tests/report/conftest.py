@@ -10,21 +10,8 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.report.page import (
-    Animation,
-    ArmFigure,
-    ArmRecord,
-    Body,
-    ChainJoint,
-    Effect,
-    FrameTrack,
-    JointInfo,
-    Message,
-    RunPage,
-    StageRow,
-    TreeChange,
-    run_page,
-)
+from armwright.report.animation import Animation, ArmFigure, Body, ChainJoint, FrameTrack, TreeChange
+from armwright.report.page import ArmRecord, Effect, JointInfo, Message, RunPage, StageRow, run_page
 
 FPS = 25.0
 SHOULDER, UPPER, FORE, HAND = 0.42, 0.43, 0.40, 0.14

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from armwright.report.animation import FrameTrack
 from armwright.report.markup import json_text
-from armwright.report.page import FrameTrack, run_page
+from armwright.report.page import run_page
 
 # Five significant digits: half a unit in the last of them.
 LAST_DIGIT = 0.5e-4

@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.cell.scene import Gripper
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.clearance import Body as SolidBody
-from armwright.report.page import ArmFigure, Body, ChainJoint
+from armwright.report.animation import ArmFigure, Body, ChainJoint
 from armwright.report.shape_table import ShapeTable
 from armwright.spatial.poses import homogeneous, to_noap
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Shape, Sphere

@@ -9,8 +9,9 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.moves import Move
 from armwright.motion.poses_file import PosesFile
 from armwright.motion.trajectory import Samples
+from armwright.report.animation import Animation, FrameTrack
 from armwright.report.arm_figure import Placed, arm_figure
-from armwright.report.page import Animation, Effect, FrameTrack, Message, RunPage, StageRow
+from armwright.report.page import Effect, Message, RunPage, StageRow
 from armwright.report.shape_table import ShapeTable
 from armwright.report.stick_figure import arm_record
 from armwright.spatial.poses import to_noap

@@ -15,18 +15,9 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt, omission_text, shorten_line
 from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
+from armwright.report.animation import Animation, FrameTrack, TreeChange
 from armwright.report.arm_figure import arm_figure, opening_of
-from armwright.report.page import (
-    Animation,
-    ArmRecord,
-    Effect,
-    FrameTrack,
-    LeastDistance,
-    Message,
-    RunPage,
-    StageRow,
-    TreeChange,
-)
+from armwright.report.page import ArmRecord, Effect, LeastDistance, Message, RunPage, StageRow
 from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, moved_parts, placed_arms
 from armwright.report.shape_table import ShapeTable
 from armwright.report.stick_figure import arm_record

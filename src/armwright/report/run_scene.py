@@ -12,8 +12,8 @@ from armwright.cell.model import Cell
 from armwright.cell.part_poses import PartTrack
 from armwright.cell.scene import Fixture
 from armwright.program.vm.recording import Effect, Recording
+from armwright.report.animation import Body, MovedPart
 from armwright.report.arm_figure import Placed
-from armwright.report.page import Body, MovedPart
 from armwright.report.shape_table import ShapeTable, shape_data
 from armwright.spatial.poses import to_noap
 from armwright.spatial.shapes import Box, support

@@ -1,6 +1,7 @@
 // Names in the view, none on another.
 
 let labels = [];
+let labelBoxes = [];
 const LABEL_FONT = "12px system-ui, sans-serif";
 const LABEL_HEIGHT = 15;
 // Where a name may stand about its point: to the right, to the left, below, above, then farther away.
@@ -69,4 +70,5 @@ function paintLabels() {
     pen.fillText(label.text, x, y);
   }
   pen.textBaseline = "alphabetic";
+  labelBoxes = taken;
 }

@@ -143,6 +143,7 @@ function start() {
 window.armwright = {
   seek,
   bodies: () => bodiesAt(now.t).bodies,
+  labels: () => labelBoxes.map(({ x, y, wide }) => ({ x, y, wide, high: LABEL_HEIGHT })),
   state: () => {
     const arm = chosenArm();
     const place = arm && presentRow(arm);
