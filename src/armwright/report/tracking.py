@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 
-import attrs
 import numpy as np
 import numpy.typing as npt
 
@@ -32,7 +31,10 @@ def measured_motion(planned: Stream, measured: MeasuredStream) -> MeasuredMotion
     rows = thinned_rows(len(measured.t))
     sizes = np.abs(error)
     return MeasuredMotion(
-        **{name: values[rows] for name, values in attrs.asdict(measured, recurse=False).items() if name != "arm"},
+        t=measured.t[rows],
+        q=measured.q[rows],
+        qd=measured.qd[rows],
+        tau=measured.tau[rows],
         error=_largest_between(error, rows),
         worst=sizes.max(axis=0),
         worst_t=measured.t[sizes.argmax(axis=0)],
