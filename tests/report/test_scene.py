@@ -338,16 +338,16 @@ def test_plates_that_cross(visit) -> None:
 def test_every_shape_is_drawn(visit) -> None:
     """A view with one more body of any kind is another picture; what is inside out or empty breaks nothing."""
     shapes: list[dict[str, Any]] = [
-        {"kind": "box", "size": [0.2, 0.3, 0.1]},
-        {"kind": "cylinder", "radius": 0.1, "length": 0.2},
-        {"kind": "capsule", "radius": 0.1, "length": 0.2},
-        {"kind": "sphere", "radius": 0.1},
-        ShapeTableOf(torus(20, 10)),
+        {"kind": "box", "size": [0.006, 0.009, 0.003]},
+        {"kind": "cylinder", "radius": 0.003, "length": 0.006},
+        {"kind": "capsule", "radius": 0.003, "length": 0.006},
+        {"kind": "sphere", "radius": 0.003},
+        ShapeTableOf(attrs.evolve(torus(20, 10), vertices=0.05 * torus(20, 10).vertices)),
     ]
     seen = []
     for count in range(len(shapes) + 1):
         fixtures = [
-            Body(name=f"B{i}", shape=i, pose=to_noap(homogeneous(np.eye(3), [0.25 * (i - 2), 0, 0.3])))
+            Body(name=f"B{i}", shape=i, pose=to_noap(homogeneous(np.eye(3), [0.004 * (i - 2), 0, 0.004])))
             for i in range(count)
         ]
         page = two_parts(np.eye(4), np.eye(4), (0.01, 0.01, 0.01))
