@@ -229,6 +229,10 @@ class Table:
         """Whether the value of a key is a table."""
         return isinstance(self._data.get(key), dict)
 
+    def is_empty(self, key: str) -> bool:
+        """Whether the value of a key is an empty list."""
+        return self._data.get(key) == []
+
     def allow(self, *keys: str) -> None:
         """Make optional keys known: ``refuse_unknown_keys`` may name them as the nearest to a misspelt one."""
         self._read.update(keys)
