@@ -126,6 +126,28 @@ class Table:
             raise self.error(key, f"expected a number above 0, got {value:g}")
         return value
 
+    def whole(self, key: str, lower: int, upper: int, default: Any = _MISSING) -> int:
+        """Return a whole number from ``lower`` to ``upper``.
+
+        Raises:
+            FileFormatError: it is missing without a default, no whole number, or out of range.
+        """
+        value = self.number(key, default, lower=lower, upper=upper)
+        if value != round(value):
+            raise self.error(key, f"expected a whole number, got {value:g}")
+        return round(value)
+
+    def flag(self, key: str, *, default: bool = False) -> bool:
+        """Return ``true`` or ``false``.
+
+        Raises:
+            FileFormatError: it is neither of them.
+        """
+        value = self._value(key, default, "true or false")
+        if not isinstance(value, bool):
+            raise self.error(key, f"expected true or false, got {_value_text(value)}")
+        return value
+
     def vector(self, key: str, length: int | Collection[int], default: Any = _MISSING) -> Array:
         """Return an array of that many finite numbers; several lengths may be allowed.
 
@@ -176,6 +198,23 @@ class Table:
         value = self._value(key, _MISSING, "a list of texts in quotes")
         if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
             raise self.error(key, f"expected a list of texts in quotes, got {_value_text(value)}")
+        return value
+
+    def text_rows(self, key: str, length: int) -> list[list[str]]:
+        """Return a list of rows of that many strings each; an empty one when it is missing.
+
+        Raises:
+            FileFormatError: it is no such list, or longer than the limit of entries.
+        """
+        expected = f"a list of lists of {length} texts in quotes"
+        value = self._value(key, [], expected)
+        if not isinstance(value, list):
+            raise self.error(key, f"expected {expected}, got {_value_text(value)}")
+        if len(value) > limit("entries"):
+            raise self.error(key, f"too many: {limit_message('entries', len(value))}")
+        for i, row in enumerate(value):
+            if not isinstance(row, list) or len(row) != length or not all(isinstance(text, str) for text in row):
+                raise self.error(key, f"expected {length} texts in quotes, got {_value_text(row)}", i)
         return value
 
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
@@ -232,6 +271,10 @@ class Table:
     def is_empty(self, key: str) -> bool:
         """Whether the value of a key is an empty list."""
         return self._data.get(key) == []
+
+    def is_text(self, key: str) -> bool:
+        """Whether the value of a key is a text."""
+        return isinstance(self._data.get(key), str)
 
     def allow(self, *keys: str) -> None:
         """Make optional keys known: ``refuse_unknown_keys`` may name them as the nearest to a misspelt one."""

@@ -60,6 +60,9 @@ LIMITS: Mapping[str, Limit] = {
     "gltf_values": Limit(1_000_000, "values", "values in the JSON of a glTF file"),
     "step_s": Limit(60, "s", "computing time for the triangles of a STEP file"),
     "step_mb": Limit(4000, "MB", "memory of the process that reads a STEP file"),
+    "pictures": Limit(1000, "pictures", "pictures that a camera is calibrated with"),
+    "picture_mb": Limit(50, "MB", "size of the file of a picture"),
+    "picture_megapixels": Limit(100, "megapixels", "width times height of a picture, which its file names"),
     "message_mb": Limit(16, "MB", "one message to the language server or the debug adapter"),
     "header_bytes": Limit(8192, "bytes", "the header of such a message"),
 }
