@@ -169,9 +169,10 @@ def _read_arms(table: Table, folder: Path) -> dict[str, CellArm]:
 
 def _read_arm(table: Table, folder: Path) -> CellArm:
     name = table.text("model", default=_DEFAULT_ARM)
+    packages = {key: folder / table.table("packages").text(key) for key in table.table("packages")}
     try:
-        # The path of an arm file is relative to the folder of the cell file.
-        arm = load_arm(regular_file(folder / name) if is_path(name) else name)
+        # The paths of an arm file and of packages are relative to the folder of the cell file.
+        arm = load_arm(regular_file(folder / name) if is_path(name) else name, packages=packages)
     except ArmwrightError as error:
         raise table.error("model", str(error)) from error
     if arm.n < _MIN_JOINTS:

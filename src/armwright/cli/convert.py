@@ -8,7 +8,8 @@ from typer import Option
 
 from armwright.cli.options import ArmName, Json, usage_error
 from armwright.cli.output import print_json
-from armwright.errors import counted, shown
+from armwright.cli.package_option import Packages, package_folders
+from armwright.errors import counted
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -23,6 +24,7 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
         str | None,
         Option(help="Joints of a URDF file to lock, at 0 or a position in degrees or mm, as in J1,J2=30."),
     ] = None,
+    package: Packages = None,
     as_json: Json = False,
 ) -> None:
     """Write an arm as URDF or as an arm file, and report what the format cannot represent.
@@ -34,7 +36,9 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.cell.assembly import is_assembly
 
     if is_assembly(Path(arm)):
-        _convert_assembly(Path(arm), output, as_json=as_json)
+        from armwright.cli.convert_assembly import convert_assembly
+
+        convert_assembly(Path(arm), output, as_json=as_json)
         return
     from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
     from armwright.arm.write import toml_text
@@ -45,7 +49,7 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("-o", f"expected a name that ends in .urdf or .toml, got {output}")
     if output.exists() and Path(arm).exists() and output.samefile(arm):
         raise usage_error("-o", "expected another file than the input, which may hold more than an arm")
-    model, notes = _read(arm, base, tip, lock)
+    model, notes = _read(arm, base, tip, lock, package)
     lost = lost_in_urdf(model) if kind == ".urdf" else []
     write_file(output, urdf_text(model) if kind == ".urdf" else toml_text(model))
     if as_json:
@@ -54,24 +58,6 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     print(f"{model.name}: {counted(model.n, 'joint')} written to {output}")
     for sentence in (*notes, *lost):
         print(f"  {sentence}")
-
-
-def _convert_assembly(path: Path, output: Path, *, as_json: bool) -> None:
-    """Write the frames of an assembly, and report which have other names than their components."""
-    from armwright.cell.assembly import frames_text, read_assembly_frames
-    from armwright.files.output import write_file
-    from armwright.program.language.words import VOCABULARIES, Standard
-
-    if output.suffix.lower() != ".toml":
-        raise usage_error("-o", f"expected a name that ends in .toml for the frames of an assembly, got {output}")
-    assembly = read_assembly_frames(path, VOCABULARIES[Standard.RLO_2].reserved)
-    write_file(output, frames_text(assembly, path.name))
-    if as_json:
-        print_json({"written": str(output), "frames": list(assembly.frames), "renamed": assembly.renamed})
-        return
-    print(f"{path.name}: {counted(len(assembly.frames), 'frame')} written to {output}")
-    for name, component in assembly.renamed.items():
-        print(f"  {name} is the component {shown(component)}")
 
 
 def _locked_positions(path: str, text: str | None) -> "dict[str, float]":
@@ -92,15 +78,18 @@ def _locked_positions(path: str, text: str | None) -> "dict[str, float]":
     return locked
 
 
-def _read(name: str, base: str | None, tip: str | None, lock: str | None) -> "tuple[Arm, list[str]]":
+def _read(
+    name: str, base: str | None, tip: str | None, lock: str | None, package: list[str] | None
+) -> "tuple[Arm, list[str]]":
     """Return an arm, and notes on what its file states otherwise."""
     from armwright.arm.load import load_arm
     from armwright.arm.urdf.reader import read_urdf
 
     if name.lower().endswith(".urdf"):
-        reading = read_urdf(name, base=base, tip=tip, lock=_locked_positions(name, lock))
+        locked, packages = _locked_positions(name, lock), package_folders(package)
+        reading = read_urdf(name, base=base, tip=tip, lock=locked, packages=packages)
         return reading.arm, list(reading.notes)
-    for option, value in (("--base", base), ("--tip", tip), ("--lock", lock)):
+    for option, value in (("--base", base), ("--tip", tip), ("--lock", lock), ("--package", package)):
         if value:
             raise usage_error(option, f"expected a URDF file, whose links and joints have names, got '{name}'")
     return load_arm(name), []

@@ -268,6 +268,10 @@ class Table:
         """Whether the value of a key is a table."""
         return isinstance(self._data.get(key), dict)
 
+    def is_empty(self, key: str) -> bool:
+        """Whether the value of a key is an empty list."""
+        return self._data.get(key) == []
+
     def is_text(self, key: str) -> bool:
         """Whether the value of a key is a text."""
         return isinstance(self._data.get(key), str)

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arm.dh import carry
 from armwright.arm.model import Link
-from armwright.arm.urdf.geometry import solids_of, unread_shapes
+from armwright.arm.urdf.geometry import has_unread_shapes, solids_of
 from armwright.arm.urdf.robot import Robot, UrdfJoint, axis_of, body_of
 from armwright.arrays import Array
 from armwright.errors import one_of
@@ -105,6 +105,7 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
     if unread:
         kinds = f"boxes, cylinders, spheres and capsules up to {LARGEST_SIZE:g} m"
         notes += (f"of shapes, {kinds} are read; links with others: {_listed(unread)}",)
+    notes += tuple(robot.meshes.notes())
     solids = tuple(solid for body in standing for solid in body.solids)
     return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, base_solids=solids, notes=notes)
 
@@ -172,8 +173,8 @@ def _rigid_bodies(robot: Robot, link: str, X_BL: Array, branches: list[UrdfJoint
     while pending:
         name, X = pending.pop()
         element = robot.links[name]
-        unread += [name] if unread_shapes(element) else []
-        yield carry(attrs.evolve(body_of(element), solids=solids_of(element)), X)
+        unread += [name] if has_unread_shapes(element, robot.meshes) else []
+        yield carry(attrs.evolve(body_of(element), solids=solids_of(element, robot.meshes)), X)
         for joint in robot.child_joints[name]:
             if joint.fixed:
                 pending.append((joint.child, X @ joint.origin))

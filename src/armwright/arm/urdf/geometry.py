@@ -1,10 +1,11 @@
-"""What the links of a URDF file look like: the primitives in <collision>, or in <visual> where a link has no such."""
+"""What the links of a URDF file look like: the shapes in <collision>, or in <visual> where a link has no such."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from armwright.arm.urdf.elements import Element
+from armwright.arm.urdf.meshes import MeshFiles
 from armwright.arm.urdf.robot import origin_of
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import LARGEST_SIZE, Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
@@ -13,24 +14,28 @@ from armwright.spatial.shapes import LARGEST_SIZE, Box, Capsule, Cylinder, Mesh,
 _TAGS = ("collision", "visual")
 
 
-def solids_of(link: Element) -> tuple[Solid, ...]:
+def solids_of(link: Element, meshes: MeshFiles) -> tuple[Solid, ...]:
     """Return the solids of a link in the frame of the link; none where it has none, or only such as are not read.
 
+    Args:
+        link: the element.
+        meshes: where its meshes are; those that are not read are noted there.
+
     Raises:
-        FileFormatError: a length, or an origin, is no number.
+        FileFormatError: a length, or an origin, is no number, or the file of a mesh is broken.
     """
-    elements = _shape_elements(link)
     solids = []
-    for element, geometry in elements:
-        shape = _shape(geometry)
+    for element, geometry in _shape_elements(link):
+        shape = _shape(geometry, meshes)
         if shape is not None:
             solids.append(Solid(shape=shape, pose=origin_of(element)))
     return tuple(solids)
 
 
-def unread_shapes(link: Element) -> int:
-    """Return how many shapes of a link are not read: meshes, and primitives without an extent."""
-    return sum(_shape(geometry) is None for _, geometry in _shape_elements(link))
+def has_unread_shapes(link: Element, meshes: MeshFiles) -> bool:
+    """Whether a link has shapes other than meshes that are not read, such as primitives without an extent."""
+    geometries = [geometry for _, geometry in _shape_elements(link) if geometry.find("mesh") is None]
+    return any(_shape(geometry, meshes) is None for geometry in geometries)
 
 
 def _shape_elements(link: Element) -> list[tuple[Element, Element]]:
@@ -43,7 +48,7 @@ def _shape_elements(link: Element) -> list[tuple[Element, Element]]:
     return []
 
 
-def _shape(geometry: Element) -> Shape | None:
+def _shape(geometry: Element, meshes: MeshFiles) -> Shape | None:
     """Return the shape that a <geometry> describes; None of one that is not read."""
     for element in geometry.children:
         match element.tag:
@@ -58,8 +63,7 @@ def _shape(geometry: Element) -> Shape | None:
                 radius = element.number("radius")
                 return Sphere(radius=radius) if _is_solid(radius) else None
             case "mesh":
-                # Here a mesh would be read: its file is named relative to element.path, its scale is a vector.
-                return None
+                return meshes.mesh(element)
     return None
 
 

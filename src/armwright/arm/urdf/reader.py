@@ -43,7 +43,14 @@ class Reading:
     notes: tuple[str, ...]
 
 
-def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Arm:
+def load_urdf(
+    path: Path | str,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    lock: Lock = (),
+    packages: Mapping[str, Path | str] | None = None,
+) -> Arm:
     """Return the serial arm between two links of a URDF file.
 
     Positions of the arm are those of the joints in the file; the base is the frame of the base link, the tool that of
@@ -56,18 +63,27 @@ def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
             that carries all of them.
         lock: names of joints that are held at 0, as if they were fixed, such as those of a gripper; or where joints
             are held by their names [rad] or [m].
+        packages: folders of packages, by name, in which the meshes are that the file names as ``package://NAME/...``;
+            others are looked for below the folder of the file.
 
     Raises:
-        KindError: ``path`` is no path, ``lock`` one text, or a position no number.
+        KindError: ``path`` is no path, ``packages`` no mapping, ``lock`` one text, or a position no number.
         InvalidValueError: a joint is to be held where its limits do not let it.
         MissingExtraError: lxml is not installed.
         UnknownNameError: there is no link, or no joint, of that name.
         FileFormatError: the file is missing, broken, or has no such arm; the text has file, line and key.
     """
-    return read_urdf(path, base=base, tip=tip, lock=lock).arm
+    return read_urdf(path, base=base, tip=tip, lock=lock, packages=packages).arm
 
 
-def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Reading:
+def read_urdf(
+    path: Path | str,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    lock: Lock = (),
+    packages: Mapping[str, Path | str] | None = None,
+) -> Reading:
     """Return the serial arm between two links of a URDF file, and what was not taken as it stands.
 
     Arguments and errors are those of ``load_urdf``.
@@ -76,9 +92,11 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
         raise KindError(f"path: expected the path of a URDF file, got {shown(path)}")
     if isinstance(lock, str):
         raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
+    if packages is not None and not isinstance(packages, Mapping):
+        raise KindError(f"packages: expected folders by the names of packages, got {shown(packages)}")
     path = file_path(path)
     locked = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
-    robot = read_robot(path, {name: number(q, f"lock, '{name}'") for name, q in locked.items()})
+    robot = read_robot(path, {name: number(q, f"lock, '{name}'") for name, q in locked.items()}, packages)
     chain = chain_of(robot, base, tip)
     # The distance of the joints and the tip from the base, or 1 m where all are at one point.
     origins = np.array([*(each.X_BJ[:3, 3] for each in chain.moving), chain.X_BT[:3, 3]])

@@ -20,8 +20,8 @@ _KINDS = {"SCALAR": (1, {5121: "u1", 5123: "<u2", 5125: "<u4"}), "VEC3": (3, {51
 
 
 def tables_in(table: Table, key: str) -> list[Table]:
-    """Return the tables of a list, none where the key is missing."""
-    return table.tables(key) if key in table else []
+    """Return the tables of a list, none where the key is missing or the list empty."""
+    return table.tables(key) if key in table and not table.is_empty(key) else []
 
 
 def index_in(table: Table, key: str, count: int) -> int:
