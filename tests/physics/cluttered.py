@@ -1,5 +1,6 @@
 """Random cells full of bodies, and another library that says whether an arm meets them."""
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import coal
@@ -13,7 +14,7 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.quintic_polynomials import point_to_point
 from armwright.physics.cell_bodies import arm_bodies, pairs_apart
-from armwright.physics.clearance import Body, ClearanceChecker, PlacedArm
+from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, PlacedArm
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
@@ -51,7 +52,7 @@ def configurations(checker: ClearanceChecker, rng: np.random.Generator, count: i
 
 
 def is_free(checker: ClearanceChecker, q: Array) -> bool:
-    return bool((checker.distances_of({ARM: q}, 1.0) > 0).all())
+    return bool((checker.distances_of({ARM: q}, 1.0) > 2 * RESOLUTION).all())
 
 
 def solutions(checker: ClearanceChecker, q: Array, start: Array) -> Array:
@@ -60,7 +61,10 @@ def solutions(checker: ClearanceChecker, q: Array, start: Array) -> Array:
 
 
 def random_task(name: str, rng: np.random.Generator) -> Task:
-    """A cell in which the start is free, a solution of the goal too, and the motion to the nearest one collides."""
+    """A cell in which the start is free, the solutions of the goal are too, and the motion to the first one collides.
+
+    In half of the cells there is one solution only, so that no other is reached on a straight way.
+    """
     reach = load_arm(name).reach
     while True:
         standing = []
@@ -74,9 +78,11 @@ def random_task(name: str, rng: np.random.Generator) -> Task:
         checker = checker_of(name, standing)
         free = [q for q in configurations(checker, rng, 20) if is_free(checker, q)]
         for start, goal in zip(free[::2], free[1::2], strict=False):
-            goals = solutions(checker, goal, start)
-            if not len(goals) or not is_free(checker, goal):
+            goals = np.array([q for q in solutions(checker, goal, start)[:16] if is_free(checker, q)])
+            if not len(goals):
                 continue
+            if rng.random() < 0.5:
+                goals = goals[:1]
             direct = point_to_point(checker.arms[ARM].arm.arm, start, goals[0])
             if checker.first_contact({ARM: direct}) is not None:
                 return Task(checker, start, goals)
@@ -127,3 +133,51 @@ def of_coal(shape: Shape) -> Any:
             return coal.Sphere(radius)
         case Mesh():
             raise NotImplementedError
+
+
+def solved_by_ompl(task: Task, checks: int, seed: int) -> bool:
+    """Whether OMPL's RRT-Connect, as it comes, finds a path among configurations that coal checks, so many at most.
+
+    Legs are checked every 20 mrad or 20 mm.
+    """
+    from ompl import base, geometric, util
+
+    arm, oracle, checked = task.checker.arms[ARM].arm.arm, Coal(task.checker), 0
+    util.setLogLevel(util.LOG_NONE)
+    util.RNG.setSeed(seed + 1)
+    space, bounds = base.RealVectorStateSpace(arm.n), base.RealVectorBounds(arm.n)
+    for i in range(arm.n):
+        bounds.setLow(i, float(arm.limits.lower[i]))
+        bounds.setHigh(i, float(arm.limits.upper[i]))
+    space.setBounds(bounds)
+    information = base.SpaceInformation(space)
+
+    def valid(state: Any) -> bool:
+        nonlocal checked
+        checked += 1
+        return not oracle.collides(np.array([[state[i] for i in range(arm.n)]]))[0]
+
+    def state_of(q: Array) -> Any:
+        state = space.allocState()
+        for i, x in enumerate(q.tolist()):
+            state[i] = x
+        return state
+
+    information.setStateValidityChecker(valid)
+    information.setStateValidityCheckingResolution(0.02 / space.getMaximumExtent())
+    information.setup()
+    problem, goals = base.ProblemDefinition(information), base.GoalStates(information)
+    problem.addStartState(state_of(task.start))
+    for q in task.goals:
+        goals.addState(state_of(q))
+    problem.setGoal(goals)
+    planner = geometric.RRTConnect(information)
+    planner.setProblemDefinition(problem)
+    planner.setup()
+    planner.solve(base.PlannerTerminationCondition(lambda: checked >= checks))
+    if not problem.hasExactSolution():
+        return False
+    corners = np.array([[state[i] for i in range(arm.n)] for state in problem.getSolutionPath().getStates()])
+    # A path that touches a body between the positions that were checked solves nothing.
+    legs = [np.linspace(a, b, max(2, int(np.abs(b - a).max() / 5e-4))) for a, b in pairwise(corners)]
+    return not any(oracle.collides(np.concatenate(legs)))

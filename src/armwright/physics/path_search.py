@@ -19,7 +19,7 @@ from armwright.extras import import_extra
 from armwright.physics.joint_space import JointSpace
 
 # The longest leg that is tried at once [m].
-_RANGE = 1.0
+_RANGE = 0.3
 # So many of the goals are tried by a straight leg before.
 _STRAIGHT = 4
 # Positions are sought so far beyond those of start and goals [rad] or [m].
