@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from armwright.arm.collision_pairs import collision_pairs_in
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
@@ -96,6 +97,7 @@ def read_arm(path: Path | str) -> Arm:
         reach=number_in(hand, "reach", LENGTH, default=math.inf, positive=True),
         tool_speed=number_in(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
         base_solids=solids_in(top, "base_solids"),
+        collisions=collision_pairs_in(top.table("collisions"), [link.name for link in links]),
         base_link=top.text("base_link", default=""),
         tool_link=top.text("tool_link", default=""),
         source=top.text("source", default=""),

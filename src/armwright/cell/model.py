@@ -96,6 +96,7 @@ class Cell:
         deviation: allowed distance from straight lines [m].
         corner: how far a path past several frames may be from the straight legs between them [m]; 20 deviations by
             default, see ``corner_deviation``.
+        clearance: distance to other bodies below which a stage of a MOVE gets a warning [m]; 0 for none.
         period: of the servo [s].
         around: the kind of detour of an infeasible straight line, by ``via`` poses or ``damped`` least squares; None
             for no detour.
@@ -116,6 +117,7 @@ class Cell:
     vision_time: float = 0.1
     deviation: float = 1e-3
     corner: float | None = None
+    clearance: float = 0.0
     period: float = 1e-3
     around: Around | None = None
 

@@ -36,6 +36,8 @@ SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
 # Corner deviations: below a hundredth of a millimetre the arm would stop.
 CORNER_MM = (1e-2, 1e3)
+# Distances to other bodies that can be asked for: larger ones are not looked for.
+CLEARANCE_MM = (0.0, 50.0)
 # The kind of detour of a straight line, by its word in the file.
 DETOURS: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
 # What the camera finds after its last answer, by its word in the file.
@@ -84,6 +86,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
         corner=_optional_number(motion, "corner_mm", 1e-3, *CORNER_MM),
+        clearance=motion.number("clearance_mm", default=0.0, lower=CLEARANCE_MM[0], upper=CLEARANCE_MM[1]) * 1e-3,
         around=DETOURS[motion.choice("around", DETOURS, default="none")],
     )
     top.allow("devices")

@@ -155,6 +155,23 @@ class Table:
             raise self.error(key, f"expected a list of texts in quotes, got {_value_text(value)}")
         return value
 
+    def text_rows(self, key: str, length: int) -> list[list[str]]:
+        """Return a list of rows of that many strings each; an empty one when it is missing.
+
+        Raises:
+            FileFormatError: it is no such list, or longer than the limit of entries.
+        """
+        expected = f"a list of lists of {length} texts in quotes"
+        value = self._value(key, [], expected)
+        if not isinstance(value, list):
+            raise self.error(key, f"expected {expected}, got {_value_text(value)}")
+        if len(value) > limit("entries"):
+            raise self.error(key, f"too many: {limit_message('entries', len(value))}")
+        for i, row in enumerate(value):
+            if not isinstance(row, list) or len(row) != length or not all(isinstance(text, str) for text in row):
+                raise self.error(key, f"expected {length} texts in quotes, got {_value_text(row)}", i)
+        return value
+
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
         """Return a string that is one of ``choices``.
 

@@ -16,14 +16,13 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
-from armwright.compiled.arm import CompiledArm
+from armwright.arrays import Array, ArrayLike
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.distances import TOLERANCE, Distances
 from armwright.spatial.shapes import Solid, box_about, farthest
@@ -58,6 +57,17 @@ class Body(NamedTuple):
     link: int = 0
 
 
+class LinkPoses(Protocol):
+    """An arm, compiled or not."""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm."""
+
+    def link_poses(self, q: ArrayLike) -> Array:
+        """Return the poses (k, n + 2, 4, 4) of all frames in the base frame, for positions (k, n)."""
+
+
 class PlacedArm(NamedTuple):
     """An arm in a cell.
 
@@ -66,7 +76,7 @@ class PlacedArm(NamedTuple):
         base: (4, 4) pose of its base frame in the world.
     """
 
-    arm: CompiledArm
+    arm: LinkPoses
     base: Array
 
 

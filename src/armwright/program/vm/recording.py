@@ -17,6 +17,7 @@ from armwright.motion.efforts import without_rounding
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
+from armwright.physics.collisions import CheckedBodies, StageClearance
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Span
@@ -79,6 +80,7 @@ class RunStage:
             [N].
         peak_time: (n,) when, since it began [s].
         stopped: whether it was stopped on its path.
+        clearance: how near it was to come to other bodies; None where that is not looked at.
     """
 
     t0: float
@@ -92,6 +94,7 @@ class RunStage:
     peak_effort: Array
     peak_time: Array
     stopped: bool = False
+    clearance: StageClearance | None = None
 
     @property
     def duration(self) -> float:
@@ -190,6 +193,7 @@ class Recording:
         trees: the frame tree at the start and after each change, with the time of the change [s]; of very many
             changes the last in every two-thousandth of the run.
         configurations: by arm, the configuration (n,) at the end.
+        checked: what was looked at for collisions; None where nothing was, because the cell has nothing to run into.
         parts: where each part of the cell was believed to be, by name.
         failure: why it did not come to its end; None where it did.
     """
@@ -202,6 +206,7 @@ class Recording:
     streams: tuple[Stream, ...]
     trees: tuple[tuple[float, FrameTree], ...]
     configurations: Mapping[str, Array]
+    checked: CheckedBodies | None = None
     parts: Mapping[str, PartTrack] = attrs.field(factory=dict)
     failure: Failure | None = None
 
