@@ -13,7 +13,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.quintic_polynomials import point_to_point
-from armwright.physics.cell_bodies import arm_bodies, pairs_apart
+from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, PlacedArm
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
@@ -32,8 +32,10 @@ class Task(NamedTuple):
 
 def checker_of(name: str, standing: list[Body]) -> ClearanceChecker:
     arm = load_arm(name)
-    bodies = [*arm_bodies(ARM, arm), *standing]
-    return ClearanceChecker({ARM: PlacedArm(compile_arm(arm, quickly=True), np.eye(4))}, bodies, pairs_apart(bodies))
+    moving = arm_bodies(ARM, arm)
+    pairs = [(i, len(moving) + j) for i in range(len(moving)) for j in range(len(standing))]
+    placed = PlacedArm(compile_arm(arm, quickly=True), np.eye(4))
+    return ClearanceChecker({ARM: placed}, [*moving, *standing], pairs)
 
 
 def random_shape(rng: np.random.Generator) -> Shape:

@@ -1,7 +1,7 @@
 """Straight legs of the joints from configuration to configuration, with rounded corners, run without a stop.
 
-About each corner the rates of the joints go over from those of one leg to those of the next by 2 h² and, from the middle
-on, 1 - 2 (1 - h)², h from 0 to 1. So the path is made of cubics with a continuous second derivative, stays in the
+About each corner the rates of the joints go over from those of one leg to those of the next by 2 h² and, from the
+middle on, 1 - 2 (1 - h)², h from 0 to 1. So the path is made of cubics with a continuous second derivative, stays in the
 triangle of its corner, and is on the legs themselves between the corners. It misses the corner by a sixth of the
 half-width of the blend times the change of the rate.
 """
@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-
 
 from armwright.arrays import Array
 from armwright.motion.joint_path import natural_speeds
@@ -95,7 +94,7 @@ def rounded_run(arm: AnyArm, points: Array, rounding: Array, speed: float = 100.
     """
     solver, slower = solver_of(arm), TOP_SPEED / check_speed(speed)
     if len(points) == 2:
-        motion = point_to_point(solver.arm, *points, speed)
+        motion = point_to_point(solver.arm, points[0], points[1], speed)
         return RoundedRun(motion.slowed(slowing_for_limits(arm, motion)[0]), *np.zeros((3, 0)))
     lengths = (np.abs(np.diff(points, axis=0)) / natural_speeds(solver.arm, points)).max(axis=1)
     times = np.concatenate([[0.0], np.cumsum(lengths)])

@@ -234,9 +234,7 @@ class ClearanceChecker:
                 if not len(near.places):
                     continue
                 margins = window.margins[near.places]
-                # An allowed overlap is followed more closely.
-                fine = np.where(margins < 0, np.minimum(-_PART_OF_OVERLAP * margins, RESOLUTION), RESOLUTION)
-                met = np.flatnonzero(near.moved <= fine)
+                met = np.flatnonzero(near.moved <= resolution(margins))
                 if len(met) and not halves:
                     return self._closest(window, near, met[near.distances[met].argmin()])
                 # Something may be earlier than a contact: it is looked at again when that is decided.
@@ -318,12 +316,15 @@ class ClearanceChecker:
         for body, pose in enumerate(poses[0]):
             self._distances.place(body, pose)
         for k in np.flatnonzero(self._least_distances(poses)[0] < within).tolist():
-            result[k] = self._distances.between(*self._pairs[k].tolist(), within)
+            a, b = self._pairs[k].tolist()
+            result[k] = self._distances.between(a, b, within)
         return result
 
     def _poses_at(self, configurations: Mapping[str, Array]) -> Array:
         """Return the poses (k, b, 4, 4) of all bodies at configurations."""
-        frames = {name: self.arms[name].base @ self.arms[name].arm.link_poses(np.atleast_2d(q)) for name, q in configurations.items()}
+        frames = {}
+        for name, q in configurations.items():
+            frames[name] = self.arms[name].base @ self.arms[name].arm.link_poses(np.atleast_2d(q))
         poses = np.empty((max(map(len, frames.values())), len(self._bodies), 4, 4))
         for number, body in enumerate(self._bodies):
             carrier = np.eye(4) if body.arm is None else frames[body.arm][:, body.link]
@@ -331,7 +332,7 @@ class ClearanceChecker:
         return poses
 
     def _least_distances(self, poses: Array) -> Array:
-        """Return lower bounds (k, p) of the distances of all pairs: of a ball about one body to a box about the other."""
+        """Return lower bounds (k, p) of the distances of pairs: from a ball about one body to a box about the other."""
         bounds = np.full((len(poses), len(self._pairs)), -np.inf)
         positions, R = poses[:, :, :3, 3], poses[:, :, :3, :3]
         for ball, box in (self._pairs.T, self._pairs.T[::-1]):
@@ -404,6 +405,14 @@ class ClearanceChecker:
             if body.arm is None:
                 poses[:, number] = body.solid.pose
         return poses, moved
+
+
+def resolution(margins: Array) -> Array:
+    """Return by how much nearer than their margins pairs (k,) count as too near [m].
+
+    An allowed overlap is followed more closely.
+    """
+    return np.where(margins < 0, np.minimum(-_PART_OF_OVERLAP * margins, RESOLUTION), RESOLUTION)
 
 
 def _movement(arm: Arm, frames: Array, pose: Array, radius: float, changes: Array) -> Array:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.motion.trajectory import Trajectory
-from armwright.physics.clearance import ClearanceChecker, Meeting
+from armwright.physics.clearance import ClearanceChecker, Meeting, resolution
 from armwright.spatial.shapes import farthest
 
-# Bodies are kept this far apart on a path, or half of what they are apart at its ends where that is less [m].
+# Distances up to this are looked for [m].
 ROOM = 0.01
 # Levers are measured at so many configurations.
 _LOOKS = 64
@@ -19,6 +20,20 @@ _LOOKS = 64
 _LEAST_LEVER = 0.02
 # Configurations nearer than this are the same [rad] or [m].
 _SAME = 1e-9
+
+
+class Margins(NamedTuple):
+    """The distances that p pairs of bodies have to keep [m]; minus infinity where they do not count.
+
+    Attributes:
+        start: (p,) where a path begins.
+        between: (p,) on it.
+        end: (p,) where it ends.
+    """
+
+    start: Array
+    between: Array
+    end: Array
 
 
 class JointSpace:
@@ -32,39 +47,45 @@ class JointSpace:
         left: number that may still be checked.
     """
 
-    def __init__(self, checker: ClearanceChecker, arm: str, others: Mapping[str, Trajectory], margin: float) -> None:
+    def __init__(
+        self, checker: ClearanceChecker, arm: str, others: Mapping[str, Trajectory], margin: float | Margins
+    ) -> None:
         """Take an arm, and what all others do: they stand where that ends.
 
         Args:
             checker: the bodies of the cell.
             arm: name of the arm.
             others: motions of all other arms.
-            margin: of distance that bodies keep [m].
+            margin: of distance that bodies keep [m], all of them the same or each pair its own.
         """
         self.step, self.checked, self.left = 1.0, 0, 0
-        self._checker, self._name, self._margin = checker, arm, margin
+        self._checker, self._name = checker, arm
         self._standing = {name: motion(motion.duration) for name, motion in others.items()}
-        moved = [body.arm == arm and body.link > 0 for body in checker.bodies]
         # Pairs that the arm does not move do not count.
-        self._counting = np.array([moved[a] or moved[b] for a, b in checker.pairs], dtype=bool)
-        self._margins = self._least = np.where(self._counting, margin, -np.inf)
+        moved = [body.arm == arm and body.link > 0 for body in checker.bodies]
+        counting = np.array([moved[a] or moved[b] for a, b in checker.pairs], dtype=bool)
+        all_ = margin if isinstance(margin, Margins) else Margins(*[np.full(len(counting), margin)] * 3)
+        # What comes nearer than can be told counts as a contact on motions.
+        self._start, self._least, self._end = (np.where(counting, each + resolution(each), -np.inf) for each in all_)
+        self._margins = self._least
         self.arm = checker.arms[arm].arm.arm
         self._ends = np.zeros((0, self.arm.n))
         self.levers = _levers(checker, arm)
 
-    def overlaps(self, q: Array) -> list[Meeting]:
-        """Return the pairs of bodies that are nearer at a configuration (n,) than they may be, the nearest first."""
+    def overlaps(self, q: Array, *, start: bool) -> list[Meeting]:
+        """Return the pairs that are too near at the start or an end (n,) of a path, the nearest first."""
         self.checked += 1
-        distances = self._checker.distances_of(self._at(q), self._margin + ROOM)
-        pairs = np.flatnonzero(self._counting & (distances < self._margin))
+        margins = self._start if start else self._end
+        distances = self._checker.distances_of(self._at(q), max(float(margins.max(initial=0.0)), ROOM))
+        pairs = np.flatnonzero(distances < margins)
         meetings = [Meeting(0, self._checker.pairs[k], float(distances[k])) for k in pairs.tolist()]
         return sorted(meetings, key=lambda meeting: meeting.distance)
 
-    def set_ends(self, ends: Array) -> None:
-        """Keep bodies apart by ``ROOM``, or half of what they are apart at the ends of a path (k, n), which are free."""
-        within = self._margin + 2 * ROOM
+    def set_ends(self, ends: Array, room: float) -> None:
+        """Keep bodies apart by some room [m], or half of what they are apart at the ends (k, n) of a path."""
+        within = float(self._least.max(initial=0.0)) + 2 * room
         distances = np.min([self._checker.distances_of(self._at(q), within) for q in ends], axis=0)
-        self._margins = np.where(self._counting, np.maximum(self._margin, (distances + self._margin) / 2), -np.inf)
+        self._margins = np.where(np.isinf(self._least), -np.inf, np.maximum(self._least, (distances + self._least) / 2))
         self._ends = ends
 
     def is_free(self, q: Array) -> bool:

@@ -19,7 +19,7 @@ from armwright.extras import import_extra
 from armwright.physics.joint_space import JointSpace
 
 # The longest leg that is tried at once [m].
-_RANGE = 0.3
+_RANGE = 0.2
 # So many of the goals are tried by a straight leg before.
 _STRAIGHT = 4
 # Positions are sought so far beyond those of start and goals [rad] or [m].
@@ -74,7 +74,7 @@ def _rrt_connect(space: JointSpace, ends: Array, lower: Array, upper: Array, see
         return state
 
     class Legs(base.MotionValidator):  # type: ignore[misc, name-defined]
-        def checkMotion(self, a: Any, b: Any) -> bool:  # noqa: N802 - of OMPL
+        def checkMotion(self, a: Any, b: Any) -> bool:
             return space.leg_is_free(to_joints(a), to_joints(b))
 
     with _LOCK:

@@ -24,17 +24,19 @@ from armwright.arrays import Array, ArrayLike, integer, joint_array, read_only
 from armwright.compiled.arm import CompiledArm
 from armwright.errors import ArmwrightError, ShapeError, counted
 from armwright.motion.rounded_joint_path import rounded_run
+from armwright.motion.solver import AnyArm
 from armwright.motion.trajectory import Trajectory, whole_ticks
-from armwright.physics.clearance import ClearanceChecker, Closest, Meeting
-from armwright.physics.joint_space import JointSpace
+from armwright.physics.clearance import ClearanceChecker, Closest, Window
+from armwright.physics.joint_space import JointSpace, Margins
 from armwright.physics.path_search import free_path, shortened
 
 Cause: TypeAlias = Literal["start", "goal", "not found"]
 Certify: TypeAlias = Callable[[Trajectory], Closest | None]
 
-# Configurations on a straight leg are checked where the arm has moved by this at most [m]; by half of it, and a quarter,
-# where a path did not stand the test.
-_STEP, _FINER = 0.02, 3
+# How a path is sought, round by round until one stands the test. Bodies are kept so far apart, or half of what they
+# are apart at its ends where that is less [m]; configurations on a straight leg are checked where the arm has moved by
+# so much at most [m]; and what is left of the budget is used up to this part.
+_ROUNDS = ((0.01, 0.04, 0.5), (2e-3, 0.02, 0.5), (2e-3, 0.01, 0.5), (5e-4, 0.005, 1.0))
 # Of more solutions of the goal the nearest are planned to.
 _MOST_GOALS = 32
 # Shortening may check so many configurations more, by those of the search.
@@ -109,7 +111,7 @@ def plan_path(
     period: float = 1e-3,
     seed: int = 0,
     checks: int = 20_000,
-    margin: float = 0.0,
+    margin: float | Margins = 0.0,
 ) -> PlannedPath:
     """Return a joint path to one of several goals on which no bodies meet.
 
@@ -125,7 +127,8 @@ def plan_path(
         period: of the servo [s]; the trajectory takes a whole number of periods.
         seed: of the random numbers, 0 or more.
         checks: number of configurations that are checked at most; to shorten the path a quarter more.
-        margin: of distance that bodies keep [m].
+        margin: of distance that bodies keep [m], all of them the same or each pair its own. It counts for ``certify``
+            only where that is left out.
 
     Raises:
         PlanningError: there is none, with the cause.
@@ -135,27 +138,29 @@ def plan_path(
     """
     others, seed = others or {}, integer(seed, "seed", least=0)
     left = integer(checks, "checks", least=1)
-    compiled = checker.arms[arm].arm
-    start = joint_array(q_start, compiled.arm.n, "q_start")
+    placed = checker.arms[arm].arm
+    model = placed if isinstance(placed, CompiledArm) else placed.arm
+    start = joint_array(q_start, placed.arm.n, "q_start")
     ends = joint_array(goals, len(start), "goals")
     if ends.ndim != 2 or not len(ends):
         raise ShapeError(f"goals: expected one or more of {len(start)} joint positions, got shape {ends.shape}")
     space = JointSpace(checker, arm, others, margin)
     free = _free_goals(space, checker, start, ends)
     nearest = ends[free[:_MOST_GOALS]]
-    space.set_ends(np.concatenate([start[None], nearest]))
     if certify is None:
         certify = partial(_first_contact, checker, arm, others, margin)
     contact: Closest | None = None
-    for finer in range(_FINER):
-        space.step, space.left = _STEP / 2**finer, left
+    for room, step, part in _ROUNDS:
+        space.set_ends(np.concatenate([start[None], nearest]), room)
+        space.step, space.left = step, math.ceil(part * left)
+        left -= space.left
         points = free_path(space, start, nearest, seed)
-        left = space.left
+        left += space.left
         if points is None:
-            break
+            continue
         space.left = math.ceil(_SHORTENING * checks)
         points = shortened(space, points, seed)
-        motion, contact = _certified(compiled, points, certify, speed, period)
+        motion, contact = _certified(model, points, certify, speed, period)
         if contact is None:
             goal = free[int(np.abs(nearest - points[-1]).max(axis=1).argmin())]
             return PlannedPath(trajectory=motion, waypoints=points, goal=goal, checked=space.checked, seed=seed)
@@ -163,8 +168,7 @@ def plan_path(
     if contact is not None:
         a, b = _overlap(checker, contact.bodies, contact.distance).bodies
         text += f"; on the last one that seemed free {a} would still meet {b}"
-    one = len(free) == 1
-    text += f"; {len(free)} of {counted(len(ends), 'IK solution')} of the goal {'is' if one else 'are'} not in collision"
+    text += f"; not in collision at the goal: {len(free)} of {counted(len(ends), 'IK solution')}"
     raise PlanningError("not found", text, space.checked)
 
 
@@ -174,19 +178,19 @@ def _free_goals(space: JointSpace, checker: ClearanceChecker, start: Array, ends
     Raises:
         PlanningError: none is, or the start is not.
     """
-    here = [_overlap(checker, it.bodies, it.distance) for it in space.overlaps(start)]
+    here = [_overlap(checker, it.bodies, it.distance) for it in space.overlaps(start, start=True)]
     if here:
         text = f"the arm is in collision where it starts: {'; '.join(map(str, here))}"
         raise PlanningError("start", text, space.checked, here)
     # Solutions that differ by whole turns are in the same collisions.
     turns = np.where(space.arm.revolute, np.round(ends / (2 * np.pi)), 0.0)
     _, first, which = np.unique(np.round(ends - 2 * np.pi * turns, 6), axis=0, return_index=True, return_inverse=True)
-    overlaps = {number: space.overlaps(ends[number]) for number in sorted(first.tolist())}
+    overlaps = {number: space.overlaps(ends[number], start=False) for number in sorted(first.tolist())}
     free = [number for number, of in enumerate(first[which.ravel()].tolist()) if not overlaps[of]]
     if free:
         return free
     found = [_overlap(checker, all_[0].bodies, all_[0].distance, number) for number, all_ in overlaps.items()]
-    several = f"all {len(found)} IK solutions of the goal are" if len(found) > 1 else "the only IK solution of the goal is"
+    several = f"all {len(found)} IK solutions of the goal are" if len(found) > 1 else "the IK solution of the goal is"
     text = f"{several} in collision: {'; '.join(map(str, found))}"
     raise PlanningError("goal", text, space.checked, found)
 
@@ -197,13 +201,18 @@ def _overlap(checker: ClearanceChecker, bodies: tuple[int, int], distance: float
 
 
 def _first_contact(
-    checker: ClearanceChecker, arm: str, others: Mapping[str, Trajectory], margin: float, motion: Trajectory
+    checker: ClearanceChecker, arm: str, others: Mapping[str, Trajectory], margin: float | Margins, motion: Trajectory
 ) -> Closest | None:
-    return checker.first_contact({**others, arm: motion}, margin)
+    motions = {**others, arm: motion}
+    if not isinstance(margin, Margins):
+        return checker.first_contact(motions, margin)
+    counting = np.flatnonzero(margin.between > -np.inf)
+    windows = [Window(0.0, max(each.duration for each in motions.values()), counting, margin.between[counting])]
+    return checker.first_contact(motions, windows=windows)
 
 
 def _certified(
-    arm: CompiledArm, points: Array, certify: Certify, speed: float, period: float
+    arm: AnyArm, points: Array, certify: Certify, speed: float, period: float
 ) -> tuple[Trajectory, Closest | None]:
     """Return the run through configurations (k, n), its corners rounded as widely as can be, and a contact on it.
 
