@@ -1,8 +1,8 @@
 """Straight legs of the joints from configuration to configuration, with rounded corners, run without a stop.
 
 About each corner the rates of the joints go over from those of one leg to those of the next by 2 h² and, from the
-middle on, 1 - 2 (1 - h)², h from 0 to 1. So the path is made of cubics with a continuous second derivative, stays in the
-triangle of its corner, and is on the legs themselves between the corners. It misses the corner by a sixth of the
+middle on, 1 - 2 (1 - h)², h from 0 to 1. So the path is made of cubics with a continuous second derivative, stays in
+the triangle of its corner, and is on the legs themselves between the corners. It misses the corner by a sixth of the
 half-width of the blend times the change of the rate.
 """
 

@@ -131,4 +131,4 @@ def _levers(checker: ClearanceChecker, arm: str) -> Array:
                 across = np.linalg.norm(np.cross(axis, away), axis=1).max()
                 levers[i] = max(levers[i], across + farthest(body.solid.shape))
     levers[~compiled.arm.revolute] = 1.0
-    return np.maximum(levers, _LEAST_LEVER * levers.max())
+    return np.asarray(np.maximum(levers, _LEAST_LEVER * levers.max()))

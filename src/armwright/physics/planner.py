@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import attrs
 import numpy as np
@@ -62,6 +62,10 @@ class PlannedPath:
     goal: int
     checked: int
     seed: int
+
+    def as_data(self) -> dict[str, Any]:
+        """Return how it was planned, as plain data in SI units."""
+        return {"waypoints": self.waypoints.tolist(), "checked": self.checked, "seed": self.seed}
 
 
 class Overlap(NamedTuple):
