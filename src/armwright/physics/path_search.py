@@ -18,8 +18,6 @@ from armwright.arrays import Array
 from armwright.extras import import_extra
 from armwright.physics.joint_space import JointSpace
 
-# The longest leg that is tried at once [m].
-_RANGE = 0.2
 # So many of the goals are tried by a straight leg before.
 _STRAIGHT = 4
 # Positions are sought so far beyond those of start and goals [rad] or [m].
@@ -30,13 +28,14 @@ _SHORTCUTS = 200
 _LOCK = Lock()
 
 
-def free_path(space: JointSpace, start: Array, goals: Array, seed: int) -> Array | None:
+def free_path(space: JointSpace, start: Array, goals: Array, longest: float, seed: int) -> Array | None:
     """Return the corners (k, n) of a free path, with both ends; None where no more may be checked.
 
     Args:
         space: the configurations.
         start: (n,) joint positions, free.
         goals: (g, n) joint positions, free, of which one is to be reached.
+        longest: leg that is tried at once [m].
         seed: of the random numbers, 0 or more.
 
     Raises:
@@ -49,7 +48,7 @@ def free_path(space: JointSpace, start: Array, goals: Array, seed: int) -> Array
     lowest, highest = ends.min(axis=0), ends.max(axis=0)
     lower = np.minimum(lowest, np.maximum(space.arm.limits.lower, lowest - _BEYOND))
     upper = np.maximum(highest, np.minimum(space.arm.limits.upper, highest + _BEYOND))
-    corners = _rrt_connect(space, ends, lower, upper, seed)
+    corners = _rrt_connect(space, ends, (lower, upper), longest, seed)
     if corners is None:
         return None
     # The ends are what they were, to the last bit.
@@ -57,12 +56,15 @@ def free_path(space: JointSpace, start: Array, goals: Array, seed: int) -> Array
     return np.concatenate([start[None], corners[1:-1], goal[None]])
 
 
-def _rrt_connect(space: JointSpace, ends: Array, lower: Array, upper: Array, seed: int) -> Array | None:
+def _rrt_connect(
+    space: JointSpace, ends: Array, limits: tuple[Array, Array], longest: float, seed: int
+) -> Array | None:
     """Return the corners of a path from the first of several ends (k, n) to another, inside bounds (n,)."""
     base, geometric, util = (
         import_extra(f"ompl.{part}", "planning a path", "planning") for part in ("base", "geometric", "util")
     )
-    n, levers = len(lower), space.levers
+    (lower, upper), levers = limits, space.levers
+    n = len(lower)
 
     def to_joints(state: Any) -> Array:
         return np.clip(np.array([state[i] for i in range(n)]) / levers, lower, upper)
@@ -99,7 +101,7 @@ def _rrt_connect(space: JointSpace, ends: Array, lower: Array, upper: Array, see
                 goals.addState(to_state(q))
             problem.setGoal(goals)
             planner = geometric.RRTConnect(information)
-            planner.setRange(_RANGE)
+            planner.setRange(longest)
             planner.setProblemDefinition(problem)
             planner.setup()
             planner.solve(base.PlannerTerminationCondition(lambda: space.left <= 0))

@@ -33,10 +33,11 @@ from armwright.physics.path_search import free_path, shortened
 Cause: TypeAlias = Literal["start", "goal", "not found"]
 Certify: TypeAlias = Callable[[Trajectory], Closest | None]
 
-# How a path is sought, round by round until one stands the test. Bodies are kept so far apart, or half of what they
-# are apart at its ends where that is less [m]; configurations on a straight leg are checked where the arm has moved by
-# so much at most [m]; and what is left of the budget is used up to this part.
-_ROUNDS = ((0.01, 0.04, 0.5), (2e-3, 0.02, 0.5), (2e-3, 0.01, 0.5), (5e-4, 0.005, 1.0))
+# How a path is sought, round by round until one stands the test: how far bodies are kept apart, or half of what they
+# are apart at its ends where that is less [m]; by how much the arm moves at most from one checked configuration of a
+# straight leg to the next [m], and on a leg of the search [m]; and which part of what is left of the budget is spent.
+# Short legs find their way out of tight places, long ones through gaps.
+_ROUNDS = ((0.01, 0.04, 0.3, 0.15), (1e-3, 0.05, 1.0, 0.65), (5e-4, 0.04, 0.3, 0.75), (5e-4, 0.01, 0.3, 1.0))
 # Of more solutions of the goal the nearest are planned to.
 _MOST_GOALS = 32
 # Shortening may check so many configurations more, by those of the search.
@@ -154,11 +155,11 @@ def plan_path(
     if certify is None:
         certify = partial(_first_contact, checker, arm, others, margin)
     contact: Closest | None = None
-    for room, step, part in _ROUNDS:
+    for room, step, longest, part in _ROUNDS:
         space.set_ends(np.concatenate([start[None], nearest]), room)
         space.step, space.left = step, math.ceil(part * left)
         left -= space.left
-        points = free_path(space, start, nearest, seed)
+        points = free_path(space, start, nearest, longest, seed)
         left += space.left
         if points is None:
             continue
