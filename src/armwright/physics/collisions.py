@@ -19,7 +19,9 @@ from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics.cell_bodies import has_solids
 from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, Closest, PlacedArm, Window
+from armwright.physics.joint_space import Margins
 from armwright.physics.placed_bodies import CellBodies, Role
+from armwright.physics.planner import PlannedPath, plan_path
 from armwright.physics.wanted_contacts import PlannedMove, Surroundings, WantedContacts
 
 # Larger distances are not looked for [m].
@@ -181,6 +183,73 @@ class CellCollisions:
             beside: by arm, the parts that its fingers may touch.
             clearances: whether they are asked for.
         """
+        wanted = self._wanted(move, others, parts, beside)
+        contact = wanted.first_contact()
+        if contact is not None:
+            return MoveCheck(collision=self._collision(wanted, contact))
+        stages = range(len(move.stages)) if clearances else ()
+        found = (_clearance(wanted, stage) for stage in stages)
+        return MoveCheck(collision=None, clearances=tuple(found))
+
+    def path_past(
+        self,
+        move: PlannedMove,
+        others: Mapping[str, Trajectory],
+        parts: PartPoses,
+        beside: Mapping[str, frozenset[str]],
+        *,
+        stage: int,
+        goals: ArrayLike,
+        speed: float,
+    ) -> PlannedPath:
+        """Return a path instead of a stage of a MOVE that would run into something.
+
+        Args:
+            move: the MOVE.
+            others: as for ``check``.
+            parts: as for ``check``.
+            beside: as for ``check``.
+            stage: which of its stages, from 0; it goes from one configuration to another.
+            goals: (k, n) joint positions that it may end at.
+            speed: 1 to 120.
+
+        Raises:
+            PlanningError: there is none, with the cause.
+            IncapableArmError: gravity alone takes more than a joint may give on the path.
+            MissingExtraError: OMPL is not installed.
+        """
+        wanted = self._wanted(move, others, parts, beside)
+        begin = wanted.starts[stage]
+        old = move.stages[stage]
+
+        def certify(trajectory: Trajectory) -> Closest | None:
+            stages = (*move.stages[:stage], trajectory, *move.stages[stage + 1 :])
+            tried = self._wanted(attrs.evolve(move, stages=stages), others, parts, beside)
+            contact = tried.first_contact()
+            # What comes before and after is looked at by ``check``.
+            if contact is None or not begin <= contact.time <= begin + trajectory.duration:
+                return None
+            return contact._replace(time=contact.time - begin)
+
+        return plan_path(
+            wanted.surroundings.checker,
+            move.arm,
+            old(0.0),
+            goals,
+            others=others,
+            certify=certify,
+            speed=speed,
+            period=self._cell.period,
+            margin=Margins(*(wanted.margins_at(begin + part * old.duration) for part in (0.0, 0.5, 1.0))),
+        )
+
+    def _wanted(
+        self,
+        move: PlannedMove,
+        others: Mapping[str, Trajectory],
+        parts: PartPoses,
+        beside: Mapping[str, frozenset[str]],
+    ) -> WantedContacts:
         bodies = self._bodies.arranged(parts)
         pairs = [
             (i, j)
@@ -191,13 +260,7 @@ class CellCollisions:
         motions = {**others, move.arm: move.trajectory}
         known = list(zip(bodies, self._bodies.roles, strict=True))
         around = Surroundings(checker, motions, known, pairs, beside)
-        wanted = WantedContacts(move, around, self._cell.arms[move.arm].arm)
-        contact = checker.first_contact(motions, windows=wanted.windows)
-        if contact is not None:
-            return MoveCheck(collision=self._collision(wanted, contact))
-        stages = range(len(move.stages)) if clearances else ()
-        found = (_clearance(wanted, stage) for stage in stages)
-        return MoveCheck(collision=None, clearances=tuple(found))
+        return WantedContacts(move, around, self._cell.arms[move.arm].arm)
 
     def _collision(self, wanted: WantedContacts, contact: Closest) -> Collision:
         move, (checker, motions, bodies, pairs, _) = wanted.move, wanted.surroundings

@@ -187,6 +187,7 @@ def _stage_data(run: RunStage, recording: Recording) -> dict[str, Any]:
         "slowed": run.stage.slowed,
         "detour": _detour_data(run.stage),
         "clearance": clearance_data(run.clearance),
+        "planned_path": None if run.path is None else run.path.as_data(),
         "peak_speed": _rounded_list(motion.peaks(1)),
         "peak_acceleration": _rounded_list(motion.peaks(2)),
         "peak_effort": _rounded_list(run.peak_effort),
