@@ -144,6 +144,17 @@ class Table:
             raise self.error(key, f"expected a text in quotes, got {_value_text(value)}")
         return str(value)
 
+    def flag(self, key: str) -> bool:
+        """Return a truth value; false when it is missing.
+
+        Raises:
+            FileFormatError: it is something else.
+        """
+        value = self._value(key, False, "true or false")
+        if not isinstance(value, bool):
+            raise self.error(key, f"expected true or false, got {_value_text(value)}")
+        return value
+
     def texts(self, key: str) -> list[str]:
         """Return a list of strings.
 
