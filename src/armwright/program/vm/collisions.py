@@ -193,6 +193,6 @@ def _error(machine: Machine, process: Process, collision: Collision, arm: str, g
         span,
         "cannot be reached on this path",
         secondary=machine.origin_labels(frame, f"`{goal}` got its pose here") if frame else [],
-        notes=collision_location(collision, arm),
+        notes=collision_location(collision),
         helps=collision_advice(collision, arm),
     )
