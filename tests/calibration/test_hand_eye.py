@@ -21,8 +21,8 @@ from armwright.errors import ContradictionError, InvalidValueError, ShapeError, 
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import homogeneous, inverse
 from calibration.boards import CHARUCO, Scene, board_views, lens_numbers, photographed, projected, random_scene
-from samples import Sample
 from calibration.simulated import random_arm, random_pose
+from samples import Sample
 
 cv2 = pytest.importorskip("cv2")
 

@@ -20,7 +20,7 @@ from armwright.physics.pictures import add_camera, add_lights
 from armwright.physics.plant import add_arm, finish, new_world
 from armwright.physics.vision import marker_name
 from armwright.spatial.poses import inverse
-from armwright.spatial.shapes import Solid, centroid, farthest, inertia
+from armwright.spatial.shapes import Solid, centroid, convex_solids, farthest, inertia
 
 # No step of the world is longer [s].
 _MAX_STEP = 1e-3
@@ -38,6 +38,8 @@ _SOFT = 0.02
 _BELOW, _FLOOR = 0.5, 20.0
 # The plate under a plane that yields: light, so that it adds nothing to what presses on it [kg], and damped.
 _PLATE_MASS, _PLATE_DAMPING, _PLATE = 0.3, 30.0, np.array([5.0, 5.0, 0.02])
+# Between the name of a body and the number of a piece of it.
+PIECE = "#"
 FLOOR, PLATE = "the floor", "the plane"
 # Colours: red, green, blue and opacity.
 _ARM, _GRIPPER, _FURNITURE = (0.78, 0.8, 0.83, 1.0), (0.25, 0.27, 0.3, 1.0), (0.62, 0.56, 0.48, 1.0)
@@ -94,12 +96,18 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     for number, part in enumerate(parts.values()):
         _add_part(spec, part, _PARTS[number % len(_PARTS)])
     for name, cell_arm in cell.arms.items():
-        for part in parts:
-            grip(spec, name, cell_arm.gripper or Gripper(), part)
+        for label in (label for part in parts.values() for label, _ in _pieces(part.name, Solid(shape=part.shape))):
+            grip(spec, name, cell_arm.gripper or Gripper(), label)
     plate = _add_plate(spec, cell)
     _add_cameras(spec, cell, {plant.name: plant.tool for plant in plants})
     model = finish(spec, tuple(plants))
     return WorldModel(cell=cell, model=model, substeps=substeps, parts=parts, plate=plate)
+
+
+def _pieces(name: str, solid: Solid) -> list[tuple[str, Solid]]:
+    """Return the convex pieces of a solid, by names that begin with its own."""
+    pieces = convex_solids([solid])
+    return [(f"{name}{PIECE}{number}" if number else name, piece) for number, piece in enumerate(pieces)]
 
 
 def _surface(friction: float) -> dict[str, Any]:
@@ -115,7 +123,8 @@ def _add_standing(spec: Any, cell: Cell) -> None:
     for name, fixture in cell.fixtures.items():
         solid = Solid(shape=fixture.shape, pose=fixture.pose)
         bits = {"contype": _STANDING, "conaffinity": _ALL}
-        add_geom(spec, spec.worldbody, name, solid, rgba=_FURNITURE, **bits, **_furniture(fixture.friction))
+        for label, piece in _pieces(name, solid):
+            add_geom(spec, spec.worldbody, label, piece, rgba=_FURNITURE, **bits, **_furniture(fixture.friction))
 
 
 def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
@@ -160,7 +169,8 @@ def _add_part(spec: Any, part: Part, colour: tuple[float, ...]) -> None:
     body.explicitinertial, body.mass, body.inertia = True, part.mass, part.mass * moments
     body.ipos, body.iquat = centroid(part.shape), quaternion(axes)
     bits = {"contype": _PART, "conaffinity": _ALL}
-    add_geom(spec, body, part.name, Solid(shape=part.shape), mass=0.0, rgba=colour, **bits, **_surface(part.friction))
+    for label, piece in _pieces(part.name, Solid(shape=part.shape)):
+        add_geom(spec, body, label, piece, mass=0.0, rgba=colour, **bits, **_surface(part.friction))
 
 
 def _add_plate(spec: Any, cell: Cell) -> bool:

@@ -203,6 +203,21 @@ def farthest(shape: Shape) -> float:
             return float(np.linalg.norm(vertices, axis=1).max())
 
 
+def box_about(shape: Shape) -> tuple[Array, float]:
+    """Return a box (3,) about the origin, as half its lengths, and a radius: all of a solid is that near to it [m]."""
+    match shape:
+        case Box(size=size):
+            return size / 2, 0.0
+        case Cylinder(radius=radius, length=length):
+            return np.array((radius, radius, length / 2)), 0.0
+        case Capsule(radius=radius, length=length):
+            return np.array((0.0, 0.0, length / 2)), radius
+        case Sphere(radius=radius):
+            return np.zeros(3), radius
+        case Mesh(vertices=vertices):
+            return np.abs(vertices).max(axis=0), 0.0
+
+
 def support(shape: Shape, direction: Array) -> float:
     """Return how far a solid reaches from its origin in a direction (3,) of length 1 [m]."""
     match shape:
