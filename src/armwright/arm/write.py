@@ -130,7 +130,8 @@ def _solid(solid: Solid) -> str:
         values["xyz_m"] = X[:3, 3].tolist()
     if not np.array_equal(X[:3, :3], np.eye(3)):
         values["rotation"] = X[:3, :3].tolist()
-    return ", ".join([f'kind = "{kind}"', *(f"{name} = {value!r}" for name, value in values.items())])
+    guess = ["guess = true"] if solid.guessed else []
+    return ", ".join([f'kind = "{kind}"', *(f"{name} = {value!r}" for name, value in values.items()), *guess])
 
 
 def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:

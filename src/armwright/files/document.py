@@ -144,6 +144,17 @@ class Table:
             raise self.error(key, f"expected a text in quotes, got {_value_text(value)}")
         return str(value)
 
+    def flag(self, key: str) -> bool:
+        """Return a truth value; false when it is missing.
+
+        Raises:
+            FileFormatError: it is something else.
+        """
+        value = self._value(key, False, "true or false")
+        if not isinstance(value, bool):
+            raise self.error(key, f"expected true or false, got {_value_text(value)}")
+        return value
+
     def texts(self, key: str) -> list[str]:
         """Return a list of strings.
 
@@ -170,17 +181,6 @@ class Table:
         for i, row in enumerate(value):
             if not isinstance(row, list) or len(row) != length or not all(isinstance(text, str) for text in row):
                 raise self.error(key, f"expected {length} texts in quotes, got {_value_text(row)}", i)
-        return value
-
-    def flag(self, key: str, default: Any = _MISSING) -> bool:
-        """Return a truth value.
-
-        Raises:
-            FileFormatError: it is missing without a default, or something else.
-        """
-        value = self._value(key, default, "true or false")
-        if not isinstance(value, bool):
-            raise self.error(key, f"expected true or false, got {_value_text(value)}")
         return value
 
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:

@@ -17,9 +17,10 @@ from armwright.cell.part_poses import PartPoses
 from armwright.compiled.arm import planning_arm
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.trajectory import Trajectory, hold
-from armwright.physics.cell_bodies import CellBodies, Role, has_solids, pairs_of
+from armwright.physics.cell_bodies import has_solids
 from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, Closest, PlacedArm, Window
 from armwright.physics.joint_space import Margins
+from armwright.physics.placed_bodies import CellBodies, Role
 from armwright.physics.planner import PlannedPath, plan_path
 from armwright.physics.wanted_contacts import PlannedMove, Surroundings, WantedContacts
 
@@ -101,7 +102,7 @@ class CheckedBodies:
     Attributes:
         pairs: how many pairs of bodies may not meet, at the start.
         guessed: by arm of which no solids are known, the radii of the guessed ones, the largest and the smallest [m].
-        left_out: pairs of names that do not count, because they meet at the start where one of them is guessed.
+        left_out: pairs of names that do not count, because they meet at the start though one of them is a guess.
     """
 
     pairs: int
@@ -132,21 +133,26 @@ class CellCollisions:
         }
         at_start = PartPoses(cell)
         bodies = self._bodies.arranged(at_start)
-        pairs = pairs_of(bodies)
+        pairs = self._bodies.pairs(bodies)
         self._checker = ClearanceChecker(self._arms, bodies, pairs)
         self._left_out = self._too_fat(bodies, pairs)
         self._count = len(pairs) - len(self._left_out)
 
     def _too_fat(self, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> frozenset[tuple[int, int]]:
-        """Return the pairs that meet where the cell starts, of which one is a guess or both are of one arm."""
+        """Return the pairs that meet where the cell starts, though one of them is only a guess."""
         motions = {name: hold(arm.start, 0.0) for name, arm in self._cell.arms.items()}
         distances = self._checker.distances_at(motions, np.zeros(1), np.arange(len(pairs)), RESOLUTION)[0]
-        roles = self._bodies.roles
         return frozenset(
             pair
             for pair, distance in zip(pairs, distances.tolist(), strict=True)
-            if distance <= 0 and (any(roles[i].guessed for i in pair) or (bodies[pair[0]].arm == bodies[pair[1]].arm))
+            if distance <= 0 and self._may_be_too_fat(bodies, pair)
         )
+
+    def _may_be_too_fat(self, bodies: Sequence[Body], pair: tuple[int, int]) -> bool:
+        """Whether a link of a pair is a guess, or the gripper before a link of its own arm."""
+        roles = [self._bodies.roles[i] for i in pair]
+        of_one = bodies[pair[0]].arm == bodies[pair[1]].arm
+        return any(role.guessed or (of_one and role.in_gripper) for role in roles)
 
     @cached_property
     def checked(self) -> CheckedBodies:
@@ -247,7 +253,7 @@ class CellCollisions:
         bodies = self._bodies.arranged(parts)
         pairs = [
             (i, j)
-            for i, j in pairs_of(bodies)
+            for i, j in self._bodies.pairs(bodies)
             if move.arm in (bodies[i].arm, bodies[j].arm) and (i, j) not in self._left_out
         ]
         checker = self._checker.rearranged(bodies, pairs)

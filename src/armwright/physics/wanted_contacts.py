@@ -21,8 +21,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, join
-from armwright.physics.cell_bodies import Role
 from armwright.physics.clearance import Body, ClearanceChecker, Closest, Numbers, Window
+from armwright.physics.placed_bodies import Role
 
 # How deep a held part may touch what it stands on, and on which length of the path [m].
 REST_DEPTH, REST_LENGTH = 0.5e-3, 0.01

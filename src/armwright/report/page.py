@@ -12,11 +12,9 @@ import attrs
 
 from armwright.arm.model import JointKind
 from armwright.arrays import Array
+from armwright.report.collision_text import NOT_CHECKED
 from armwright.report.elements import badge, facts
 from armwright.report.markup import asset, page_html
-
-# The text on collisions wherever a motion is reported, until they are checked.
-COLLISIONS = "not checked"
 
 _SCRIPTS = ("scene.js", "camera.js", "solids.js", "view.js", "charts.js", "joint_charts.js", "lists.js", "run.js")
 
@@ -229,6 +227,7 @@ class RunPage:
         arms: records of the arms.
         animation: the data of the view; None without a view.
         text_kind: kind of the text, ``Program`` or ``Poses``.
+        collisions: whether they were checked, and how near the arms came to other bodies.
     """
 
     title: str
@@ -245,6 +244,7 @@ class RunPage:
     arms: Sequence[ArmRecord] = ()
     animation: Animation | None = None
     text_kind: Literal["Program", "Poses"] = "Program"
+    collisions: str = NOT_CHECKED
 
 
 def run_page(data: RunPage) -> str:
@@ -275,5 +275,5 @@ def _facts(data: RunPage) -> Iterator[tuple[str, str]]:
     if data.cell_name:
         yield "Cell", data.cell_name
     yield data.text_kind, data.program_name
-    yield "Collisions", COLLISIONS
+    yield "Collisions", data.collisions
     yield "Command", data.command

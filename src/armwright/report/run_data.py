@@ -15,6 +15,7 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt, omission_text, shorten_line
 from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
+from armwright.report.collision_text import collision_text
 from armwright.report.page import Animation, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
 from armwright.report.stick_figure import arm_record, stick_figure
 from armwright.spatial.poses import to_noap
@@ -70,6 +71,7 @@ def run_page_data(
             for s in recording.streams
         ],
         animation=animation,
+        collisions=collision_text(recording),
     )
 
 

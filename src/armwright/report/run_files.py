@@ -20,7 +20,8 @@ from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Effect, Recording, RunStage, motion_csv_lines
-from armwright.report.page import COLLISIONS, run_page
+from armwright.report.collision_text import clearance_data, collision_text
+from armwright.report.page import run_page
 from armwright.report.run_data import run_page_data
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
@@ -141,7 +142,7 @@ def summary_data(recording: Recording, diagnostics: Sequence[Diagnostic], hint: 
             {"line": source.line(e.span.start), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
             for e in _contacts(recording).join()
         ],
-        "collisions": COLLISIONS,
+        "collisions": collision_text(recording),
         "stages": [_stage_data(stage, recording) for stage in recording.stages],
         "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics],
     }
@@ -171,6 +172,7 @@ def _stage_data(run: RunStage, recording: Recording) -> dict[str, Any]:
         "slowed": run.stage.slowed,
         "detour": _detour_data(run.stage),
         "planned_path": None if run.path is None else run.path.as_data(),
+        "clearance": clearance_data(run.clearance),
         "peak_speed": _rounded_list(motion.peaks(1)),
         "peak_acceleration": _rounded_list(motion.peaks(2)),
         "peak_effort": _rounded_list(run.peak_effort),

@@ -14,6 +14,7 @@ from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, Excerpt, excerpt, o
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.move_diagnostics import path_text
 from armwright.program.vm.recording import Effect, Recording, RunStage
+from armwright.report.collision_text import collision_text
 from armwright.report.run_files import ending_data, summary_data
 
 
@@ -55,11 +56,10 @@ class RunSummary:
             f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, "
             f"{counted(moves, 'move')}, {counted(len(recording.stages), 'stage')}, {counted(ticks, 'servo tick')}"
         )
-        return (
-            *shorten_list([*slowed, *planned], MAX_TERMINAL_LINES, self.hint),
-            numbers,
-            "Collisions are not checked.",
+        collisions = (
+            "Collisions are not checked." if recording.checked is None else f"Collisions: {collision_text(recording)}."
         )
+        return (*shorten_list([*slowed, *planned], MAX_TERMINAL_LINES, self.hint), numbers, collisions)
 
     def as_data(self) -> dict[str, Any]:
         """Return the summary as plain data in SI units."""

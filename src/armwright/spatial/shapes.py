@@ -140,10 +140,12 @@ class Solid:
     Attributes:
         shape: its form.
         pose: (4, 4) of the shape in the frame.
+        guessed: whether the shape is a guess, made where no drawing is at hand.
     """
 
     shape: Shape
     pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+    guessed: bool = False
 
     __reduce__ = reduce_by_fields
 

@@ -20,6 +20,7 @@ from armwright.arrays import Array, number
 from armwright.errors import KindError, shown
 from armwright.files.inputs import file_path
 from armwright.spatial.poses import inverse
+from armwright.spatial.shapes import Solid
 
 # Axes that are this near to parallel were meant to be [rad]: a half turn typed as 3.1416 is 0.7e-5 rad off.
 _MEANT_PARALLEL = 1e-4
@@ -100,6 +101,7 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
         tool=cleared_pose(inverse(frames.poses[-1]) @ chain.X_BT, size),
         gravity=felt_gravity(chain.X_RB, UPRIGHT_GRAVITY),
         gravity_from="root",
+        base_solids=chain.base_solids,
         base_link=chain.base,
         tool_link=chain.tip,
         source=f"{path.name}, link '{chain.base}' to link '{chain.tip}'",
@@ -113,16 +115,21 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
 def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:
     """Weld bodies that are given in the frame of the base, and see them from the frame of a link."""
     unknown = [body for body in bodies if body.unknown]
+    X_LB = inverse(X_BL)
+    solids = [_cleared(solid.moved(X_LB), size) for body in bodies for solid in body.solids]
     if unknown:
-        return unknown[0]
+        return attrs.evolve(unknown[0], solids=solids)
     whole = _welded([body for body in bodies if body.mass or body.inertia.any()])
-    solids = [solid for body in bodies for solid in body.solids]
-    seen = carry(attrs.evolve(whole, solids=solids), inverse(X_BL))
+    seen = carry(whole, X_LB)
     # What has no mass has no centre of mass either; it is put at the origin.
     com = cleared(seen.com, size) if seen.mass else np.zeros(3)
     inertia = cleared(seen.inertia, float(np.abs(seen.inertia).max()))
     known = impossible_moments(seen.mass, com, inertia) is None
-    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known, solids=seen.solids)
+    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known, solids=solids)
+
+
+def _cleared(solid: Solid, size: float) -> Solid:
+    return attrs.evolve(solid, pose=cleared_pose(solid.pose, size))
 
 
 def _welded(bodies: Sequence[Link]) -> Link:
