@@ -21,8 +21,8 @@ from armwright.errors import ContradictionError, InvalidValueError, ShapeError, 
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import homogeneous, inverse
 from calibration.boards import CHARUCO, Scene, board_views, lens_numbers, photographed, projected, random_scene
-from samples import Sample
 from calibration.simulated import random_arm, random_pose
+from samples import Sample
 
 cv2 = pytest.importorskip("cv2")
 
@@ -248,11 +248,11 @@ def test_the_wrong_setup_is_refused(rng: np.random.Generator, *, eye_in_hand: bo
     scene = random_scene(rng, ARM, 10, eye_in_hand=eye_in_hand, accuracy=ArmAccuracy())
     views = projected(rng, scene, PIXEL_NOISE)
 
-    with pytest.raises(ContradictionError, match="the camera is on the hand,? or beside the arm|behind the camera"):
+    with pytest.raises(ContradictionError, match=r"the camera is on the hand,? or beside the arm|behind the camera"):
         calibrate_hand_eye(views, scene.readings, lens=scene.lens, eye_in_hand=not eye_in_hand)
 
 
-def one_axis_scene(rng: np.random.Generator, scene: Scene, joint: int, spread: float) -> Scene:
+def one_axis_scene(scene: Scene, joint: int, spread: float) -> Scene:
     """Return a scene in which one joint alone moves."""
     q = np.repeat(scene.readings.q[:1], 6, axis=0)
     q[:, joint] += np.linspace(0, spread, 6)
@@ -261,10 +261,10 @@ def one_axis_scene(rng: np.random.Generator, scene: Scene, joint: int, spread: f
 
 @SETUPS
 def test_parallel_rotations_are_refused_with_their_direction(rng: np.random.Generator, *, eye_in_hand: bool) -> None:
-    """Where one joint alone turns, the position of the camera along its axis is open, and the message names the axis."""
+    """Where one joint alone turns, the position of the camera along its axis is open; the message names the axis."""
     scene = random_scene(rng, ARM, 6, eye_in_hand=eye_in_hand, accuracy=ArmAccuracy())
     joint = 5 if eye_in_hand else 0
-    moved = one_axis_scene(rng, scene, joint, np.radians(40))
+    moved = one_axis_scene(scene, joint, np.radians(40))
     X = np.repeat(scene.seen[:1], 6, axis=0)
     # The last axis of the arm is z of the tool, and the first one z of the base.
     with pytest.raises(

@@ -93,8 +93,8 @@ def hand_eye_start(E: Array, C: Array) -> tuple[Array, Array, Array]:
         guesses.append((float(np.median(_discrepancies(boards, Z))), X, Z))
     if not guesses:
         raise ContradictionError(
-            "the board turns less in the pictures than the hand does: are these the joint positions of the pictures, and "
-            "is the camera on the hand, or beside the arm, as stated?"
+            "the board turns less in the pictures than the hand does: are these the joint positions of the pictures, "
+            "and is the camera on the hand, or beside the arm, as stated?"
         )
     _, X, Z = min(guesses, key=lambda guess: guess[0])
     near = np.argsort(_discrepancies(E @ X @ C, Z))[: max(MIN_PICTURES, (len(E) + 1) // 2)]
