@@ -186,7 +186,7 @@ def shares_within(sample: Sample, draw: object, full: int, what: str) -> None:
 
 
 def test_truth_lies_in_the_intervals_of_projected_sets(sample: Sample) -> None:
-    """With lens distortion, noise of pixels, and arm errors of 0.1 mm and 0.5 mrad or of joints, 95 % hold the truth."""
+    """With distortion, noise of pixels, and arm errors of 0.1 mm and 0.5 mrad or of joints, 95 % hold the truth."""
 
     def draw(rng: np.random.Generator, eye_in_hand: bool) -> object:  # noqa: FBT001
         accuracy = ArmAccuracy() if rng.random() < 0.6 else ArmAccuracy(joints=np.full(6, 2e-4))
