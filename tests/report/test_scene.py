@@ -22,11 +22,11 @@ from armwright.report.page import RunPage, run_page
 from armwright.report.run_data import run_page_data
 from armwright.report.run_files import RunInputs, write_run
 from armwright.report.run_scene import kept_poses, moved_parts
-from armwright.report.shape_table import ShapeTable, coarse_mesh
+from armwright.report.shape_table import ShapeTable, coarse_mesh, shape_data
 from armwright.report.tracking import measured_motion, seen_pictures
 from armwright.spatial.poses import homogeneous, to_noap
-from armwright.spatial.shapes import Box, Mesh, Sphere, is_closed, volume
 from armwright.spatial.rotations import elementary_rotation
+from armwright.spatial.shapes import Box, Mesh, Sphere, is_closed, volume
 from oracles.stocked_cell import stocked_run, torus, with_solids
 
 # The page carries five significant digits of joint positions, and six decimals of lengths.
@@ -333,7 +333,7 @@ def test_every_shape_is_drawn(visit) -> None:
         {"kind": "cylinder", "radius": 0.1, "length": 0.2},
         {"kind": "capsule", "radius": 0.1, "length": 0.2},
         {"kind": "sphere", "radius": 0.1},
-        ShapeTableOf(torus(20, 10)),
+        shape_data(torus(20, 10)),
     ]
     seen = []
     for count in range(len(shapes) + 1):
@@ -348,12 +348,6 @@ def test_every_shape_is_drawn(visit) -> None:
         assert opened.complaints == []
         seen.append(opened.pixels())
     assert len(set(seen)) == len(seen)
-
-
-def ShapeTableOf(mesh: Mesh) -> dict[str, Any]:  # noqa: N802 - see below
-    table = ShapeTable()
-    table.number(mesh)
-    return table.as_data()[0]
 
 
 @pytest.mark.browser
