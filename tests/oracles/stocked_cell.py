@@ -52,19 +52,20 @@ rest = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0.0,0.25]
 [visions]
 block = { part = "BLOCK" }
 """
-PROGRAM = """VAR block, high, nest, rest : FRAME ; up : TRANS ;
+PROGRAM = """VAR block, high, nest, over, rest : FRAME ; up : TRANS ;
 BEGIN
   READ VISIONS (block) ;
   up = (1,0,0, 0,1,0, 0,0,1, 0,0,-0.10) ;
   AFFIX high TO block AT up ;
+  AFFIX over TO nest AT up ;
   OPEN ARM_1 ;
   MOVE ARM_1 TO block WITH APPROACH = high ;
   GRASP ARM_1 ;
   AFFIX block TO ARM_1 ;
-  MOVE block TO nest ;
+  MOVE block TO nest WITH DEPARTURE = high, WITH APPROACH = over ;
   OPEN ARM_1 ;
   UNFIX block FROM ARM_1 ;
-  MOVE ARM_1 TO rest ;
+  MOVE ARM_1 TO rest WITH DEPARTURE = over ;
 END.
 """
 

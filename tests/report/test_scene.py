@@ -12,10 +12,12 @@ import pytest
 from PIL import Image
 
 from armwright.arrays import Array
+from armwright.cell.observations import MeasuredStream, Picture
 from armwright.cell.part_poses import PartTrack
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.physics.cell_bodies import arm_bodies
-from armwright.program.vm.recording import MeasuredStream, Picture, Recording, StageClearance, Stream
+from armwright.physics.collisions import StageClearance
+from armwright.program.vm.recording import Recording, Stream
 from armwright.report.animation import Animation, Body, MovedPart
 from armwright.report.markup import json_text
 from armwright.report.page import RunPage, run_page
@@ -41,6 +43,11 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 def page_of(recording: Recording) -> RunPage:
     return run_page_data(recording, (), "armwright run stocked.rlo --cell cell.toml")
+
+
+def observed(recording: Recording, **changes: Any) -> Recording:
+    """A recording of which the cell has left something else."""
+    return attrs.evolve(recording, observations=attrs.evolve(recording.observations, **changes))
 
 
 def png(width: int = 32, height: int = 24, rng: np.random.Generator | None = None) -> bytes:
@@ -131,7 +138,7 @@ def test_poses_of_a_falling_part_are_thinned(rng: np.random.Generator) -> None:
 def test_long_tracks_keep_the_page_small(stocked: Recording, rng: np.random.Generator) -> None:
     """A hundred thousand poses of three parts add less than three megabytes."""
     falls = track(homogeneous(np.eye(3), rng.normal(size=(100_000, 3))), [None] * 100_000)
-    shown = moved_parts(attrs.evolve(stocked, parts=dict.fromkeys(stocked.cell.parts, falls)), ShapeTable())
+    shown = moved_parts(observed(stocked, parts=dict.fromkeys(stocked.cell.parts, falls)), ShapeTable())
     assert len(json_text(shown)) < 3_000_000
 
 
@@ -153,7 +160,9 @@ def test_a_column_below_a_raised_arm(tmp_path: Path) -> None:
     arm = recording.cell.arms["ARM_1"]
     base = arm.base.copy()
     base[:3, 3] = 0.5, 0.0, 0.3
-    cell = attrs.evolve(recording.cell, arms={**recording.cell.arms, "ARM_1": attrs.evolve(arm, base=base)})
+    bare = attrs.evolve(arm.arm, base_solids=(), links=tuple(attrs.evolve(link, solids=()) for link in arm.arm.links))
+    raised = attrs.evolve(arm, base=base, arm=bare)
+    cell = attrs.evolve(recording.cell, arms={**recording.cell.arms, "ARM_1": raised})
     animation = page_of(attrs.evolve(recording, cell=cell)).animation
     assert animation is not None
     columns = {body.name: body for figure in animation.arms.values() for body in figure.bodies if "column" in body.name}
@@ -192,7 +201,7 @@ def test_pictures_are_kept(stocked: Recording, tmp_path: Path, rng: np.random.Ge
     """Pictures are among the results, byte by byte, listed in run.json; a run without any takes them away."""
     inputs = RunInputs(program=tmp_path / "p.rlo", cell=None, command="armwright", options={}, text="BEGIN END.")
     pictures = (picture(0.5, png=png(rng=rng)), picture(1.5, found=False, text="dark"))
-    write_run(tmp_path / "out", attrs.evolve(stocked, pictures=pictures), (), inputs)
+    write_run(tmp_path / "out", observed(stocked, pictures=pictures), (), inputs)
     listed = json.loads((tmp_path / "out/run.json").read_text())["pictures"]
 
     assert [(one["time"], one["found"], one["text"]) for one in listed] == [(0.5, True, "seen"), (1.5, False, "dark")]
@@ -220,7 +229,7 @@ def planned_and_measured(error: Array) -> tuple[Stream, MeasuredStream]:
     planned = Stream(arm="ARM_1", t=times, q=q, qd=zeros, qdd=zeros, tau=zeros)
     at = 2.0 * t / t[-1] + error
     zero = np.zeros((len(t), 1))
-    return planned, MeasuredStream(arm="ARM_1", t=t, q=at[:, None], qd=zero, tau=zero)
+    return planned, MeasuredStream(arm="ARM_1", t=t, q=at[:, None], qd=zero, tau=zero, sent=zero, opening=zero[:, 0])
 
 
 def test_spikes_of_the_tracking_error_survive() -> None:
@@ -338,7 +347,7 @@ def test_every_shape_is_drawn(visit) -> None:
     seen = []
     for count in range(len(shapes) + 1):
         fixtures = [
-            Body(name=f"B{i}", shape=i, pose=to_noap(homogeneous(np.eye(3), [0.25 * (i - 2), 0, 0.3])))
+            Body(name=f"B{i}", shape=i, pose=to_noap(homogeneous(np.eye(3), [0.004 * (i - 2), 0, 0.004])))
             for i in range(count)
         ]
         page = two_parts(np.eye(4), np.eye(4), (0.01, 0.01, 0.01))
@@ -375,7 +384,7 @@ def test_least_distances(visit, stocked: Recording) -> None:
         StageClearance(distance=0.0123, bound=0.012, bodies=("ARM_1 link 4", "POST"), time=0.25),
         StageClearance(distance=0.004, bound=0.0035, bodies=("ARM_1 palm", NASTY), time=0.1),
         StageClearance(distance=None, bound=0.05),
-        None,
+        *[None] * (len(stocked.stages) - 3),
     )
     stages = tuple(attrs.evolve(one, clearance=it) for one, it in zip(stocked.stages, given, strict=True))
     opened = visit(attrs.evolve(page_of(attrs.evolve(stocked, stages=stages)), clearance=0.005))
@@ -408,9 +417,11 @@ def test_measured_beside_planned(visit, stocked: Recording) -> None:
     """Charts have a second curve and a row for the tracking error, its largest value named with its time."""
     stream = stocked.streams[0]
     off = np.zeros_like(stream.q)
-    off[:, 0] = 2e-3 * np.sin(stream.t)
-    measured = MeasuredStream(arm=stream.arm, t=stream.t, q=stream.q + off, qd=stream.qd, tau=stream.tau)
-    opened = visit(page_of(attrs.evolve(stocked, measured=(measured,))))
+    off[:, 0] = 2e-3 * np.sin(stream.t) * (stream.t < 3)
+    measured = MeasuredStream(
+        arm=stream.arm, t=stream.t, q=stream.q + off, qd=stream.qd, tau=stream.tau, sent=stream.q, opening=0 * stream.t
+    )
+    opened = visit(page_of(observed(stocked, measured=(measured,))))
     plain = visit(page_of(stocked))
     chart = "document.querySelectorAll('.plot canvas')[0].toDataURL()"
 
@@ -432,7 +443,7 @@ def test_measured_beside_planned(visit, stocked: Recording) -> None:
 def test_strip_of_pictures(visit, stocked: Recording, rng: np.random.Generator) -> None:
     """Pictures are shown with time, camera and what was found, as plain text; a click goes to their time."""
     pictures = (picture(0.5, png=png(rng=rng)), picture(2.25, camera=NASTY, frame=NASTY, found=False, text=NASTY))
-    opened = visit(page_of(attrs.evolve(stocked, pictures=pictures)))
+    opened = visit(page_of(observed(stocked, pictures=pictures)))
     items = opened.page.locator("#pictures li")
     items.last.scroll_into_view_if_needed()
     opened.until("[...document.querySelectorAll('#pictures img')].every((i) => i.complete && i.naturalWidth === 32)")
@@ -468,7 +479,7 @@ def test_paper_is_white(visit, stocked: Recording) -> None:
 
 def test_page_has_no_other_files(stocked: Recording) -> None:
     """With scene, parts and pictures too the page names no file and no address but its own data."""
-    text = run_page(page_of(attrs.evolve(stocked, pictures=(picture(0.1),))))
+    text = run_page(page_of(observed(stocked, pictures=(picture(0.1),))))
     assert "http://" not in text
     assert "https://" not in text
     assert len(text) < 700_000

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from armwright.arm.solid_entries import shape_in
-from armwright.cell.entries import read_name, read_pose, refuse_too_many
+from armwright.cell.entries import read_name, read_pose, read_whole, refuse_too_many
 from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, Spread, table
+from armwright.errors import counted
 from armwright.files.document import Table
-from armwright.spatial.shapes import LARGEST_SIZE
+from armwright.spatial.shapes import LARGEST_SIZE, Mesh, Shape, is_closed, open_edges
 
 # A coefficient of friction beyond this is that of glue.
 _MAX_FRICTION = 10.0
@@ -17,7 +18,8 @@ _MAX_FORCE = 1e5
 # Markers of the dictionary 4X4_50.
 _MARKERS = 50
 _MAX_SYMMETRY = 360
-_SHAPES = ("box", "cylinder", "sphere")
+_SHAPES = ("box", "cylinder", "mesh", "sphere")
+_FIXTURES = {"boxes": "box", "cylinders": "cylinder", "meshes": "mesh", "spheres": "sphere"}
 
 
 def read_fixtures(scene: Table) -> dict[str, Fixture]:
@@ -30,19 +32,36 @@ def read_fixtures(scene: Table) -> dict[str, Fixture]:
     if "table" in scene:
         fixtures[TABLE] = _table(scene.table("table"))
     scene.allow("table")
-    for kind in ("boxes", "cylinders", "spheres"):
+    for kind, shape in _FIXTURES.items():
         for entry in scene.tables(kind) if kind in scene else ():
             name = read_name(entry, "name", fixtures, entry.text("name"))
             fixtures[name] = Fixture(
                 name=name,
-                shape=shape_in(entry, {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere"}[kind]),
+                shape=shape_in(entry, shape),
                 pose=read_pose(entry, "at"),
                 friction=_friction(entry),
             )
             entry.refuse_unknown_keys()
         scene.allow(kind)
+    scene.allow("markers")
     scene.refuse_unknown_keys()
     return fixtures
+
+
+def read_markers(scene: Table) -> dict[str, Marker]:
+    """Read the markers that lie in the world, by name.
+
+    Raises:
+        FileFormatError: a key is unknown, missing or out of range, or a name or a number occurs twice.
+    """
+    markers: dict[str, Marker] = {}
+    numbers: dict[int, str] = {}
+    for entry in scene.tables("markers") if "markers" in scene else ():
+        name = read_name(entry, "name", markers, entry.text("name"))
+        markers[name] = _marker(entry)
+        if (other := numbers.setdefault(markers[name].number, name)) != name:
+            raise entry.error("id", f"{other} and {name} have the same marker {markers[name].number}")
+    return markers
 
 
 def _table(entry: Table) -> Fixture:
@@ -83,7 +102,7 @@ def read_parts(parts: Table) -> dict[str, Part]:
         entry.allow("marker")
         result[name] = Part(
             name=name,
-            shape=shape_in(entry, entry.choice("shape", _SHAPES, default="box")),
+            shape=_part_shape(entry),
             mass=entry.number("mass_kg", lower=1e-6, upper=_MAX_MASS),
             friction=_friction(entry),
             pose=read_pose(entry, "at"),
@@ -93,17 +112,30 @@ def read_parts(parts: Table) -> dict[str, Part]:
             ),
             grasp=read_pose(entry, "grasp", np.eye(4)),
             marker=marker,
-            symmetry=_whole(entry, "symmetry", 1, _MAX_SYMMETRY, default=1),
+            symmetry=read_whole(entry, "symmetry", 1, _MAX_SYMMETRY, default=1),
         )
         entry.refuse_unknown_keys()
     return result
 
 
+def _part_shape(entry: Table) -> Shape:
+    """Read the shape of a part, which must enclose the volume that its mass fills."""
+    shape = shape_in(entry, entry.choice("shape", _SHAPES, default="mesh" if "mesh" in entry else "box"))
+    if isinstance(shape, Mesh) and not is_closed(shape):
+        edges = counted(open_edges(shape), "edge")
+        raise entry.error(
+            "mesh",
+            f"{shape.name} is not closed ({edges} without one triangle on either side); expected a mesh that encloses "
+            "the mass of the part",
+        )
+    return shape
+
+
 def _marker(entry: Table) -> Marker:
     marker = Marker(
-        number=_whole(entry, "id", 0, _MARKERS - 1),
+        number=read_whole(entry, "id", 0, _MARKERS - 1),
         size=entry.number("size_mm", lower=1.0, upper=1e4) * 1e-3,
-        pose=read_pose(entry, "at", np.eye(4)),
+        pose=read_pose(entry, "at"),
     )
     entry.refuse_unknown_keys()
     return marker
@@ -127,15 +159,3 @@ def read_gripper(entry: Table) -> Gripper:
 
 def _friction(entry: Table, default: float = 0.8) -> float:
     return entry.number("friction", default=default, lower=0.0, upper=_MAX_FRICTION)
-
-
-def _whole(entry: Table, key: str, least: int, most: int, *, default: int | None = None) -> int:
-    """Read a whole number."""
-    number = (
-        entry.number(key, lower=least, upper=most)
-        if default is None
-        else entry.number(key, default=default, lower=least, upper=most)
-    )
-    if number != round(number):
-        raise entry.error(key, f"expected a whole number, got {number:g}")
-    return round(number)

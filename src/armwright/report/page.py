@@ -13,11 +13,9 @@ import attrs
 from armwright.arm.model import JointKind
 from armwright.arrays import Array
 from armwright.report.animation import Animation
+from armwright.report.collision_text import NOT_CHECKED
 from armwright.report.elements import badge, facts
 from armwright.report.markup import asset, page_html
-
-# The text on collisions wherever a motion is reported, until they are checked.
-COLLISIONS = "not checked"
 
 _SCRIPTS = (
     "scene.js",
@@ -240,6 +238,7 @@ class RunPage:
         pictures: that cameras took, in order.
         clearance: smaller distances of stages are marked [m].
         text_kind: kind of the text, ``Program`` or ``Poses``.
+        collisions: whether they were checked, and how near the arms came to other bodies.
     """
 
     title: str
@@ -258,6 +257,7 @@ class RunPage:
     pictures: Sequence[SeenPicture] = ()
     clearance: float = 0.0
     text_kind: Literal["Program", "Poses"] = "Program"
+    collisions: str = NOT_CHECKED
 
 
 def run_page(data: RunPage) -> str:
@@ -288,5 +288,5 @@ def _facts(data: RunPage) -> Iterator[tuple[str, str]]:
     if data.cell_name:
         yield "Cell", data.cell_name
     yield data.text_kind, data.program_name
-    yield "Collisions", COLLISIONS
+    yield "Collisions", data.collisions
     yield "Command", data.command

@@ -17,6 +17,7 @@ from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
 from armwright.report.animation import Animation, FrameTrack, TreeChange
 from armwright.report.arm_figure import arm_figure, opening_of
+from armwright.report.collision_text import collision_text
 from armwright.report.page import ArmRecord, Effect, LeastDistance, Message, RunPage, StageRow
 from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, moved_parts, placed_arms
 from armwright.report.shape_table import ShapeTable
@@ -73,6 +74,7 @@ def run_page_data(
         stages=[_stage_row(run, source.line(run.span.start)) for run in stages],
         arms=_arm_records(recording),
         animation=animation,
+        collisions=collision_text(recording),
         pictures=pictures,
     )
 

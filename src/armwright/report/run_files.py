@@ -3,7 +3,7 @@
 import hashlib
 import json
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,9 @@ from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
 from armwright.program.vm.machine import RunError
-from armwright.program.vm.recording import Effect, Recording, RunStage, motion_csv_lines
-from armwright.report.page import COLLISIONS, run_page
+from armwright.program.vm.recording import Effect, Recording, RunStage, measured_csv_lines, motion_csv_lines
+from armwright.report.collision_text import clearance_data, collision_text
+from armwright.report.page import run_page
 from armwright.report.run_data import run_page_data
 from armwright.report.run_scene import part_data, scene_data
 from armwright.spatial.poses import to_noap
@@ -84,6 +85,7 @@ def run_files(recording: Recording, diagnostics: Sequence[Diagnostic], origin: R
     """
     return {
         "motion.csv": motion_csv_lines(recording.streams, _written_ticks(recording, origin.motion_rows)),
+        **_measured_file(recording, origin.motion_rows),
         "events.jsonl": _event_lines(recording),
         "frames.json": _json(frame_data(recording)),
         "report.html": run_page(
@@ -91,6 +93,12 @@ def run_files(recording: Recording, diagnostics: Sequence[Diagnostic], origin: R
         ),
         **{_picture_file(i): picture.png for i, picture in enumerate(recording.pictures[:MAX_PICTURES], 1)},
     }
+
+
+def _measured_file(recording: Recording, most_rows: int) -> dict[str, Iterable[str]]:
+    """Return what the servos measured, in a cell with physics."""
+    streams, ticks = recording.measured, _written_ticks(recording, most_rows)
+    return {"measured.csv": measured_csv_lines(streams, ticks)} if streams else {}
 
 
 def _picture_file(number: int) -> str:
@@ -147,10 +155,12 @@ def summary_data(recording: Recording, diagnostics: Sequence[Diagnostic], hint: 
             {"line": source.line(e.span.start), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
             for e in _contacts(recording).join()
         ],
-        "collisions": COLLISIONS,
+        "collisions": collision_text(recording),
         "stages": [_stage_data(stage, recording) for stage in recording.stages],
         "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics],
     }
+    if recording.observations.facts:
+        data["physics"] = recording.observations.facts
     return {name: round_numbers(value) for name, value in data.items()}
 
 
@@ -176,6 +186,8 @@ def _stage_data(run: RunStage, recording: Recording) -> dict[str, Any]:
         "certificate": None if run.stage.certificate is None else run.stage.certificate.as_data(),
         "slowed": run.stage.slowed,
         "detour": _detour_data(run.stage),
+        "clearance": clearance_data(run.clearance),
+        "planned_path": None if run.path is None else run.path.as_data(),
         "peak_speed": _rounded_list(motion.peaks(1)),
         "peak_acceleration": _rounded_list(motion.peaks(2)),
         "peak_effort": _rounded_list(run.peak_effort),

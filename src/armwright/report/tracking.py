@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 
-import attrs
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array
-from armwright.program.vm.recording import MeasuredStream, Picture, Stream
+from armwright.cell.observations import MeasuredStream, Picture
+from armwright.program.vm.recording import Stream
 from armwright.report.page import MeasuredMotion, SeenPicture
 from armwright.report.stick_figure import thinned_rows
 
@@ -31,7 +31,10 @@ def measured_motion(planned: Stream, measured: MeasuredStream) -> MeasuredMotion
     rows = thinned_rows(len(measured.t))
     sizes = np.abs(error)
     return MeasuredMotion(
-        **{name: values[rows] for name, values in attrs.asdict(measured, recurse=False).items() if name != "arm"},
+        t=measured.t[rows],
+        q=measured.q[rows],
+        qd=measured.qd[rows],
+        tau=measured.tau[rows],
         error=_largest_between(error, rows),
         worst=sizes.max(axis=0),
         worst_t=measured.t[sizes.argmax(axis=0)],

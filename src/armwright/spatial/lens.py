@@ -14,6 +14,8 @@ from armwright.arrays import Array, ArrayLike, exact_shape, floats
 _COEFFICIENTS = 5
 # Steps by which distortion is taken away, and when no more are needed.
 _STEPS, _SETTLED = 50, 1e-13
+# Pixels along each side of a picture by which a lens is checked, and how far from itself one may come back [px].
+_GRID, _SAME_PIXEL = 33, 1e-6
 
 
 def _as_pair(value: ArrayLike) -> Array:
@@ -60,11 +62,56 @@ class Lens:
         if self.distortion.any():
             # Newton's steps with the derivative of what the lens does.
             for _ in range(_STEPS):
-                step = np.linalg.solve(self._derivative(flat), (seen - self._distorted(flat))[..., None])[..., 0]
+                (a, b), (c, d) = np.moveaxis(self._derivative(flat), (-2, -1), (0, 1))
+                x, y = np.moveaxis(seen - self._distorted(flat), -1, 0)
+                step = np.stack([d * x - b * y, a * y - c * x], axis=-1) / (a * d - b * c)[..., None]
                 flat = flat + step
                 if np.abs(step).max(initial=0.0) < _SETTLED:
                     break
         return np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
+
+    def field(self) -> Array:
+        """Return the least and the largest x and y, (2, 2), of the directions with z = 1 that its pictures show."""
+        x, y = np.arange(self.width + 1) - 0.5, np.arange(self.height + 1) - 0.5
+        rim = [np.stack(np.broadcast_arrays(x, edge), axis=-1) for edge in (y[0], y[-1])]
+        rim += [np.stack(np.broadcast_arrays(edge, y), axis=-1) for edge in (x[0], x[-1])]
+        seen = self.rays(np.concatenate(rim))[:, :2]
+        return np.array([seen.min(axis=0), seen.max(axis=0)])
+
+    def is_invertible(self) -> bool:
+        """Whether every pixel of its pictures shows one direction; a lens that distorts much can fold the picture."""
+        x, y = (np.linspace(-0.5, size - 0.5, _GRID) for size in (self.width, self.height))
+        pixels = np.stack(np.meshgrid(x, y), axis=-1)
+        with np.errstate(all="ignore"):
+            rays = self.rays(pixels)
+            back = np.abs(self.project(rays) - pixels).max() if np.isfinite(rays).all() else np.inf
+            return bool(back < _SAME_PIXEL and (np.linalg.det(self._derivative(rays[..., :2])) > 0).all())
+
+    def derivatives(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Return the derivatives of the pixels of points (..., 3) in the frame of the camera.
+
+        Returns:
+            By the coordinates of the point, (..., 2, 3) [px/m]; by the numbers of the lens, which are focal lengths,
+            centre and distortion, (..., 2, 9).
+        """
+        points = floats(points, "points")
+        flat, depth = points[..., :2] / points[..., 2:], points[..., 2:, None]
+        slope = self.focal[:, None] * self._derivative(flat)
+        by_point = np.concatenate([slope, -np.einsum("...ij,...j->...i", slope, flat)[..., None]], axis=-1) / depth
+        x, y = flat[..., 0], flat[..., 1]
+        r2 = x * x + y * y
+        xy2, x2, y2 = 2 * x * y, r2 + 2 * x * x, r2 + 2 * y * y
+        shape = np.stack(
+            [
+                np.stack([x * r2, x * r2**2, xy2, x2, x * r2**3], -1),
+                np.stack([y * r2, y * r2**2, y2, xy2, y * r2**3], -1),
+            ],
+            axis=-2,
+        )
+        seen = self._distorted(flat)
+        by_focal = seen[..., None] * np.eye(2)
+        by_centre = np.broadcast_to(np.eye(2), by_focal.shape)
+        return by_point, np.concatenate([by_focal, by_centre, self.focal[:, None] * shape], axis=-1)
 
     def _distorted(self, flat: Array) -> Array:
         """Return where points of the plane z = 1 (..., 2) are seen, in that plane."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import attrs
@@ -107,6 +108,13 @@ def _faces(value: npt.ArrayLike) -> npt.NDArray[np.int32]:
     return faces
 
 
+def _pieces(value: Iterable[Mesh]) -> tuple[Mesh, ...]:
+    pieces = tuple(value)
+    if not all(isinstance(piece, Mesh) for piece in pieces):
+        raise KindError("pieces: expected meshes")
+    return pieces
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Mesh:
     """A solid between triangles, each of which is seen counterclockwise from outside.
@@ -115,11 +123,13 @@ class Mesh:
         vertices: (k, 3) [m].
         faces: (m, 3) the numbers of the vertices of each triangle, from 0.
         name: of its file; empty where it has none.
+        pieces: convex meshes that together fill it, which count in collisions; none where its convex hull counts.
     """
 
     vertices: Array = attrs.field(converter=_vertices)
     faces: npt.NDArray[np.int32] = attrs.field(converter=_faces)
     name: str = ""
+    pieces: tuple[Mesh, ...] = attrs.field(default=(), converter=_pieces)
 
     __reduce__ = reduce_by_fields
 
@@ -140,10 +150,12 @@ class Solid:
     Attributes:
         shape: its form.
         pose: (4, 4) of the shape in the frame.
+        guessed: whether the shape is a guess, made where no drawing is at hand.
     """
 
     shape: Shape
     pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+    guessed: bool = False
 
     __reduce__ = reduce_by_fields
 
@@ -154,10 +166,26 @@ class Solid:
 
 def is_closed(mesh: Mesh) -> bool:
     """Whether the triangles of a mesh enclose a solid: every edge belongs to two of them, once in either direction."""
+    return open_edges(mesh) == 0
+
+
+def open_edges(mesh: Mesh) -> int:
+    """Return how many edges of a mesh do not belong to two triangles, once in either direction."""
     edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-    there = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
-    back = edges[:, 1] * len(mesh.vertices) + edges[:, 0]
-    return len(np.unique(there)) == len(there) and bool(np.isin(back, there).all())
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    _, numbers = np.unique(low * len(mesh.vertices) + high, return_inverse=True)
+    there = np.bincount(numbers, edges[:, 0] == low)
+    return int(((there != 1) | (np.bincount(numbers) != 2)).sum())
+
+
+def collision_shapes(shape: Shape) -> tuple[Shape, ...]:
+    """Return the convex solids that count in collisions: a shape itself, whose hull counts, or the pieces of a mesh."""
+    return shape.pieces if isinstance(shape, Mesh) and shape.pieces else (shape,)
+
+
+def convex_solids(solids: Iterable[Solid]) -> list[Solid]:
+    """Return solids with the pieces of meshes in place of those that have some; see ``collision_shapes``."""
+    return [attrs.evolve(solid, shape=shape) for solid in solids for shape in collision_shapes(solid.shape)]
 
 
 def farthest(shape: Shape) -> float:
@@ -175,6 +203,21 @@ def farthest(shape: Shape) -> float:
             return float(np.linalg.norm(vertices, axis=1).max())
 
 
+def box_about(shape: Shape) -> tuple[Array, float]:
+    """Return a box (3,) about the origin, as half its lengths, and a radius: all of a solid is that near to it [m]."""
+    match shape:
+        case Box(size=size):
+            return size / 2, 0.0
+        case Cylinder(radius=radius, length=length):
+            return np.array((radius, radius, length / 2)), 0.0
+        case Capsule(radius=radius, length=length):
+            return np.array((0.0, 0.0, length / 2)), radius
+        case Sphere(radius=radius):
+            return np.zeros(3), radius
+        case Mesh(vertices=vertices):
+            return np.abs(vertices).max(axis=0), 0.0
+
+
 def support(shape: Shape, direction: Array) -> float:
     """Return how far a solid reaches from its origin in a direction (3,) of length 1 [m]."""
     match shape:
@@ -188,6 +231,37 @@ def support(shape: Shape, direction: Array) -> float:
             return radius
         case Mesh(vertices=vertices):
             return float((vertices @ direction).max())
+
+
+def contains(shape: Shape, points: Array) -> npt.NDArray[np.bool_]:
+    """Return which of some points (k, 3) are inside a solid; a mesh must be closed.
+
+    Source:
+        for meshes, Van Oosterom & Strackee (1983), The solid angle of a plane triangle, eq. (8): all triangles together
+        fill the whole solid angle as seen from inside, and nothing of it from outside.
+    """
+    across = np.hypot(points[:, 0], points[:, 1])
+    match shape:
+        case Box(size=size):
+            return np.asarray((np.abs(points) < size / 2).all(axis=1))
+        case Cylinder(radius=radius, length=length):
+            return np.asarray((across < radius) & (np.abs(points[:, 2]) < length / 2))
+        case Capsule(radius=radius, length=length):
+            beyond = np.maximum(np.abs(points[:, 2]) - length / 2, 0.0)
+            return np.asarray(np.hypot(across, beyond) < radius)
+        case Sphere(radius=radius):
+            return np.asarray(np.linalg.norm(points, axis=1) < radius)
+        case Mesh(vertices=vertices, faces=faces):
+            return np.array([_solid_angle(vertices[faces] - point) > 2 * math.pi for point in points])
+
+
+def _solid_angle(triangles: Array) -> float:
+    """Return the solid angle of triangles (m, 3, 3) seen from the origin: 4 pi from inside of what they enclose."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    la, lb, lc = np.linalg.norm(triangles, axis=2).T
+    above = np.einsum("ki,ki->k", a, np.cross(b, c))
+    below = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    return float(2 * np.arctan2(above, below).sum())
 
 
 def volume(shape: Shape) -> float:
