@@ -246,6 +246,8 @@ class PhysicsCell:
             return mishaps.closed_on_nothing(self._now, arm, hand.expected, distance)
         hand.part, hand.pose, hand.off = part, in_hand(self._data, arm, part), 0
         self._held[arm] = part
+        if self._cell.arms[arm].servo.knows_parts:
+            self._servos[arm].load = self._cell.parts[part].mass
         self._contacts.hold(self._held)
         return None
 
@@ -275,6 +277,7 @@ class PhysicsCell:
     def _let_go(self, arm: str) -> None:
         hand = self._hands[arm]
         hand.part = hand.pose = None
+        self._servos[arm].load = 0.0
         self._held.pop(arm, None)
         self._contacts.hold(self._held)
 
