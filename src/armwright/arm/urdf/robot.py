@@ -12,6 +12,7 @@ import numpy as np
 
 from armwright.arm.model import Limits, Link, Motor
 from armwright.arm.tensors import impossible_moments, moments_message
+from armwright.arm.tree.kinematic_tree import listed
 from armwright.arm.urdf.elements import Element, read_elements
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
@@ -19,6 +20,7 @@ from armwright.files.limits import limit, limit_message
 from armwright.spatial.euler import from_rpy
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
+from armwright.spatial.shapes import Solid
 
 # URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
 NO_LIMIT = 1e30
@@ -52,6 +54,21 @@ class UrdfJoint:
         return self.kind == "fixed"
 
     @property
+    def prismatic(self) -> bool:
+        """Whether the joint slides."""
+        return self.kind == "prismatic"
+
+    @property
+    def anchor(self) -> Array:
+        """A point (3,) of the axis in the frame of the child: its origin."""
+        return np.zeros(3)
+
+    @property
+    def axis(self) -> Array:
+        """Unit vector (3,) in the frame of the child; x where the file says nothing."""
+        return axis_of(self)
+
+    @property
     def origin(self) -> Array:
         """Pose (4, 4) of the child in the frame of the parent, the joint at 0, or where it is locked."""
         X = origin_of(self.element)
@@ -61,6 +78,18 @@ class UrdfJoint:
         if self.element.text("type") == "prismatic":
             return X @ homogeneous(np.eye(3), axis)
         return X @ homogeneous(rotation_from_vector(axis), np.zeros(3))
+
+    def limits(self) -> tuple[Limits, list[str]]:
+        """Return its limits, and sentences on what was taken for unknown."""
+        return limits_of(self)
+
+    def motor(self) -> tuple[Motor, list[str]]:
+        """Return its friction."""
+        return motor_of(self), []
+
+    def error(self, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of the joint."""
+        return self.element.error("", message)
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
@@ -95,6 +124,30 @@ class Robot:
     links: dict[str, Element]
     parent_joints: dict[str, UrdfJoint]
     child_joints: dict[str, list[UrdfJoint]]
+
+    @property
+    def function(self) -> str:
+        """The function that reads such files, in messages."""
+        return "load_urdf"
+
+    def default_base(self) -> str:
+        """Return the link that hangs on nothing.
+
+        Raises:
+            FileFormatError: there are several.
+        """
+        roots = [name for name in self.links if name not in self.parent_joints]
+        if len(roots) > 1:
+            raise self.error(f"the base link is ambiguous: it could be {listed(roots)}; specify one as base (--base)")
+        return roots[0]
+
+    def body(self, link: str) -> Link:
+        """Return the body of a link, in its frame."""
+        return body_of(self.links[link])
+
+    def solids(self, link: str) -> tuple[Solid, ...]:  # noqa: ARG002 - no shapes are read
+        """Return what of a link meets other bodies: nothing is known of it."""
+        return ()
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the whole file."""

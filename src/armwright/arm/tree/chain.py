@@ -1,4 +1,4 @@
-"""The chain in a URDF file: from a base link to a tip link, and what hangs on every link of it."""
+"""The chain in a tree of links: from a base link to a tip link, and what hangs on every link of it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import numpy as np
 
 from armwright.arm.dh import carry
 from armwright.arm.model import Link
-from armwright.arm.urdf.robot import Robot, UrdfJoint, axis_of, body_of
+from armwright.arm.tree.kinematic_tree import Tree, TreeJoint, listed
 from armwright.arrays import Array
 from armwright.errors import one_of
 from armwright.files.limits import limit, limit_message
-
-# Of links and joints, a message lists this many.
-_MAX_LISTED = 50
+from armwright.spatial.poses import homogeneous
+from armwright.spatial.shapes import Solid
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -24,12 +23,12 @@ class MovingJoint:
 
     Attributes:
         joint: the joint.
-        X_BJ: (4, 4) the frame of the joint.
+        X_BJ: (4, 4) a frame on its axis.
         axis: (3,) its axis, a unit vector.
         bodies: of all links that it moves and no later joint does.
     """
 
-    joint: UrdfJoint
+    joint: TreeJoint
     X_BJ: Array
     axis: Array
     bodies: tuple[Link, ...]
@@ -45,6 +44,7 @@ class Chain:
         moving: the joints that move, from the base to the tip.
         X_BT: (4, 4) the tip seen from the base.
         X_RB: (4, 4) the base seen from the root of the tree.
+        base_solids: what of the base meets other bodies, in its frame.
         notes: sentences on what was chosen.
     """
 
@@ -53,15 +53,16 @@ class Chain:
     moving: tuple[MovingJoint, ...]
     X_BT: Array
     X_RB: Array
+    base_solids: tuple[Solid, ...]
     notes: tuple[str, ...] = ()
 
 
-def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> Chain:
+def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Chain:
     """Return the chain between two links.
 
     Args:
-        robot: the file.
-        base: name of the first link; the one that hangs on nothing when left out.
+        tree: the file.
+        base: name of the first link; the tree's own when left out.
         tip: name of the last link; when left out the only one at the end of moving joints, or the link that carries
             all of them.
 
@@ -69,43 +70,39 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
         UnknownNameError: there is no link of that name.
         FileFormatError: it is not clear which link is meant, nothing moves between them, or a joint is none of an arm.
     """
-    base = _root(robot) if base is None else one_of("link", base, robot.links)
+    base = tree.default_base() if base is None else one_of("link", base, tree.links)
     notes: tuple[str, ...] = ()
     if tip is None:
-        tip, notes = _default_tip(robot, base)
-    one_of("link", tip, robot.links)
-    path = _joint_path(robot, base, tip)
+        tip, notes = _default_tip(tree, base)
+    one_of("link", tip, tree.links)
+    path = _joint_path(tree, base, tip)
     for joint in path:
         joint.require_serial()
     movable = [joint for joint in path if not joint.fixed]
     if not movable:
-        raise robot.error(f"no joint moves between the links '{base}' and '{tip}'")
+        raise tree.error(f"no joint moves between the links '{base}' and '{tip}'")
     if len(movable) > limit("joints"):
-        raise robot.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(movable))}")
+        raise tree.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(movable))}")
     X, moving = np.eye(4), []
-    branches: list[UrdfJoint] = []
+    branches: list[TreeJoint] = []
     for joint in path:
         X = X @ joint.origin
         if not joint.fixed:
-            bodies = tuple(_rigid_bodies(robot, joint.child, X, branches))
-            moving.append(MovingJoint(joint=joint, X_BJ=X, axis=X[:3, :3] @ axis_of(joint), bodies=bodies))
-    _refuse_loads(robot, [joint for joint in branches if joint not in movable])
+            welded = _welded_links(tree, joint.child, X, branches)
+            bodies = tuple(carry(tree.body(link), X_BL) for link, X_BL in welded)
+            X_BJ = X @ homogeneous(np.eye(3), joint.anchor)
+            moving.append(MovingJoint(joint=joint, X_BJ=X_BJ, axis=X[:3, :3] @ joint.axis, bodies=bodies))
+    _refuse_loads(tree, [joint for joint in branches if joint not in movable])
     X_RB, root = np.eye(4), base
-    while root in robot.parent_joints:
-        root = robot.parent_joints[root].parent
-    for joint in _joint_path(robot, root, base):
+    while root in tree.parent_joints:
+        root = tree.parent_joints[root].parent
+    for joint in _joint_path(tree, root, base):
         X_RB = X_RB @ joint.origin
-    return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, notes=notes)
+    solids = [x.moved(X_BL) for link, X_BL in _welded_links(tree, base, np.eye(4), []) for x in tree.solids(link)]
+    return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, base_solids=tuple(solids), notes=notes)
 
 
-def _root(robot: Robot) -> str:
-    roots = [name for name in robot.links if name not in robot.parent_joints]
-    if len(roots) > 1:
-        raise robot.error(f"the base link is ambiguous: it could be {_listed(roots)}; specify one as base (--base)")
-    return roots[0]
-
-
-def _default_tip(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
+def _default_tip(tree: Tree, base: str) -> tuple[str, tuple[str, ...]]:
     """Return the only link that ends a chain, and notes; one that is fixed to the base ends none.
 
     Where several ends are fixed to one another, the link that carries all of them is the end: it moves as they do.
@@ -114,83 +111,77 @@ def _default_tip(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
     pending = [(base, False)]
     while pending:
         link, moves = pending.pop()
-        pending += [(joint.child, moves or not joint.fixed) for joint in reversed(robot.child_joints[link])]
-        if moves and not robot.child_joints[link]:
+        pending += [(joint.child, moves or not joint.fixed) for joint in reversed(tree.child_joints[link])]
+        if moves and not tree.child_joints[link]:
             ends.append(link)
     if not ends:
-        raise robot.error(f"no joint moves a link below '{base}'")
+        raise tree.error(f"no joint moves a link below '{base}'")
     if len(ends) == 1:
         return ends[0], ()
-    carrier = _carrier(robot, base, ends)
+    carrier = _carrier(tree, base, ends)
     if carrier is None:
-        raise robot.error(
-            f"the tip link is ambiguous: it could be {_listed(ends)}; specify one as tip: "
-            f"load_urdf(path, tip='{ends[0]}'), or armwright convert {robot.path} --tip {ends[0]} -o arm.toml"
+        raise tree.error(
+            f"the tip link is ambiguous: it could be {listed(ends)}; specify one as tip: "
+            f"{tree.function}(path, tip='{ends[0]}'), or armwright convert {tree.path} --tip {ends[0]} -o arm.toml"
         )
-    note = f"the tool is '{carrier}', which carries {_listed(ends)}; each moves as it does and may be the tip (--tip)"
+    note = f"the tool is '{carrier}', which carries {listed(ends)}; each moves as it does and may be the tip (--tip)"
     return carrier, (note,)
 
 
-def _carrier(robot: Robot, base: str, ends: list[str]) -> str | None:
+def _carrier(tree: Tree, base: str, ends: list[str]) -> str | None:
     """Return the last link that all ends hang on, if no joint moves between it and them, else None."""
-    paths = [_joint_path(robot, base, end) for end in ends]
+    paths = [_joint_path(tree, base, end) for end in ends]
     common = [row[0] for row in zip(*paths, strict=False) if all(joint is row[0] for joint in row)]
     rigid = all(joint.fixed for path in paths for joint in path[len(common) :])
     return common[-1].child if common and rigid else None
 
 
-def _joint_path(robot: Robot, base: str, tip: str) -> list[UrdfJoint]:
+def _joint_path(tree: Tree, base: str, tip: str) -> list[TreeJoint]:
     """Return the joints from the base to the tip."""
-    path: list[UrdfJoint] = []
+    path: list[TreeJoint] = []
     link = tip
     while link != base:
-        if link not in robot.parent_joints:
-            raise robot.error(f"link '{tip}' is not below link '{base}'")
-        path.append(robot.parent_joints[link])
-        link = robot.parent_joints[link].parent
+        if link not in tree.parent_joints:
+            raise tree.error(f"link '{tip}' is not below link '{base}'")
+        path.append(tree.parent_joints[link])
+        link = tree.parent_joints[link].parent
     return path[::-1]
 
 
-def _rigid_bodies(robot: Robot, link: str, X_BL: Array, branches: list[UrdfJoint]) -> Iterator[Link]:
-    """Walk through the bodies that are fixed to a link and to one another, in the frame of the base.
+def _welded_links(tree: Tree, link: str, X_BL: Array, branches: list[TreeJoint]) -> Iterator[tuple[str, Array]]:
+    """Walk through the links that are fixed to a link and to one another, with their poses in the frame of the base.
 
     Joints that move and hang on one of them are put into ``branches``.
     """
     pending = [(link, X_BL)]
     while pending:
         name, X = pending.pop()
-        yield carry(body_of(robot.links[name]), X)
-        for joint in robot.child_joints[name]:
+        yield name, X
+        for joint in tree.child_joints[name]:
             if joint.fixed:
                 pending.append((joint.child, X @ joint.origin))
             else:
                 branches.append(joint)
 
 
-def _refuse_loads(robot: Robot, branches: list[UrdfJoint]) -> None:
+def _refuse_loads(tree: Tree, branches: list[TreeJoint]) -> None:
     """Refuse joints beside the chain that carry something: how that moves, a serial arm does not know."""
-    loaded = [joint for joint in branches if _carries_mass(robot, joint)]
+    loaded = [joint for joint in branches if _carries_mass(tree, joint)]
     if loaded:
         single, names = len(loaded) == 1, [joint.name for joint in loaded]
         does = "joint lies beside the chain, moves and has" if single else "joints lie beside the chain, move and have"
-        raise loaded[0].element.error(
-            "",
-            f"{len(loaded)} {does} mass to carry: {_listed(names)}. An arm has no branches: choose another tip, or "
+        raise loaded[0].error(
+            f"{len(loaded)} {does} mass to carry: {listed(names)}. An arm has no branches: choose another tip, or "
             f"lock {'it' if single else 'them'}, at 0 or elsewhere: lock={names} (--lock {','.join(names)})",
         )
 
 
-def _carries_mass(robot: Robot, joint: UrdfJoint) -> bool:
+def _carries_mass(tree: Tree, joint: TreeJoint) -> bool:
     pending = [joint.child]
     while pending:
         name = pending.pop()
-        body = body_of(robot.links[name])
+        body = tree.body(name)
         if body.mass or body.inertia.any() or body.unknown:
             return True
-        pending += [child_joint.child for child_joint in robot.child_joints[name]]
+        pending += [child_joint.child for child_joint in tree.child_joints[name]]
     return False
-
-
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - _MAX_LISTED:,} more" if len(names) > _MAX_LISTED else ""
-    return ", ".join(f"'{name}'" for name in names[:_MAX_LISTED]) + more
