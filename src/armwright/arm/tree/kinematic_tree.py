@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from armwright.arm.model import Limits, Link, Motor
-from armwright.arrays import Array
-from armwright.errors import FileFormatError
+from armwright.arrays import Array, number
+from armwright.errors import FileFormatError, InvalidValueError, KindError, shown
 from armwright.spatial.shapes import Solid
+
+# Joints that are held: their names, or their positions by their names [rad] or [m].
+Lock: TypeAlias = Collection[str] | Mapping[str, float]
 
 
 class TreeJoint(Protocol):
@@ -116,3 +120,32 @@ def listed(names: Sequence[str], most: int = 50) -> str:
     """Return names for a message, not more than some of them."""
     more = f" and {len(names) - most:,} more" if len(names) > most else ""
     return ", ".join(f"'{name}'" for name in names[:most]) + more
+
+
+def locked_positions(lock: Lock) -> dict[str, float]:
+    """Return where joints are held by their names [rad] or [m].
+
+    Raises:
+        KindError: it is one text, or a position is no number.
+    """
+    if isinstance(lock, str):
+        raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
+    positions = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
+    return {name: number(q, f"lock, '{name}'") for name, q in positions.items()}
+
+
+def check_lock(name: str, kind: str, position: float, limits: Limits | None) -> None:
+    """Refuse to hold a joint where it cannot be.
+
+    Args:
+        name: of the joint.
+        kind: as in the file.
+        position: where it is to be held [rad] or [m].
+        limits: of the joint; None of one that has no position.
+
+    Raises:
+        InvalidValueError: it cannot be there.
+    """
+    if position and not (limits and math.isfinite(position) and limits.lower <= position <= limits.upper):
+        ends = f"it goes from {limits.lower:g} to {limits.upper:g}" if limits else f"it is {kind}"
+        raise InvalidValueError(f"lock: joint '{name}' cannot be locked at {position:g} (rad or m): {ends}")

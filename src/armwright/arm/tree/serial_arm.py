@@ -79,8 +79,8 @@ def serial_arm(
         source=f"{tree.path.name}, link '{chain.base}' to link '{chain.tip}'",
     )
     if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
-        down = vector_text(arm.gravity)
-        notes.append(f"gravity points downwards in the root link of the file: {down} along the axes of '{chain.base}'")
+        says = "gravity points downwards in the root link of the file" if gravity_from == "root" else "gravity"
+        notes.append(f"{says}: {vector_text(arm.gravity)} along the axes of '{chain.base}'")
     return Reading(arm=arm, notes=tuple(notes))
 
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import TypeAlias
 
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
+from armwright.arm.tree.kinematic_tree import Lock, locked_positions
 from armwright.arm.tree.serial_arm import Reading, serial_arm
 from armwright.arm.urdf.robot import read_robot
-from armwright.arrays import number
 from armwright.errors import KindError, shown
 from armwright.files.inputs import file_path
-
-# Joints that are held: their names, or their positions by their names [rad] or [m].
-Lock: TypeAlias = Collection[str] | Mapping[str, float]
 
 
 def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Arm:
@@ -48,9 +43,5 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
     """
     if not isinstance(path, str | Path):
         raise KindError(f"path: expected the path of a URDF file, got {shown(path)}")
-    if isinstance(lock, str):
-        raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
     path = file_path(path)
-    locked = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
-    robot = read_robot(path, {name: number(q, f"lock, '{name}'") for name, q in locked.items()})
-    return serial_arm(robot, base, tip, UPRIGHT_GRAVITY)
+    return serial_arm(read_robot(path, locked_positions(lock)), base, tip, UPRIGHT_GRAVITY)

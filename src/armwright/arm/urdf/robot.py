@@ -12,10 +12,10 @@ import numpy as np
 
 from armwright.arm.model import Limits, Link, Motor
 from armwright.arm.tensors import impossible_moments, moments_message
-from armwright.arm.tree.kinematic_tree import listed
+from armwright.arm.tree.kinematic_tree import check_lock, listed
 from armwright.arm.urdf.elements import Element, read_elements
 from armwright.arrays import Array
-from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
+from armwright.errors import FileFormatError, closest, one_of
 from armwright.files.limits import limit, limit_message
 from armwright.spatial.euler import from_rpy
 from armwright.spatial.poses import homogeneous
@@ -216,12 +216,7 @@ def _joint(element: Element, links: dict[str, Element], lock: Mapping[str, float
 
 def _locked(joint: UrdfJoint, position: float) -> UrdfJoint:
     """Return a joint as one that is held at a position."""
-    if position:
-        moves = joint.kind in _MOVING
-        limits = limits_of(joint)[0] if moves else Limits()
-        if not (moves and math.isfinite(position) and limits.lower <= position <= limits.upper):
-            ends = f"it goes from {limits.lower:g} to {limits.upper:g}" if moves else f"it is {joint.kind}"
-            raise InvalidValueError(f"lock: joint '{joint.name}' cannot be locked at {position:g} (rad or m): {ends}")
+    check_lock(joint.name, joint.kind, position, limits_of(joint)[0] if position and joint.kind in _MOVING else None)
     return attrs.evolve(joint, kind="fixed", locked=position)
 
 
