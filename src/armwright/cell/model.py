@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arm.gravity import in_world
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
+from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.scene import Fixture, Gripper, Part
 from armwright.errors import ShapeError
@@ -45,6 +46,10 @@ class CellArm:
         open_time: time in which the fingers open [s].
         grasp_time: time in which they close [s].
         gripper: what it holds parts with; None where nothing is known of it.
+        servo: the controller of its joints, in a cell with physics.
+        plant: the arm that stands in such a cell, where it is another than ``arm``, which its controller believes in.
+        sensors: what its controller knows of its joints there.
+        force_sensor: between the arm and its tool there.
     """
 
     arm: Arm
@@ -53,6 +58,10 @@ class CellArm:
     open_time: float = 0.3
     grasp_time: float = 0.3
     gripper: Gripper | None = None
+    servo: Servo = attrs.field(factory=Servo)
+    plant: Arm | None = None
+    sensors: Sensors = attrs.field(factory=Sensors)
+    force_sensor: ForceSensor = attrs.field(factory=ForceSensor)
 
     def __attrs_post_init__(self) -> None:
         """Refuse a start of another number of joints."""
@@ -92,6 +101,7 @@ class Cell:
         camera: (4, 4) pose of the camera in the world.
         devices: names of the devices that can be operated; None allows any name.
         contact: plane with which arms and what they carry come into contact.
+        alarms: what stops a program in this cell with physics.
         vision_time: time that the camera takes for an answer [s].
         deviation: allowed distance from straight lines [m].
         corner: how far a path past several frames may be from the straight legs between them [m]; 20 deviations by
@@ -113,6 +123,7 @@ class Cell:
     camera_repeats: bool = False
     devices: frozenset[str] | None = None
     contact: ContactPlane = attrs.field(factory=ContactPlane)
+    alarms: Alarms = attrs.field(factory=Alarms)
     vision_time: float = 0.1
     deviation: float = 1e-3
     corner: float | None = None

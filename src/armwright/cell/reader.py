@@ -11,6 +11,7 @@ from armwright.arm.load import is_path, load_arm
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array
+from armwright.cell.control_reader import read_alarms, read_force_sensor, read_plant, read_sensors, read_servo
 from armwright.cell.entries import ARM_NAME, read_name, read_pose, refuse_too_many, to_pose
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane
@@ -74,6 +75,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         visions=visions,
         camera=read_pose(camera, "pose", default=np.eye(4)),
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
+        alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
         devices=_read_devices(top.table("devices")) if "devices" in top else None,
         contact=ContactPlane(
@@ -151,17 +153,33 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         weighed(arm)
     except ArmwrightError as error:
         raise table.error("model", f"{error}, but the motions of a program are computed with efforts") from error
-    arm = attrs.evolve(arm, tool=read_pose(table, "tool", default=arm.tool))
+    arm = _with_tool(arm, table)
     base = read_pose(table, "base", default=np.eye(4))
     table.allow("hand", "joint_positions")
     start = _read_start(table, arm, base)
     open_time, grasp_time = (
         table.number(key, default=0.3, lower=0.0, upper=_MAX_DURATION) for key in ("open_s", "grasp_s")
     )
-    gripper = read_gripper(table.table("gripper")) if "gripper" in table else None
-    table.allow("gripper")
+    result = CellArm(
+        arm=arm,
+        base=base,
+        start=start,
+        open_time=open_time,
+        grasp_time=grasp_time,
+        gripper=read_gripper(table.table("gripper")) if "gripper" in table else None,
+        servo=read_servo(table.table("servo")),
+        plant=_with_tool(read_plant(table.table("plant"), arm, folder), table) if "plant" in table else None,
+        sensors=read_sensors(table.table("sensors")),
+        force_sensor=read_force_sensor(table.table("force")),
+    )
+    table.allow("gripper", "plant")
     table.refuse_unknown_keys()
-    return CellArm(arm=arm, base=base, start=start, open_time=open_time, grasp_time=grasp_time, gripper=gripper)
+    return result
+
+
+def _with_tool(arm: Arm, table: Table) -> Arm:
+    """Return an arm with the tool that the cell file specifies, if it does."""
+    return attrs.evolve(arm, tool=read_pose(table, "tool", default=arm.tool))
 
 
 def _read_start(table: Table, arm: Arm, base: Array) -> Array:

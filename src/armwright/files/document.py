@@ -112,6 +112,28 @@ class Table:
             raise self.error(key, f"expected a number above 0, got {value:g}")
         return value
 
+    def whole(self, key: str, lower: int, upper: int, default: Any = _MISSING) -> int:
+        """Return a whole number from ``lower`` to ``upper``.
+
+        Raises:
+            FileFormatError: it is missing without a default, no whole number, or out of range.
+        """
+        value = self.number(key, default, lower=lower, upper=upper)
+        if value != round(value):
+            raise self.error(key, f"expected a whole number, got {value:g}")
+        return round(value)
+
+    def flag(self, key: str, default: Any = _MISSING) -> bool:
+        """Return ``true`` or ``false``.
+
+        Raises:
+            FileFormatError: it is missing without a default, or neither of them.
+        """
+        value = self._value(key, default, "true or false")
+        if not isinstance(value, bool):
+            raise self.error(key, f"expected true or false, got {_value_text(value)}")
+        return value
+
     def vector(self, key: str, length: int | Collection[int], default: Any = _MISSING) -> Array:
         """Return an array of that many finite numbers; several lengths may be allowed.
 

@@ -175,6 +175,21 @@ def farthest(shape: Shape) -> float:
             return float(np.linalg.norm(vertices, axis=1).max())
 
 
+def support(shape: Shape, direction: Array) -> float:
+    """Return how far a solid reaches from its origin in a direction (3,) of length 1 [m]."""
+    match shape:
+        case Box(size=size):
+            return float(np.abs(direction) @ size) / 2
+        case Cylinder(radius=radius, length=length):
+            return float(radius * math.hypot(direction[0], direction[1]) + length / 2 * abs(direction[2]))
+        case Capsule(radius=radius, length=length):
+            return float(radius + length / 2 * abs(direction[2]))
+        case Sphere(radius=radius):
+            return radius
+        case Mesh(vertices=vertices):
+            return float((vertices @ direction).max())
+
+
 def volume(shape: Shape) -> float:
     """Return the volume of a solid [m³]; that of a mesh means something where it is closed."""
     match shape:

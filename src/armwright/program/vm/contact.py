@@ -40,7 +40,7 @@ def stop_arm(machine: Machine, process: Process, span: Span) -> int:
         if runs and local < runs[-1].duration - _ROUNDING:
             motion.rest_tick += _stop_during_stage(machine, motion, local)
         else:
-            _send_and_watch(machine, motion, hold(machine.hardware.configuration(motion.arm, machine.now), period))
+            _send_and_watch(machine, motion, hold(machine.hardware.sent_configuration(motion.arm, machine.now), period))
     end = max(motion.rest_tick, machine.state.ticks)
     machine.update_hand_pose(motion.arm, span, tick=end)
     return end
@@ -73,7 +73,7 @@ def _send_and_watch(machine: Machine, motion: Motion, trajectory: Trajectory) ->
 
 def send_trajectory(machine: Machine, motion: Motion, trajectory: Trajectory) -> ToolWrenches:
     """Let the arm of a motion follow a trajectory instead of what it does now; return what will push on its hand."""
-    machine.hardware.start_motion(motion.arm, trajectory, machine.now, motion.X_HM)
+    machine.hardware.start_motion(motion.arm, trajectory, machine.now, motion.X_HM, guarded=bool(motion.guards))
     return _record_wrenches(machine, motion.arm)
 
 

@@ -29,7 +29,7 @@ def _move_fingers(machine: Machine, process: Process, step: Instruction) -> None
     motion = None if mover is None else mover.motion
     if motion is not None:
         record_contact(machine, motion)
-    time = machine.hardware.move_fingers(arm, closed=closed, width=metres)
+    time = machine.hardware.move_fingers(arm, machine.now, closed=closed, width=metres, frame=hand.held_frame)
     recompute_efforts(machine, arm, None if motion is None or motion.stage_index < 0 else motion.stage_index)
     if motion is not None:
         # What is released does not press any more.
@@ -54,7 +54,7 @@ def _operate(machine: Machine, process: Process, step: Instruction) -> None:
 def _read_visions(machine: Machine, process: Process, step: Instruction) -> None:
     name = machine.resolve_name(process, step.operands[0])
     try:
-        X_WF, time = machine.hardware.locate(name)
+        X_WF, time = machine.hardware.locate(name, machine.now)
     except DeviceError as error:
         raise machine.error(process, "R601", str(error), step.span, "the camera is asked here") from None
     text = f"READ VISIONS {machine.spelling(name)}"

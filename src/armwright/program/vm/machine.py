@@ -10,9 +10,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree
-from armwright.cell.hardware import Hardware
+from armwright.cell.hardware import Hardware, SimulatedHardware
 from armwright.cell.model import Cell, base_name
-from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand
@@ -82,7 +81,7 @@ class Machine:
         Raises:
             TypeError: the hardware is a real cell, which cannot be copied.
         """
-        if not isinstance(self.hardware, Simulator):
+        if not isinstance(self.hardware, SimulatedHardware):
             raise TypeError(f"only a simulated cell can be copied, not a {type(self.hardware).__name__}")
         copied = copy.copy(self)
         copied.hardware, copied.state = self.hardware.copy(), self.state.copy()
@@ -102,6 +101,9 @@ class Machine:
     def recording(self) -> Recording:
         """Return all that happened so far."""
         cell, state = self.cell, self.state
+        # What goes wrong while the arms come to rest is of no program any more.
+        while self.hardware.advance(self.now) is not None:
+            pass
         streams = tuple(
             sample_stream(
                 name, arm, state.segments[name], state.tool_wrenches[name], end_tick=state.ticks, period=cell.period
@@ -117,6 +119,7 @@ class Machine:
             streams=streams,
             trees=tuple(state.trees),
             configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
+            parts=self.hardware.part_poses().tracks,
         )
 
     # ---- names and values ------------------------------------------------------------------------------------------

@@ -194,7 +194,7 @@ def _plan_stages(
     ]
     manner = Manner(speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
     try:
-        stages = plan(planning_arm(cell_arm.arm), machine.hardware.configuration(arm, machine.now), goals, manner)
+        stages = plan(planning_arm(cell_arm.arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except IncapableArmError as error:

@@ -11,6 +11,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell, CellArm
+from armwright.cell.part_poses import PartTrack
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.motion.efforts import without_rounding
 from armwright.motion.plan import PlannedStage
@@ -189,6 +190,7 @@ class Recording:
         trees: the frame tree at the start and after each change, with the time of the change [s]; of very many
             changes the last in every two-thousandth of the run.
         configurations: by arm, the configuration (n,) at the end.
+        parts: where each part of the cell was believed to be, by name.
         failure: why it did not come to its end; None where it did.
     """
 
@@ -200,6 +202,7 @@ class Recording:
     streams: tuple[Stream, ...]
     trees: tuple[tuple[float, FrameTree], ...]
     configurations: Mapping[str, Array]
+    parts: Mapping[str, PartTrack] = attrs.field(factory=dict)
     failure: Failure | None = None
 
     @property

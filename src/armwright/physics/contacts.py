@@ -1,0 +1,162 @@
+"""What touches what in a world, and how hard."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arrays import Array
+from armwright.physics.world_model import FLOOR, PLATE, WorldModel
+
+# Parts, fixtures and arms that overlap by more at the start stand inside one another [m].
+OVERLAP = 1e-3
+_UNOWNED = ""
+
+
+class Touch(NamedTuple):
+    """Two things that press on each other.
+
+    Attributes:
+        arm: whose link, gripper or part in the hand it is.
+        what: its name.
+        other: what it touches.
+        force: between them [N].
+    """
+
+    arm: str
+    what: str
+    other: str
+    force: float
+
+
+class Overlap(NamedTuple):
+    """Two things that stand inside each other, and by how much [m]."""
+
+    one: str
+    other: str
+    depth: float
+
+
+class Contacts:
+    """The geoms of a world by what they belong to."""
+
+    def __init__(self, world: WorldModel) -> None:
+        """Take a world."""
+        self._model = world.model
+        self.names: list[str] = []
+        self._owners: list[str] = []
+        # The bodies of grippers and parts.
+        self._hand: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
+        self._parts: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
+        self._pads: dict[str, list[int]] = {name: [] for name in world.cell.arms}
+        self._part_geoms = {name: world.model.geom(name).id for name in world.parts}
+        self._tools = {name: world.model.body(f"{name}/tool").id for name in world.cell.arms}
+        for number in range(world.model.ngeom):
+            self._add_geom(world, number)
+        self._unwanted: npt.NDArray[np.bool_] = np.zeros((world.model.ngeom,) * 2, dtype=bool)
+        self.hold({})
+
+    def _add_geom(self, world: WorldModel, number: int) -> None:
+        name = world.model.geom(number).name
+        arm, slash, what = name.partition("/")
+        if not slash or arm not in world.cell.arms:
+            self.names.append(name)
+            self._owners.append(_UNOWNED)
+            self._parts[number] = name in world.parts
+            return
+        self._owners.append(arm)
+        self._hand[number] = not (what.startswith(("link", "base")))
+        if what.endswith("pad") or what == "cup":
+            self._pads[arm].append(number)
+        label = what.partition("/")[0].replace("link", "link ")
+        self.names.append(f"{arm} {'finger' if what.endswith(('pad', 'finger')) else label}")
+
+    def hold(self, held: dict[str, str]) -> None:
+        """Take note of what arms hold: parts by arm. What they hold belongs to them."""
+        owners = np.array(self._owners, dtype=object)
+        for arm, part in held.items():
+            owners[self._part_geoms[part]] = arm
+        owned = owners != _UNOWNED
+        # An arm may touch nothing but what is its; grippers may touch parts.
+        apart = (owners[:, None] != owners[None, :]) & (owned[:, None] | owned[None, :])
+        reach = self._hand[:, None] & self._parts[None, :]
+        self._unwanted = apart & ~reach & ~reach.T
+        self._holders = owners
+
+    def unwanted(self, data: Any, least: float) -> Touch | None:
+        """Return the hardest contact of an arm with what it should not touch, of at least a force [N]."""
+        if not data.ncon:
+            return None
+        geoms = data.contact.geom
+        suspicious = self._unwanted[geoms[:, 0], geoms[:, 1]]
+        if not suspicious.any():
+            return None
+        worst = None
+        for number in np.flatnonzero(suspicious).tolist():
+            force = self.force(data, number)
+            if force >= (least if worst is None else worst.force):
+                a, b = geoms[number].tolist()
+                mine, other = (a, b) if self._holders[a] != _UNOWNED else (b, a)
+                worst = Touch(str(self._holders[mine]), self.names[mine], self.names[other], force)
+        return worst
+
+    def force(self, data: Any, number: int) -> float:
+        """Return the normal force of a contact [N]."""
+        import mujoco  # noqa: PLC0415 - only cells with several bodies need it
+
+        force = np.zeros(6)
+        mujoco.mj_contactForce(self._model, data, number, force)
+        return float(abs(force[0]))
+
+    def gripped(self, data: Any, arm: str) -> str | None:
+        """Return the part that both pads of an arm touch, or that its cup does; None without one."""
+        if not data.ncon:
+            return None
+        geoms = data.contact.geom
+        touching: list[set[int]] = []
+        for pad in self._pads[arm]:
+            first, second = geoms[:, 0] == pad, geoms[:, 1] == pad
+            others = {*geoms[first, 1].tolist(), *geoms[second, 0].tolist()}
+            touching.append({other for other in others if self._parts[other]})
+        common = set.intersection(*touching) if touching else set()
+        return self.names[min(common)] if common else None
+
+    def touches(self, data: Any, part: str) -> list[str]:
+        """Return what a part touches."""
+        number = self._part_geoms[part]
+        pairs = data.contact.geom[: data.ncon]
+        others = {*pairs[pairs[:, 0] == number, 1].tolist(), *pairs[pairs[:, 1] == number, 0].tolist()}
+        return sorted({self.names[other] for other in others})
+
+    def overlaps(self, data: Any) -> list[Overlap]:
+        """Return what stands inside other things."""
+        found = []
+        for number in range(data.ncon):
+            a, b = data.contact.geom[number].tolist()
+            depth = -float(data.contact.dist[number])
+            if depth > OVERLAP and not {self.names[a], self.names[b]} & {FLOOR}:
+                found.append(Overlap(self.names[a], self.names[b], depth))
+        return found
+
+    def tool_wrench(self, data: Any, arm: str) -> Array:
+        """Return force [N] and moment [N m] (6,) on the tool of an arm, without the weight of the tool.
+
+        Along the axes of the world, at the tool point: as a sensor between the arm and its tool reads them.
+        """
+        import mujoco  # noqa: PLC0415 - only cells with several bodies need it
+
+        mujoco.mj_rnePostConstraint(self._model, data)
+        tool = self._tools[arm]
+        moment, force = data.cfrc_int[tool, :3], data.cfrc_int[tool, 3:]
+        point = data.xpos[tool]
+        about = data.subtree_com[self._model.body_rootid[tool]]
+        weight = self._model.body_subtreemass[tool] * self._model.opt.gravity
+        pull = -force - weight
+        turn = -(moment + np.cross(about - point, force)) - np.cross(data.subtree_com[tool] - point, weight)
+        return np.concatenate([pull, turn])
+
+    def plate_depth(self, data: Any) -> float:
+        """Return how deep the plane that yields is pressed [m]."""
+        return float(-data.qpos[self._model.joint(PLATE).qposadr[0]])
