@@ -16,7 +16,7 @@ from armwright.cell.model import Cell
 from armwright.cell.scene import Gripper, Part
 from armwright.physics.geoms import add_geom, place, quaternion
 from armwright.physics.gripper import add_gripper, gripper_length
-from armwright.physics.plant import add_arm, finish, new_world
+from armwright.physics.plant import PlantArm, add_arm, finish, new_world
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Solid, centroid, farthest, inertia
 
@@ -68,6 +68,17 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     Raises:
         UnsupportedArmError: masses of an arm are unknown.
     """
+    spec, plants = world_spec(cell, parts)
+    substeps = round(cell.period / spec.option.timestep)
+    plate = cell.contact.height is not None
+    return WorldModel(cell=cell, model=finish(spec, plants), substeps=substeps, parts=parts, plate=plate)
+
+
+def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantArm, ...]]:
+    """Return the world of a cell as a specification that has not been compiled yet, and its arms.
+
+    Arguments and errors are those of ``world_model``.
+    """
     assert len(cell.arms) <= _MAX_ARMS  # noqa: S101 - a limit of cell files
     substeps = math.ceil(cell.period / _MAX_STEP - 1e-9)
     spec = new_world(cell.gravity, cell.period / substeps)
@@ -87,9 +98,8 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     _add_floor(spec, cell, parts)
     for part in parts.values():
         _add_part(spec, part)
-    plate = _add_plate(spec, cell)
-    model = finish(spec, tuple(plants))
-    return WorldModel(cell=cell, model=model, substeps=substeps, parts=parts, plate=plate)
+    _add_plate(spec, cell)
+    return spec, tuple(plants)
 
 
 def arm_solids(arm: Arm, gripper: float) -> tuple[tuple[Solid, ...], ...]:
@@ -149,13 +159,13 @@ def _add_part(spec: Any, part: Part) -> None:
     add_geom(spec, body, part.name, Solid(shape=part.shape), mass=0.0, **bits, **_surface(part.friction))
 
 
-def _add_plate(spec: Any, cell: Cell) -> bool:
-    """Add the plane of contact of the cell: a light plate on a spring; return whether there is one."""
+def _add_plate(spec: Any, cell: Cell) -> None:
+    """Add the plane of contact of the cell, if there is one: a light plate on a spring."""
     import mujoco  # noqa: PLC0415 - only cells with several bodies need it
 
     plane = cell.contact
     if plane.height is None:
-        return False
+        return
     plate = spec.worldbody.add_body(name=PLATE, pos=(0.0, 0.0, plane.height), gravcomp=1.0)
     plate.explicitinertial, plate.mass, plate.inertia = True, _PLATE_MASS, (1.0, 1.0, 1.0)
     plate.add_joint(
@@ -176,7 +186,6 @@ def _add_plate(spec: Any, cell: Cell) -> bool:
         conaffinity=_PART | _HAND,
         **_furniture(0.8),
     )
-    return True
 
 
 def part_pose(data: Any, name: str) -> Array:
