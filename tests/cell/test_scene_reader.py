@@ -100,7 +100,8 @@ def test_grippers(tmp_path: Path) -> None:
         ('[parts.A]\nshape = "ball"\n', "expected one of box, cylinder, sphere, got the text 'ball'"),
         (
             "\n".join(
-                f"[parts.{name}]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\nmarker = {{ id = 7, size_mm = 9 }}"
+                f"[parts.{name}]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\n"
+                f"marker = {{ id = 7, size_mm = 9, at = {HERE} }}"
                 for name in "AB"
             ),
             "parts, B, marker, id: the parts A and B have the same marker 7",

@@ -204,8 +204,14 @@ def test_fingers_take_their_time(tmp_path: Path) -> None:
     """Opening and closing take as long as the cell file says, and 0.3 s where it says nothing."""
     hardware = Simulator(bench(tmp_path))
 
-    assert (hardware.move_fingers("ARM_1", 0.0, closed=False), hardware.move_fingers("ARM_1", 0.0, closed=True)) == (0.2, 0.5)
-    assert (hardware.move_fingers("ARM_2", 0.0, closed=False), hardware.move_fingers("ARM_2", 0.0, closed=True)) == (0.3, 0.3)
+    assert (hardware.move_fingers("ARM_1", 0.0, closed=False), hardware.move_fingers("ARM_1", 0.0, closed=True)) == (
+        0.2,
+        0.5,
+    )
+    assert (hardware.move_fingers("ARM_2", 0.0, closed=False), hardware.move_fingers("ARM_2", 0.0, closed=True)) == (
+        0.3,
+        0.3,
+    )
 
 
 def test_a_start_that_does_not_fit_the_arm(tmp_path: Path) -> None:

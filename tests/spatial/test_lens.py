@@ -29,3 +29,26 @@ def test_rays_undo_projection(rng: np.random.Generator) -> None:
     rays = lens.rays(lens.project(points))
 
     np.testing.assert_allclose(rays, points / points[:, 2:], atol=ROUNDING)
+
+
+def test_the_field_of_a_lens(rng: np.random.Generator) -> None:
+    """No pixel shows a direction outside of the field, and pixels of the rim show its bounds."""
+    lens = simple_lens(640, 480, np.radians(50), (-0.2, 0.03, 0.002, -0.001, 0.0))
+    inner = lens.rays(rng.uniform([-0.5, -0.5], [639.5, 479.5], (500, 2)))[:, :2]
+
+    least, most = lens.field()
+
+    assert (inner > least).all()
+    assert (inner < most).all()
+    flat = simple_lens(640, 480, np.radians(90)).field()
+    np.testing.assert_allclose(flat, [[-4 / 3, -1], [4 / 3, 1]], atol=ROUNDING)
+
+
+def test_a_lens_that_folds_the_picture() -> None:
+    """With k1 = -1, r (1 - r²) has its largest value at r = 0.577: pixels beyond that show nothing."""
+    most = 0.5773 * (1 - 0.5773**2)
+
+    for reach, whole in ((0.99 * most, True), (1.01 * most, False)):
+        focal = np.hypot(320, 240) / reach
+        lens = Lens(width=640, height=480, focal=(focal, focal), centre=(319.5, 239.5), distortion=(-1, 0, 0, 0, 0))
+        assert lens.is_invertible() == whole

@@ -13,9 +13,11 @@ from armwright.spatial.shapes import (
     Shape,
     Sphere,
     centroid,
+    contains,
     farthest,
     inertia,
     is_closed,
+    support,
     volume,
 )
 
@@ -58,6 +60,20 @@ def test_random_points(shape: Shape, rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(centroid(shape), 0.0)
 
 
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
+def test_what_solids_contain(shape: Shape, rng: np.random.Generator) -> None:
+    """Random points are inside by their coordinates; in every direction the farthest of them is at its reach."""
+    far = farthest(shape)
+    points = rng.uniform(-far, far, size=(100_000, 3))
+    there = points[inside(shape, points)]
+
+    np.testing.assert_array_equal(contains(shape, points), inside(shape, points))
+    for direction in rng.normal(size=(20, 3)):
+        unit = direction / np.linalg.norm(direction)
+        assert (there @ unit).max() == pytest.approx(support(shape, unit), rel=0.1)
+        assert (there @ unit).max() <= support(shape, unit)
+
+
 def hull(points: np.ndarray) -> Mesh:
     """The convex hull of points as a mesh."""
     found = ConvexHull(points)
@@ -80,6 +96,18 @@ def test_mesh_of_a_box(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(centroid(mesh), away, atol=1e-12)
     np.testing.assert_allclose(inertia(mesh), inertia(box), atol=1e-12)
     assert farthest(mesh) == pytest.approx(np.linalg.norm(corners, axis=1).max())
+
+
+def test_what_meshes_contain(rng: np.random.Generator) -> None:
+    """A point is in a convex mesh where it is below all planes of its faces."""
+    points = rng.normal(size=(30, 3))
+    planes, tried = ConvexHull(points).equations, 1.5 * rng.normal(size=(1000, 3))
+    below = (tried @ planes[:, :3].T + planes[:, 3] < 0).all(axis=1)
+    direction = np.array([0.6, 0.0, 0.8])
+
+    np.testing.assert_array_equal(contains(hull(points), tried), below)
+    assert 100 < below.sum() < 900
+    assert support(hull(points), direction) == (points @ direction).max()
 
 
 def test_open_meshes(rng: np.random.Generator) -> None:

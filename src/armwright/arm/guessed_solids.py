@@ -23,28 +23,17 @@ def guessed_radii(arm: Arm) -> Array:
     return _RADIUS * length * np.linspace(1.0, _LAST, arm.n)
 
 
-def guessed_solids(arm: Arm, gripper: float = 0.0) -> tuple[tuple[Solid, ...], ...]:
+def guessed_solids(arm: Arm) -> tuple[tuple[Solid, ...], ...]:
     """Return capsules for each link, in its frame.
 
     A link begins on the axis of its joint, at the end of the shift along it, and ends at the origin of its frame; a
     slide begins where it is at its lower limit.
-
-    Args:
-        arm: the arm.
-        gripper: how far the solids of a gripper reach from the tool point back along a [m]; the last link ends there.
     """
     radii = guessed_radii(arm)
-    return tuple(
-        tuple(_along(arm, i, float(radii[i]), gripper)) or _ball(arm, i, float(radii[i]), gripper) for i in range(arm.n)
-    )
+    return tuple(tuple(_along(arm, i, float(radii[i]))) or (_ball(float(radii[i])),) for i in range(arm.n))
 
 
-def _ball(arm: Arm, i: int, radius: float, gripper: float) -> tuple[Solid, ...]:
-    """Return the ball of a link without length; none where a gripper is there instead."""
-    return () if i + 1 == arm.n and gripper else (Solid(shape=Sphere(radius=radius)),)
-
-
-def _along(arm: Arm, i: int, radius: float, gripper: float) -> list[Solid]:
+def _along(arm: Arm, i: int, radius: float) -> list[Solid]:
     """Return the capsules along the steps of one row of the table, in the frame of the link."""
     joint = arm.joints[i]
     behind = np.linalg.inv(joint.behind)
@@ -52,18 +41,7 @@ def _along(arm: Arm, i: int, radius: float, gripper: float) -> list[Solid]:
     foot = behind[:3, 3]
     shift = joint.d if joint.revolute else joint.d + float(np.clip(joint.limits.lower, -10.0, 10.0))
     corners = [foot - behind[:3, 2] * shift, foot, np.zeros(3)]
-    steps = list(pairwise(corners))
-    if i + 1 == arm.n and gripper:
-        steps = [_before(arm.tool, gripper + radius, a, b) for a, b in steps]
-    return [_capsule(a, b, radius) for a, b in steps if np.linalg.norm(b - a) > _SHORT * radius]
-
-
-def _before(tool: Array, room: float, a: Array, b: Array) -> tuple[Array, Array]:
-    """Return what of the line from one point to another is at least so far before the tool point [m]."""
-    ahead, towards = ((tool[:3, 3] - end) @ tool[:3, 2] - room for end in (a, b))
-    if ahead <= 0:
-        return a, a
-    return a, b if towards >= 0 else a + (b - a) * ahead / (ahead - towards)
+    return [_capsule(a, b, radius) for a, b in pairwise(corners) if np.linalg.norm(b - a) > _SHORT * radius]
 
 
 def _capsule(a: Array, b: Array, radius: float) -> Solid:
@@ -74,4 +52,8 @@ def _capsule(a: Array, b: Array, radius: float) -> Solid:
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)
     R = np.stack([x, np.cross(z, x), z], axis=1)
-    return Solid(shape=Capsule(radius=radius, length=length), pose=homogeneous(R, (a + b) / 2))
+    return Solid(shape=Capsule(radius=radius, length=length), pose=homogeneous(R, (a + b) / 2), guessed=True)
+
+
+def _ball(radius: float) -> Solid:
+    return Solid(shape=Sphere(radius=radius), guessed=True)

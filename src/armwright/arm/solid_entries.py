@@ -26,7 +26,8 @@ def solids_in(table: Table, key: str) -> tuple[Solid, ...]:
 
 
 def _solid(entry: Table) -> Solid:
-    solid = Solid(shape=shape_in(entry, entry.choice("kind", KINDS)), pose=typed_pose(entry).X)
+    shape = shape_in(entry, entry.choice("kind", KINDS))
+    solid = Solid(shape=shape, pose=typed_pose(entry).X, guessed=entry.flag("guess"))
     entry.refuse_unknown_keys()
     return solid
 

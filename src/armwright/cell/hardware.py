@@ -1,8 +1,11 @@
 """The protocol by which the interpreter controls a cell, simulated or real."""
 
-from typing import NamedTuple, Protocol, Self, runtime_checkable
+from collections.abc import Callable
+from typing import NamedTuple, Protocol, Self, TypeAlias, runtime_checkable
 
 from armwright.arrays import Array
+from armwright.cell.model import Cell
+from armwright.cell.observations import Observations
 from armwright.cell.part_poses import PartPoses
 from armwright.errors import ArmwrightError
 from armwright.motion.trajectory import Trajectory
@@ -122,6 +125,9 @@ class Hardware(Protocol):
             DeviceError: nothing was found.
         """
 
+    def observations(self) -> Observations:
+        """Return what the cell leaves of the run up to now."""
+
     def active_devices(self) -> frozenset[str]:
         """Return the devices that are on."""
 
@@ -132,3 +138,7 @@ class SimulatedHardware(Hardware, Protocol):
 
     def copy(self) -> Self:
         """Return devices in the same state; later commands to one do not change the other."""
+
+
+# How a cell is set up to run programs.
+HardwareFactory: TypeAlias = Callable[[Cell], SimulatedHardware]

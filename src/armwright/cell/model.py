@@ -11,7 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
-from armwright.cell.scene import Fixture, Gripper, Part
+from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import one_pose
@@ -95,7 +95,9 @@ class Cell:
         frames: by name, in upper case.
         fixtures: bodies that stand where they are, by name.
         parts: bodies that grippers hold and move, by name.
-        seen_parts: by frame name, the part whose grasp pose the camera answers with.
+        markers: of the scene, by name, with their poses in the world.
+        cameras: that take pictures, by name.
+        sights: by frame name, what a camera looks for: parts, and markers of the scene.
         visions: other answers of the camera by frame name, in order, (4, 4) relative to the camera.
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
@@ -106,6 +108,7 @@ class Cell:
         deviation: allowed distance from straight lines [m].
         corner: how far a path past several frames may be from the straight legs between them [m]; 20 deviations by
             default, see ``corner_deviation``.
+        clearance: distance to other bodies below which a stage of a MOVE gets a warning [m]; 0 for none.
         period: of the servo [s].
         around: the kind of detour of an infeasible straight line, by ``via`` poses or ``damped`` least squares; None
             for no detour.
@@ -117,7 +120,9 @@ class Cell:
     frames: Mapping[str, Node] = attrs.field(factory=dict)
     fixtures: Mapping[str, Fixture] = attrs.field(factory=dict)
     parts: Mapping[str, Part] = attrs.field(factory=dict)
-    seen_parts: Mapping[str, str] = attrs.field(factory=dict)
+    markers: Mapping[str, Marker] = attrs.field(factory=dict)
+    cameras: Mapping[str, Camera] = attrs.field(factory=dict)
+    sights: Mapping[str, Sight] = attrs.field(factory=dict)
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False
@@ -127,6 +132,7 @@ class Cell:
     vision_time: float = 0.1
     deviation: float = 1e-3
     corner: float | None = None
+    clearance: float = 0.0
     period: float = 1e-3
     around: Around | None = None
 
@@ -139,9 +145,24 @@ class Cell:
         object.__setattr__(self, "arms", arms)
 
     @property
+    def seen_parts(self) -> Mapping[str, str]:
+        """By frame name, the part whose grasp pose a camera answers with."""
+        return {name: sight.name for name, sight in self.sights.items() if sight.kind == "part"}
+
+    @property
     def corner_deviation(self) -> float:
         """How far a path past several frames may be from the straight legs between them [m]."""
         return _CORNER_DEVIATIONS * self.deviation if self.corner is None else self.corner
+
+    @property
+    def seen_frames(self) -> frozenset[str]:
+        """The frames that the camera has answers for."""
+        return frozenset({*self.visions, *self.sights})
+
+    @property
+    def collisions_matter(self) -> bool:
+        """Whether there is anything in the cell that an arm could run into: fixtures, parts or another arm."""
+        return bool(self.fixtures or self.parts) or len(self.arms) > 1
 
     def tree(self) -> FrameTree:
         """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.

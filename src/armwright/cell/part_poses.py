@@ -139,6 +139,11 @@ class PartPoses:
         self._openings[arm] = opening if width is None else min(width, opening)
         return parts
 
+    def see(self, part: str, pose: Array, now: float) -> None:
+        """Take note that a part which no arm holds stands at a pose (4, 4) in the world."""
+        if self.carrier(part) is None:
+            self._put(part, None, pose, now)
+
     def _put(self, part: str, arm: str | None, pose: Array, now: float) -> None:
         track = self._tracks[part]
         # Of the same moment the last counts.

@@ -1,7 +1,7 @@
 """Cell files: TOML for people, JSON for programs, with the same content."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import attrs
@@ -11,12 +11,13 @@ from armwright.arm.load import is_path, load_arm
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array
+from armwright.cell.camera_reader import read_cameras, read_visions, refuse_hidden_markers
 from armwright.cell.control_reader import read_alarms, read_force_sensor, read_plant, read_sensors, read_servo
-from armwright.cell.entries import ARM_NAME, read_name, read_pose, refuse_too_many, to_pose
+from armwright.cell.entries import ARM_NAME, read_name, read_pose, refuse_too_many
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane
 from armwright.cell.names import arm_name
-from armwright.cell.scene_reader import read_fixtures, read_gripper, read_parts
+from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
@@ -37,6 +38,8 @@ SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
 # Corner deviations: below a hundredth of a millimetre the arm would stop.
 CORNER_MM = (1e-2, 1e3)
+# Distances to other bodies that can be asked for: larger ones are not looked for.
+CLEARANCE_MM = (0.0, 50.0)
 # The kind of detour of a straight line, by its word in the file.
 DETOURS: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
 # What the camera finds after its last answer, by its word in the file.
@@ -62,8 +65,11 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
-    fixtures, parts = read_fixtures(top.table("scene")), read_parts(top.table("parts"))
-    seen_parts, visions = _read_visions(top.table("visions"), parts)
+    scene = top.table("scene")
+    fixtures, parts, markers = read_fixtures(scene), read_parts(top.table("parts")), read_markers(scene)
+    refuse_hidden_markers(top, fixtures, parts, markers)
+    cameras = read_cameras(camera, top.table("cameras"), arms)
+    sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
@@ -71,7 +77,9 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         frames=_read_frames(top.table("frames"), arms),
         fixtures=fixtures,
         parts=parts,
-        seen_parts=seen_parts,
+        markers=markers,
+        cameras=cameras,
+        sights=sights,
         visions=visions,
         camera=read_pose(camera, "pose", default=np.eye(4)),
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
@@ -86,6 +94,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
         corner=_optional_number(motion, "corner_mm", 1e-3, *CORNER_MM),
+        clearance=motion.number("clearance_mm", default=0.0, lower=CLEARANCE_MM[0], upper=CLEARANCE_MM[1]) * 1e-3,
         around=DETOURS[motion.choice("around", DETOURS, default="none")],
     )
     top.allow("devices")
@@ -238,27 +247,6 @@ def _path_to_root(name: str, frames: Mapping[str, Node], max_depth: int) -> list
         path[parent] = None
         parent = frames[parent].parent
     return list(path)
-
-
-def _read_visions(table: Table, parts: Collection[str]) -> tuple[dict[str, str], dict[str, tuple[Array, ...]]]:
-    """Read what the camera answers by frame: the part that it finds, or a list of poses."""
-    refuse_too_many(table, "entries")
-    seen: dict[str, str] = {}
-    visions: dict[str, tuple[Array, ...]] = {}
-    for key in table:
-        name = read_name(table, key, {*seen, *visions})
-        if table.is_table(key):
-            entry = table.table(key)
-            part = seen[name] = entry.text("part").upper()
-            if part not in parts:
-                near = closest(part, parts)
-                hint = f"; did you mean {near}?" if near else ""
-                raise entry.error("part", f"{part} is not a part of the cell{hint}")
-            entry.refuse_unknown_keys()
-        else:
-            poses = enumerate(table.vectors(key, 12))
-            visions[name] = tuple(to_pose(table, key, numbers, index) for index, numbers in poses)
-    return seen, visions
 
 
 def _read_devices(table: Table) -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""What stands and lies in a cell: furniture, parts with their markers, and grippers."""
+"""What stands and lies in a cell: furniture, parts with their markers, grippers and cameras."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.spatial.lens import Lens
 from armwright.spatial.poses import one_pose
 from armwright.spatial.shapes import Box, Shape
 
 GripperKind: TypeAlias = Literal["fingers", "suction"]
+SightKind: TypeAlias = Literal["part", "marker"]
 
-# The name of the body of a table.
-TABLE = "TABLE"
+# The name of the body of a table, and of the camera of a cell with one.
+TABLE, CAMERA = "TABLE", "CAMERA"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -36,12 +38,12 @@ class Fixture:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Marker:
-    """A square marker of the dictionary 4X4_50 of ArUco, on a part.
+    """A square marker of the dictionary 4X4_50 of ArUco, on a part or in the world.
 
     Attributes:
         number: which one of the dictionary.
         size: length of the sides of its black square [m].
-        pose: (4, 4) on the part: its centre, x to the right and y up as it is looked at, z out of it.
+        pose: (4, 4) on the part or in the world: its centre, x to the right and y up as it is looked at, z out of it.
     """
 
     number: int
@@ -104,6 +106,47 @@ class Gripper:
     force: float = 30.0
     opening: float = 0.08
     friction: float = 1.0
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Camera:
+    """A camera that takes pictures.
+
+    Attributes:
+        name: in messages, such as ``TOP``.
+        lens: size of its pictures, focal lengths and distortion.
+        pose: (4, 4) in the world, or in the tool frame of the arm that carries it: x to the right in the picture, y
+            down, z forward.
+        on: the arm that carries it; None where it stands.
+        noise: standard deviation of its pixels, of 255.
+        light: part of the light that it gets, from 0 (darkness) to 1.
+    """
+
+    name: str
+    lens: Lens
+    pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+    on: str | None = None
+    noise: float = 0.0
+    light: float = 1.0
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Sight:
+    """What a camera looks for when a program asks for a frame.
+
+    Attributes:
+        kind: whether the frame is on a part or at a marker of the scene.
+        name: of the part or of the marker.
+        camera: that looks; None where the cell has no camera that takes pictures.
+        height: at which the part stands or the marker lies [m]; None where nothing is known of that.
+        relation: (4, 4) pose of the frame on the part or at the marker.
+    """
+
+    kind: SightKind
+    name: str
+    camera: str | None
+    height: float | None
+    relation: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
 
 
 def table(z: float, corner: Array, opposite: Array, thickness: float, friction: float) -> Fixture:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from armwright.arm.solid_entries import shape_in
-from armwright.cell.entries import read_name, read_pose, refuse_too_many
+from armwright.cell.entries import read_name, read_pose, read_whole, refuse_too_many
 from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, Spread, table
 from armwright.files.document import Table
 from armwright.spatial.shapes import LARGEST_SIZE
@@ -41,8 +41,25 @@ def read_fixtures(scene: Table) -> dict[str, Fixture]:
             )
             entry.refuse_unknown_keys()
         scene.allow(kind)
+    scene.allow("markers")
     scene.refuse_unknown_keys()
     return fixtures
+
+
+def read_markers(scene: Table) -> dict[str, Marker]:
+    """Read the markers that lie in the world, by name.
+
+    Raises:
+        FileFormatError: a key is unknown, missing or out of range, or a name or a number occurs twice.
+    """
+    markers: dict[str, Marker] = {}
+    numbers: dict[int, str] = {}
+    for entry in scene.tables("markers") if "markers" in scene else ():
+        name = read_name(entry, "name", markers, entry.text("name"))
+        markers[name] = _marker(entry)
+        if (other := numbers.setdefault(markers[name].number, name)) != name:
+            raise entry.error("id", f"{other} and {name} have the same marker {markers[name].number}")
+    return markers
 
 
 def _table(entry: Table) -> Fixture:
@@ -93,7 +110,7 @@ def read_parts(parts: Table) -> dict[str, Part]:
             ),
             grasp=read_pose(entry, "grasp", np.eye(4)),
             marker=marker,
-            symmetry=_whole(entry, "symmetry", 1, _MAX_SYMMETRY, default=1),
+            symmetry=read_whole(entry, "symmetry", 1, _MAX_SYMMETRY, default=1),
         )
         entry.refuse_unknown_keys()
     return result
@@ -101,9 +118,9 @@ def read_parts(parts: Table) -> dict[str, Part]:
 
 def _marker(entry: Table) -> Marker:
     marker = Marker(
-        number=_whole(entry, "id", 0, _MARKERS - 1),
+        number=read_whole(entry, "id", 0, _MARKERS - 1),
         size=entry.number("size_mm", lower=1.0, upper=1e4) * 1e-3,
-        pose=read_pose(entry, "at", np.eye(4)),
+        pose=read_pose(entry, "at"),
     )
     entry.refuse_unknown_keys()
     return marker
@@ -127,15 +144,3 @@ def read_gripper(entry: Table) -> Gripper:
 
 def _friction(entry: Table, default: float = 0.8) -> float:
     return entry.number("friction", default=default, lower=0.0, upper=_MAX_FRICTION)
-
-
-def _whole(entry: Table, key: str, least: int, most: int, *, default: int | None = None) -> int:
-    """Read a whole number."""
-    number = (
-        entry.number(key, lower=least, upper=most)
-        if default is None
-        else entry.number(key, default=default, lower=least, upper=most)
-    )
-    if number != round(number):
-        raise entry.error(key, f"expected a whole number, got {number:g}")
-    return round(number)

@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.hardware import DeviceError, PeakContact
 from armwright.cell.model import Cell
+from armwright.cell.observations import Observations
 from armwright.cell.part_poses import PartPoses
 from armwright.errors import closest, counted
 from armwright.kinematics.forward_kinematics import forward
@@ -258,6 +259,10 @@ class Simulator:
         """Return where the parts are, and on whose hands. It is not to be changed."""
         return self._parts
 
+    def observations(self) -> Observations:
+        """Return where the parts were."""
+        return Observations(parts=self._parts.tracks)
+
     def _hands(self, now: float) -> dict[str, Array]:
         """Return the pose (4, 4) of each hand in the world."""
         return {
@@ -267,15 +272,19 @@ class Simulator:
     def locate(self, frame: str, now: float) -> tuple[Array, float]:
         """Return the next answer of the camera for a frame, in the world, and the time it takes.
 
-        Of a frame that stands for a part it is the grasp pose of this part, where it is now. The answers of the cell
-        file come one after the other; where it states so, the last one is repeated.
+        Of a frame that stands for a part it is the grasp pose of this part, where it is now; a marker of the scene is
+        where it is. The answers of the cell file come one after the other; where it states so, the last one is
+        repeated.
 
         Raises:
             DeviceError: the cell file has no answer for this frame, or no more.
         """
-        if (part := self._cell.seen_parts.get(frame)) is not None:
-            X_WP = self._parts.in_world(part, self._hands(now))
-            return X_WP @ self._cell.parts[part].grasp, self._cell.vision_time
+        sight = self._cell.sights.get(frame)
+        if sight is not None and sight.kind == "marker":
+            return self._cell.markers[sight.name].pose @ sight.relation, self._cell.vision_time
+        if sight is not None:
+            X_WP = self._parts.in_world(sight.name, self._hands(now))
+            return X_WP @ self._cell.parts[sight.name].grasp, self._cell.vision_time
         answers = self._answers.get(frame)
         if not answers:
             if count := len(self._cell.visions.get(frame, ())):
@@ -284,7 +293,7 @@ class Simulator:
                     f"{counted(count, 'answer')} for it; "
                     'with `after_last = "same"` under [camera] the last one stays'
                 )
-            known = ", ".join(sorted({*self._answers, *self._cell.seen_parts})) or "nothing"
+            known = ", ".join(sorted({*self._answers, *self._cell.sights})) or "nothing"
             raise DeviceError(f"the camera found nothing for {frame}; in cell '{self._cell.name}' it finds {known}")
         last = self._cell.camera_repeats and len(answers) == 1
         answer = answers[0] if last else answers.pop(0)

@@ -123,11 +123,11 @@ class Table:
             raise self.error(key, f"expected a whole number, got {value:g}")
         return round(value)
 
-    def flag(self, key: str, default: Any = _MISSING) -> bool:
+    def flag(self, key: str, *, default: bool = False) -> bool:
         """Return ``true`` or ``false``.
 
         Raises:
-            FileFormatError: it is missing without a default, or neither of them.
+            FileFormatError: it is neither of them.
         """
         value = self._value(key, default, "true or false")
         if not isinstance(value, bool):
@@ -175,6 +175,23 @@ class Table:
         value = self._value(key, _MISSING, "a list of texts in quotes")
         if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
             raise self.error(key, f"expected a list of texts in quotes, got {_value_text(value)}")
+        return value
+
+    def text_rows(self, key: str, length: int) -> list[list[str]]:
+        """Return a list of rows of that many strings each; an empty one when it is missing.
+
+        Raises:
+            FileFormatError: it is no such list, or longer than the limit of entries.
+        """
+        expected = f"a list of lists of {length} texts in quotes"
+        value = self._value(key, [], expected)
+        if not isinstance(value, list):
+            raise self.error(key, f"expected {expected}, got {_value_text(value)}")
+        if len(value) > limit("entries"):
+            raise self.error(key, f"too many: {limit_message('entries', len(value))}")
+        for i, row in enumerate(value):
+            if not isinstance(row, list) or len(row) != length or not all(isinstance(text, str) for text in row):
+                raise self.error(key, f"expected {length} texts in quotes, got {_value_text(row)}", i)
         return value
 
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
@@ -227,6 +244,10 @@ class Table:
     def is_table(self, key: str) -> bool:
         """Whether the value of a key is a table."""
         return isinstance(self._data.get(key), dict)
+
+    def is_text(self, key: str) -> bool:
+        """Whether the value of a key is a text."""
+        return isinstance(self._data.get(key), str)
 
     def allow(self, *keys: str) -> None:
         """Make optional keys known: ``refuse_unknown_keys`` may name them as the nearest to a misspelt one."""

@@ -71,7 +71,7 @@ def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str
             WRITTEN[named] = None
 
 
-def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> None:
+def write_file(path: Path, text: Content, *, back: bool = False) -> None:
     """Write one file, or leave what was there before. A link stays one, and so do its owner and who may read the file.
 
     A file that cannot be replaced is written where it stands: one that is mounted by itself, as into a container, one
@@ -80,7 +80,7 @@ def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> 
     Args:
         path: its folder is made where it is missing, with its parents. A device, a pipe or an open descriptor, such as
             ``/dev/stdout``, is written to as it is.
-        text: or pieces of it that are written as they come.
+        text: or pieces of it that are written as they come; or bytes.
         back: it may be a file that was read, and is to be changed.
 
     Raises:
@@ -99,8 +99,8 @@ def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> 
     with _make_parents(path, lambda error: f"cannot write '{path}': {error.strerror or error}"):
         there = path.stat() if path.exists() else None
         if there is not None and not stat.S_ISREG(there.st_mode) and not stat.S_ISDIR(there.st_mode):
-            with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as stream:
-                stream.writelines([text] if isinstance(text, str) else text)
+            with path.open("wb") as stream:
+                stream.writelines(_encode(text))
         elif there is not None and _must_overwrite(path, there):
             data = b"".join(_encode(text))
             with deferred_signals():
@@ -122,7 +122,7 @@ def descriptor(path: Path) -> int | None:
     return None
 
 
-def _write_to_descriptor(number: int, path: Path, text: str | Iterable[str]) -> None:
+def _write_to_descriptor(number: int, path: Path, text: Content) -> None:
     """Write into an open descriptor, behind what was printed so far."""
     try:
         sys.stdout.flush()
@@ -141,7 +141,7 @@ def _must_overwrite(path: Path, there: os.stat_result) -> bool:
     return there.st_nlink > 1 or not os.access(path.parent, os.W_OK | os.X_OK)
 
 
-def _write_beside(path: Path, named: Path, text: str | Iterable[str], there: os.stat_result | None) -> None:
+def _write_beside(path: Path, named: Path, text: Content, there: os.stat_result | None) -> None:
     """Write a file beside its place, and move it there.
 
     Args:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array
+from armwright.physics.gripper import LIP_TOUCHES
 from armwright.physics.world_model import FLOOR, PLATE, WorldModel
 
 # Parts, fixtures and arms that overlap by more at the start stand inside one another [m].
@@ -52,6 +54,10 @@ class Contacts:
         self._parts: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
         self._pads: dict[str, list[int]] = {name: [] for name in world.cell.arms}
         self._part_geoms = {name: world.model.geom(name).id for name in world.parts}
+        # What parts press with by their weight [N].
+        self._weights = np.zeros(world.model.ngeom)
+        for name, part in world.parts.items():
+            self._weights[self._part_geoms[name]] = part.mass * float(np.linalg.norm(world.cell.gravity))
         self._tools = {name: world.model.body(f"{name}/tool").id for name in world.cell.arms}
         for number in range(world.model.ngeom):
             self._add_geom(world, number)
@@ -68,10 +74,11 @@ class Contacts:
             return
         self._owners.append(arm)
         self._hand[number] = not (what.startswith(("link", "base")))
-        if what.endswith("pad") or what == "cup":
+        if what.endswith("finger") or what.startswith("lip"):
             self._pads[arm].append(number)
         label = what.partition("/")[0].replace("link", "link ")
-        self.names.append(f"{arm} {'finger' if what.endswith(('pad', 'finger')) else label}")
+        label = "finger" if what.endswith("finger") else "suction cup" if what.startswith("lip") else label
+        self.names.append(f"{arm} {label}")
 
     def hold(self, held: dict[str, str]) -> None:
         """Take note of what arms hold: parts by arm. What they hold belongs to them."""
@@ -86,7 +93,10 @@ class Contacts:
         self._holders = owners
 
     def unwanted(self, data: Any, least: float) -> Touch | None:
-        """Return the hardest contact of an arm with what it should not touch, of at least a force [N]."""
+        """Return the hardest contact of an arm with what it should not touch, of at least a force [N].
+
+        A part in the hand may press with its own weight beside: it stood on something before it was lifted.
+        """
         if not data.ncon:
             return None
         geoms = data.contact.geom
@@ -96,9 +106,9 @@ class Contacts:
         worst = None
         for number in np.flatnonzero(suspicious).tolist():
             force = self.force(data, number)
-            if force >= (least if worst is None else worst.force):
-                a, b = geoms[number].tolist()
-                mine, other = (a, b) if self._holders[a] != _UNOWNED else (b, a)
+            a, b = geoms[number].tolist()
+            mine, other = (a, b) if self._holders[a] != _UNOWNED else (b, a)
+            if force - self._weights[[a, b]].max() >= least and (worst is None or force > worst.force):
                 worst = Touch(str(self._holders[mine]), self.names[mine], self.names[other], force)
         return worst
 
@@ -111,17 +121,18 @@ class Contacts:
         return float(abs(force[0]))
 
     def gripped(self, data: Any, arm: str) -> str | None:
-        """Return the part that both pads of an arm touch, or that its cup does; None without one."""
+        """Return the part that both pads of an arm touch, or most of the lip of its cup; None without one."""
         if not data.ncon:
             return None
         geoms = data.contact.geom
-        touching: list[set[int]] = []
+        touches: Counter[int] = Counter()
         for pad in self._pads[arm]:
             first, second = geoms[:, 0] == pad, geoms[:, 1] == pad
             others = {*geoms[first, 1].tolist(), *geoms[second, 0].tolist()}
-            touching.append({other for other in others if self._parts[other]})
-        common = set.intersection(*touching) if touching else set()
-        return self.names[min(common)] if common else None
+            touches.update(other for other in others if self._parts[other])
+        needed = min(len(self._pads[arm]), LIP_TOUCHES)
+        held = min((other for other, count in touches.items() if count >= needed), default=None)
+        return None if held is None else self.names[held]
 
     def touches(self, data: Any, part: str) -> list[str]:
         """Return what a part touches."""

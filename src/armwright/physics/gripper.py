@@ -6,7 +6,7 @@ that is limited, so what they hold slides when its weight and inertia exceed wha
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,15 +14,14 @@ import numpy.typing as npt
 from armwright.arrays import Array
 from armwright.cell.scene import Gripper
 from armwright.physics.geoms import add_geom
+from armwright.physics.hand_solids import gripper_solids
 from armwright.spatial.poses import homogeneous
-from armwright.spatial.shapes import Box, Cylinder, Shape, Solid
+from armwright.spatial.shapes import Solid, Sphere
 
-# Half lengths of the pads along n, o and a of the tool [m].
-_PAD = np.array([0.01, 0.004, 0.015])
-# What carries the pads: their height, and that of the palm above the tool point [m].
-_BONE_LENGTH, _PALM_HEIGHT, _PALM = 0.07, 0.1, np.array([0.03, 0.0, 0.024])
-# A cup of suction: its radius and height [m].
-_CUP_RADIUS, _CUP_HEIGHT = 0.015, 0.02
+# The lip of a cup, as balls: their number, radius, and distance from its axis [m].
+LIP, _LIP_RADIUS, _LIP_DISTANCE = 4, 2e-3, 13e-3
+# A cup takes hold of what is so near [m], where so many balls touch a face so flat: by the cosine of its tilt.
+_NEAR, LIP_TOUCHES, _FLAT = 1e-3, 3, 0.99
 # Fingers weigh next to nothing: the model of the arm has the gripper among its own masses [kg], [kg m²].
 _FINGER_MASS, _FINGER_INERTIA = 5e-3, 1e-6
 # What the drive of a finger moves, and its damping; gains with which it is positioned.
@@ -34,49 +33,8 @@ _ROLLING = (0.005, 1e-4)
 _STIFF = (0.95, 0.99, 0.001, 0.5, 2.0)
 
 
-class GripperSolid(NamedTuple):
-    """A solid of a gripper in the frame of the tool, with its fingers open."""
-
-    name: str
-    solid: Solid
-
-
-def gripper_solids(gripper: Gripper) -> list[GripperSolid]:
-    """Return the solids of a gripper in the frame of the tool, with its fingers open."""
-    if gripper.kind == "suction":
-        return [GripperSolid("cup", _at(Cylinder(radius=_CUP_RADIUS, length=_CUP_HEIGHT), 0.0, -_CUP_HEIGHT / 2))]
-    solids = [GripperSolid("palm", _palm(gripper))]
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        shift = homogeneous(np.eye(3), (0.0, sign * gripper.opening / 2, 0.0))
-        solids += [GripperSolid(f"{side} finger", solid.moved(shift)) for solid in _finger(sign)]
-    return solids
-
-
-def gripper_length(gripper: Gripper) -> float:
-    """Return how far a gripper reaches from the tool point back along a [m]."""
-    return _CUP_HEIGHT if gripper.kind == "suction" else _PALM_HEIGHT + float(_PALM[2])
-
-
-def _at(shape: Shape, y: float, z: float) -> Solid:
-    return Solid(shape=shape, pose=homogeneous(np.eye(3), (0.0, y, z)))
-
-
-def _palm(gripper: Gripper) -> Solid:
-    size = np.array([_PALM[0], gripper.opening + 8 * _PAD[1], _PALM[2]])
-    return _at(Box(size=size), 0.0, -_PALM_HEIGHT - _PALM[2] / 2)
-
-
-def _finger(sign: float) -> list[Solid]:
-    """Return the pad of a finger, and what carries it."""
-    bone = np.array([0.016, 2 * _PAD[1], _BONE_LENGTH])
-    return [
-        _at(Box(size=2 * _PAD), sign * _PAD[1], -_PAD[2]),
-        _at(Box(size=bone), sign * 2 * _PAD[1], -2 * _PAD[2] - _BONE_LENGTH / 2),
-    ]
-
-
 def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: float, **geoms: Any) -> None:
-    """Add a gripper to the tool of an arm: bodies ``NAME/left`` and ``NAME/right``, or a geom ``NAME/cup``.
+    """Add a gripper to the tool of an arm: bodies ``NAME/left`` and ``NAME/right``, or geoms of a cup.
 
     Args:
         spec: of the world.
@@ -92,29 +50,32 @@ def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: flo
         # The stiffest that MuJoCo lets pass: held parts slip by less the stiffer the contact is while a carry turns.
         "solref": (2 * timestep, 1.0),
         "solimp": _STIFF,
+        "priority": 1,
     }
     if gripper.kind == "suction":
         _add_cup(spec, name, tool, gripper, geoms | pads)
         return
-    add_geom(spec, tool, f"{name}/palm", _palm(gripper), mass=0.0, **geoms)
-    for side, sign in (("left", 1.0), ("right", -1.0)):
+    left, right, palm = gripper_solids(gripper, 0.0)
+    add_geom(spec, tool, f"{name}/palm", Solid(shape=palm.shape, pose=palm.pose), mass=0.0, **geoms)
+    for side, sign, pad in (("left", 1.0, left), ("right", -1.0, right)):
         finger = _add_finger(spec, tool, f"{name}/{side}", sign, gripper)
-        pad, bone = _finger(sign)
-        add_geom(spec, finger, f"{name}/{side} pad", pad, **{**geoms, **pads, "priority": 1, "mass": 0.0})
-        add_geom(spec, finger, f"{name}/{side} finger", bone, mass=0.0, **geoms)
+        solid = Solid(shape=pad.shape, pose=pad.pose)
+        add_geom(spec, finger, f"{name}/{side} finger", solid, mass=0.0, **geoms | pads)
     _couple(spec, name)
 
 
 def _add_cup(spec: Any, name: str, tool: Any, gripper: Gripper, options: dict[str, Any]) -> None:
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
-    # A body of its own, which pulls on what it touches.
-    body = tool.add_body(name=f"{name}/cup")
-    (cup,) = gripper_solids(gripper)
-    add_geom(spec, body, f"{name}/cup", cup.solid, mass=0.0, **options)
-    pull = spec.add_actuator(name=f"{name}/suction", target=f"{name}/cup", trntype=mujoco.mjtTrn.mjTRN_BODY)
-    pull.set_to_adhesion(gain=gripper.force)
-    pull.ctrlrange = (0.0, 1.0)
+    """Add a cup, which stands a little behind its lip."""
+    behind = homogeneous(np.eye(3), (0.0, 0.0, -_LIP_RADIUS))
+    for it in gripper_solids(gripper, 0.0):
+        part = it.name.removeprefix("suction ")
+        add_geom(spec, tool, f"{name}/{part}", Solid(shape=it.shape, pose=behind @ it.pose), mass=0.0, **options)
+    for i in range(LIP):
+        angle = 2 * np.pi * i / LIP
+        where = (_LIP_DISTANCE * np.cos(angle), _LIP_DISTANCE * np.sin(angle), -_LIP_RADIUS)
+        ball = Solid(shape=Sphere(radius=_LIP_RADIUS), pose=homogeneous(np.eye(3), where))
+        # What is in the gap is pulled at, and does not push.
+        add_geom(spec, tool, f"{name}/lip{i}", ball, mass=0.0, gap=_NEAR, **options)
 
 
 def _add_finger(spec: Any, tool: Any, name: str, sign: float, gripper: Gripper) -> Any:
@@ -123,6 +84,7 @@ def _add_finger(spec: Any, tool: Any, name: str, sign: float, gripper: Gripper) 
 
     finger = tool.add_body(name=name, gravcomp=1.0)
     finger.explicitinertial, finger.mass, finger.inertia = True, _FINGER_MASS, (_FINGER_INERTIA,) * 3
+    finger.ipos = np.zeros(3)
     slide = finger.add_joint(
         name=name,
         type=mujoco.mjtJoint.mjJNT_SLIDE,
@@ -158,13 +120,20 @@ class GripperDrive:
     def __init__(self, model: Any, name: str, gripper: Gripper) -> None:
         """Begin with the fingers open."""
         self.gripper = gripper
-        sides = ("suction",) if gripper.kind == "suction" else ("left", "right")
-        self._actuators: npt.NDArray[np.intp] = np.array([model.actuator(f"{name}/{side}").id for side in sides])
+        sides = () if gripper.kind == "suction" else ("left", "right")
+        self._actuators: npt.NDArray[np.intp] = np.array(
+            [model.actuator(f"{name}/{side}").id for side in sides], dtype=np.intp
+        )
         self._fingers = gripper.kind == "fingers"
         self.positions: npt.NDArray[np.intp] = np.array([], dtype=np.intp)
         if self._fingers:
             self.positions = np.array([model.joint(f"{name}/{side}").qposadr[0] for side in sides])
         self._addresses: list[int] = self.positions.tolist() if self._fingers else []
+        lip = () if self._fingers else range(LIP)
+        self._lip = np.array([model.geom(f"{name}/lip{i}").id for i in lip], dtype=np.intp)
+        self._tool, self._bodies = model.body(f"{name}/tool").id, model.geom_bodyid
+        # The body that a cup pulls at; none yet.
+        self._pulled = -1
         self._from = self._to = gripper.opening / 2 if self._fingers else 0.0
         self._tick, self._ticks = 0, 0
 
@@ -177,7 +146,7 @@ class GripperDrive:
         """Open the fingers of a new world."""
         if self._fingers:
             data.qpos[self.positions] = self._to
-        data.ctrl[self._actuators] = self._to
+            data.ctrl[self._actuators] = self._to
 
     def send(self, data: Any, *, closed: bool, width: float | None, ticks: int) -> None:
         """Send the fingers to a width within so many steps, or altogether."""
@@ -192,9 +161,35 @@ class GripperDrive:
 
     def step(self, data: Any) -> None:
         """Command the next step."""
-        if self._tick < self._ticks:
+        if not self._fingers:
+            self._pull(data)
+        elif self._tick < self._ticks:
             self._tick += 1
             data.ctrl[self._actuators] = self._from + (self._to - self._from) * self._tick / self._ticks
+
+    def _pull(self, data: Any) -> None:
+        """Pull at what the cup lies on with a flat face."""
+        if self._pulled >= 0:
+            data.xfrc_applied[[self._pulled, self._tool]] = 0.0
+        self._pulled = self._under(data) if self._to else -1
+        if self._pulled < 0:
+            return
+        force = -self.gripper.force * data.xmat[self._tool].reshape(3, 3)[:, 2]
+        for body, pull in ((self._pulled, force), (self._tool, -force)):
+            # Forces are applied at centres of mass.
+            lever = data.xpos[self._tool] - data.xipos[body]
+            data.xfrc_applied[body] = *pull, *np.cross(lever, pull)
+
+    def _under(self, data: Any) -> int:
+        """Return the body on a flat face of which a cup lies; -1 where there is none."""
+        pairs = data.contact.geom
+        lips = np.isin(pairs, self._lip)
+        axis = data.xmat[self._tool].reshape(3, 3)[:, 2]
+        flat = lips.any(axis=1) & (np.abs(data.contact.frame[:, :3] @ axis) > _FLAT)
+        if int(flat.sum()) < LIP_TOUCHES:
+            return -1
+        others = self._bodies[np.where(lips[flat, 0], pairs[flat, 1], pairs[flat, 0])]
+        return int(others[0]) if (others == others[0]).all() else -1
 
     def opening(self, data: Any) -> float:
         """Return the distance between the fingers [m]; 0 for suction."""

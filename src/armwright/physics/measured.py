@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import attrs
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell
+from armwright.cell.observations import MeasuredStream
 from armwright.cell.part_poses import PartTrack
 from armwright.physics.servo import Measured, Reference
 from armwright.physics.world_model import WorldModel, part_pose
@@ -18,29 +18,6 @@ _BLOCK = 1024
 # Poses of parts are kept so often [s].
 _PARTS = 0.02
 _STILL = 1e-5
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class MeasuredStream:
-    """What the servo of an arm measured at its ticks.
-
-    Attributes:
-        arm: its name.
-        t: (k,) times [s].
-        q: (k, n) joint positions [rad] or [m].
-        qd: (k, n) joint speeds.
-        tau: (k, n) efforts of the motors [N m] or [N].
-        sent: (k, n) joint positions that the arm was sent to.
-        opening: (k,) distance between the fingers [m].
-    """
-
-    arm: str
-    t: Array
-    q: Array
-    qd: Array
-    tau: Array
-    sent: Array
-    opening: Array
 
 
 class Log:

@@ -17,6 +17,7 @@ from armwright.arm.positions import known_arm
 from armwright.cell.model import Cell
 from armwright.cell.scene import Gripper
 from armwright.dynamics.inertia_matrix import mass_matrix
+from armwright.physics.cell_bodies import arm_bodies, has_solids
 from armwright.physics.mjcf_text import spec_text
 from armwright.physics.plant import PlantArm, add_arm, arm_indices, new_world
 from armwright.physics.world_model import world_spec
@@ -57,8 +58,9 @@ def arm_mjcf(arm: Arm) -> MjcfFile:
     """
     refuse_names_beyond_xml(known_arm(arm))
     spec = new_world(arm.gravity, _TIMESTEP)
-    solids = (arm.base_solids, *(link.solids for link in arm.links))
-    plant = add_arm(spec, "arm", arm, np.eye(4), solids, **_ARM_BITS)
+    # Solids that are guessed are not written.
+    bodies = [body for body in arm_bodies("arm", arm) if has_solids(arm) or body.link == 0]
+    plant = add_arm(spec, "arm", arm, np.eye(4), bodies, **_ARM_BITS)
     _set_one_sided_limits(spec, plant)
     lost = _lost_of_arm(arm, spec, plant)
     text = spec_text(spec, arm.name, _comment(lost), _Names(plant).rename)
@@ -74,7 +76,8 @@ def cell_mjcf(cell: Cell) -> MjcfFile:
     """
     for cell_arm in cell.arms.values():
         refuse_names_beyond_xml(cell_arm.arm)
-    spec, plants = world_spec(cell, cell.parts)
+    # Cameras and markers are pictures.
+    spec, plants = world_spec(attrs.evolve(cell, cameras={}), cell.parts)
     lost: list[str] = []
     for plant in plants:
         _set_one_sided_limits(spec, plant)
@@ -142,9 +145,10 @@ def _lost_of_arm(arm: Arm, spec: Any, plant: PlantArm) -> list[str]:
     changed = [inertia for inertia in plant.inertias if inertia.changed]
     for inertia in changed:
         moments, padded = (", ".join(f"{x:.3g}" for x in values) for values in (inertia.moments, inertia.padded))
+        mass = float(spec.body(inertia.body).mass)
         lost.append(
-            f"{_short(inertia.body)}: no body has a mass of {inertia.mass:g} kg and principal moments of {moments} kg m²; "
-            f"in the file they are {float(spec.body(inertia.body).mass):g} kg and {padded} kg m²"
+            f"{_short(inertia.body)}: no body has a mass of {inertia.mass:g} kg and principal moments of {moments} "
+            f"kg m²; in the file they are {mass:g} kg and {padded} kg m²"
         )
     if changed:
         error = _mass_matrix_error(arm, spec, plant.name)
@@ -184,6 +188,7 @@ def _lost_of_cell(cell: Cell) -> list[str]:
     kinds: Mapping[str, object] = {
         "the frames": cell.frames,
         "the answers of the camera": cell.visions or cell.seen_parts,
+        "the cameras and markers": cell.cameras or cell.markers,
         "the devices": cell.devices,
     }
     lost = [f"{name} are not in the file" for name, content in kinds.items() if content]

@@ -131,8 +131,15 @@ def _set(element: Element, item: Any, plain: Any, attributes: Iterable[str], muj
     for attribute in attributes:
         field = _SPEC_NAMES.get(attribute, attribute)
         value, usual = getattr(item, field), getattr(plain, field)
-        if not np.array_equal(np.asarray(value), np.asarray(usual)):
+        if not _same(value, usual):
             element.set(attribute, _text(attribute, value, mujoco))
+
+
+def _same(value: Any, usual: Any) -> bool:
+    """Whether two members of an enumeration are one, or all numbers are the same; what nobody has set is no number."""
+    if hasattr(value, "name"):
+        return bool(value == usual)
+    return np.array_equal(np.asarray(value, dtype=np.float64), np.asarray(usual, dtype=np.float64), equal_nan=True)
 
 
 def _text(attribute: str, value: Any, mujoco: Any) -> str:

@@ -6,6 +6,7 @@ are known. Such bodies are compiled with more inertia, and get their own afterwa
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import attrs
@@ -17,9 +18,9 @@ from armwright.arrays import Array
 from armwright.dynamics.arguments import weighed
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import link_poses
+from armwright.physics.clearance import Body
 from armwright.physics.geoms import add_geom, place, quaternion
 from armwright.spatial.poses import inverse
-from armwright.spatial.shapes import Solid
 
 # What MuJoCo's compiler takes as the least [kg], [kg m²].
 _LEAST_MASS, _LEAST_MOMENT = 1e-6, 1e-6
@@ -113,9 +114,7 @@ def finish(spec: Any, arms: tuple[PlantArm, ...]) -> Any:
     return model
 
 
-def add_arm(
-    spec: Any, name: str, arm: Arm, base: Array, solids: tuple[tuple[Solid, ...], ...] = (), **geoms: Any
-) -> PlantArm:
+def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] = (), **geoms: Any) -> PlantArm:
     """Add an arm to a world: bodies ``NAME/link1``, joints ``NAME/joint1``, motors ``NAME/motor1``, body ``NAME/tool``.
 
     Args:
@@ -123,7 +122,7 @@ def add_arm(
         name: of the arm.
         arm: the model, with n joints.
         base: (4, 4) pose of its base frame in the world.
-        solids: of the base, in its frame, and of the n links, in theirs; none without.
+        bodies: its solids; none without.
         geoms: options of their geoms.
 
     Raises:
@@ -135,7 +134,7 @@ def add_arm(
     # Frames 0 to n and the tool, at zero positions, in the base frame.
     frames = link_poses(arm, np.zeros(arm.n))
     body = spec.worldbody.add_body(name=f"{name}/base", **place(base))
-    _add_solids(spec, body, f"{name}/base", solids[:1], geoms)
+    links = [body]
     behind, inertias = np.eye(4), []
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         body = body.add_body(name=f"{name}/link{i}", **place(inverse(behind) @ frames[i]))
@@ -148,18 +147,16 @@ def add_arm(
         if np.isfinite(joint.limits.effort):
             motor_of_joint.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
             motor_of_joint.forcerange = (-joint.limits.effort, joint.limits.effort)
-        _add_solids(spec, body, f"{name}/link{i}", solids[i : i + 1], geoms)
+        links.append(body)
         behind = frames[i]
     tool = body.add_body(name=f"{name}/tool", **place(inverse(behind) @ frames[arm.n + 1]))
     tool.add_site(name=f"{name}/tool")
+    for number, it in enumerate(bodies, 1):
+        # What is fixed to the base is told in frame 0 of the table. The links have their inertia already.
+        solid = it.solid if it.link else it.solid.moved(arm.base)
+        label = f"link{it.link}" if it.link else "base"
+        add_geom(spec, links[it.link], f"{name}/{label}/solid{number}", solid, mass=0.0, **geoms)
     return PlantArm(name=name, arm=arm, tool=tool, inertias=tuple(inertias))
-
-
-def _add_solids(spec: Any, body: Any, name: str, solids: tuple[tuple[Solid, ...], ...], geoms: dict[str, Any]) -> None:
-    for part in solids:
-        for number, solid in enumerate(part, 1):
-            # The links have their inertia already.
-            add_geom(spec, body, f"{name}/solid{number}", solid, mass=0.0, **geoms)
 
 
 def _set_inertia(body: Any, link: Link) -> Inertia:

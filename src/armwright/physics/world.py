@@ -16,29 +16,39 @@ import numpy as np
 
 from armwright.arm.model import STANDARD_GRAVITY
 from armwright.arrays import Array
-from armwright.cell.hardware import Mishap, PeakContact
+from armwright.cell.hardware import DeviceError, Mishap, PeakContact
 from armwright.cell.model import Cell
+from armwright.cell.observations import MeasuredStream, Observations, Picture
 from armwright.cell.part_poses import PartPoses
 from armwright.cell.scene import Gripper, Part
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError, closest
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics import mishaps
 from armwright.physics.contacts import Contacts
 from armwright.physics.gripper import GripperDrive
-from armwright.physics.measured import Log, MeasuredStream
+from armwright.physics.measured import Log
+from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
 from armwright.physics.servo import ArmServo, Sent, TorqueLaw
+from armwright.physics.vision import camera_in_world, look
 from armwright.physics.world_model import WorldModel, in_hand, part_pose, tool_pose, world_model
-from armwright.spatial.poses import homogeneous, inverse
+from armwright.spatial.poses import homogeneous, inverse, to_noap
 from armwright.spatial.rotations import rotation_from_vector
 
 # How long a held part may be off the pads, and an arm off its track [s].
 _LOST, _OFF_TRACK = 0.05, 0.02
 # Held parts are looked at so often [s]; a contact counts as over after so long [s].
 _LOOK, _PAUSE = 0.01, 0.1
+# How long an arm is left alone that has had a mishap [s]: it brakes.
+_STOP = 0.2
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
+# Of very many pictures the last ones are kept.
+_MAX_PICTURES = 500
+# Ticks between poses of the tool that are compared.
+_TIP_TICKS = 10
 # In wrists, the noise of moments by that of forces [m].
 _MOMENT_NOISE = 0.1
 
@@ -56,6 +66,7 @@ class _Hand:
         expected: the part that it closes on; None where the program does not say.
         guarded: whether the program looks out for contact during the motion.
         off_track: for how many ticks the arm has not been where it was sent.
+        stopping_until: tick up to which the arm is stopped because of a mishap, and others are no news.
         quiet_until: tick up to which contacts are no news.
         deepest: how deep the arm has pressed into the plane since its motion began [m].
     """
@@ -68,6 +79,7 @@ class _Hand:
     expected: str | None = None
     guarded: bool = False
     off_track: int = 0
+    stopping_until: int = 0
     quiet_until: int = 0
     deepest: float = 0.0
 
@@ -100,7 +112,7 @@ class PhysicsCell:
             InvalidValueError: things stand inside each other at the start, or a law is for no arm of the cell.
         """
         self._cell, self._believed = cell, Simulator(cell)
-        self._rng = np.random.default_rng(seed)
+        self._seed, self._rng = seed, np.random.default_rng(seed)
         self._world = world_model(cell, drawn_parts(cell, self._rng) if parts is None else parts)
         self._contacts = Contacts(self._world)
         self._data = _initial_data(self._world)
@@ -125,9 +137,12 @@ class PhysicsCell:
             near = closest(name, cell.arms)
             hint = f"; did you mean {near}?" if near else ""
             raise InvalidValueError(f"laws: {name} is no arm of cell '{cell.name}'{hint}")
-        self._look = max(1, round(_LOOK / period))
+        self._every = max(1, round(_LOOK / period))
         self._tick, self._held = 0, dict[str, str]()
         self._log = Log(cell, self._world)
+        self._pictures: tuple[Picture, ...] = ()
+        # Made for the first picture, and shared by copies.
+        self._photographers: list[Photographer] = []
         self._tare = {name: np.zeros(6) for name in cell.arms}
         self._tracking = {name: _tracking_limits(cell, name) for name in cell.arms}
         self._settle()
@@ -171,9 +186,19 @@ class PhysicsCell:
         while self._tick < end:
             self._step()
             mishap = self._watch()
-            if mishap is not None:
+            if mishap is not None and self._is_news(mishap):
                 return mishap
         return None
+
+    def _is_news(self, mishap: Mishap) -> bool:
+        """Whether a program must be told of a mishap: not while its arm is stopped because of another."""
+        hand = None if mishap.arm is None else self._hands[mishap.arm]
+        if hand is None:
+            return True
+        if self._tick < hand.stopping_until:
+            return False
+        hand.stopping_until = self._tick + round(_STOP / self._cell.period)
+        return True
 
     @property
     def _now(self) -> float:
@@ -197,7 +222,7 @@ class PhysicsCell:
 
     def _watch(self) -> Mishap | None:
         """Return what has gone wrong at this tick."""
-        data, look = self._data, self._tick % self._look == 0
+        data, look = self._data, self._tick % self._every == 0
         if look and _is_unstable(data):
             return mishaps.unstable(self._now)
         for name, hand in self._hands.items():
@@ -237,7 +262,7 @@ class PhysicsCell:
         slip = float(np.linalg.norm((inverse(hand.pose) @ there)[:3, 3]))
         self._log.add_slip(arm, slip)
         off = self._contacts.gripped(self._data, arm) != hand.part
-        hand.off = hand.off + self._look if off else 0
+        hand.off = hand.off + self._every if off else 0
         if hand.off * self._cell.period < _LOST and slip <= self._cell.alarms.slip:
             return None
         part, gripper = hand.part, hand.drive.gripper
@@ -258,7 +283,7 @@ class PhysicsCell:
         servo = self._servos[arm]
         error = np.abs(self._sent[arm].at(self._tick).q - self._data.qpos[servo.indices.positions])
         off = (error > self._tracking[arm]).any()
-        before, hand.off_track = hand.off_track, hand.off_track + self._look if off else 0
+        before, hand.off_track = hand.off_track, hand.off_track + self._every if off else 0
         limit = _OFF_TRACK / self._cell.period
         if not before < limit <= hand.off_track:
             return None
@@ -302,7 +327,8 @@ class PhysicsCell:
         hand = self._hands[arm]
         if not guarded:
             # What it pressed on while it was guarded, it may press on until it is away.
-            hand.quiet_until = self._tick + (round(_PAUSE / self._cell.period) if hand.guarded else 0)
+            quiet = self._tick + (round(_PAUSE / self._cell.period) if hand.guarded else 0)
+            hand.quiet_until = max(hand.quiet_until, quiet)
         hand.guarded, hand.deepest = guarded, 0.0
 
     def contact_time(self, arm: str) -> None:
@@ -364,10 +390,40 @@ class PhysicsCell:
 
     def locate(self, frame: str, now: float) -> tuple[Array, float]:
         """Let the camera locate the object of a frame; return its pose in the world and the time it takes."""
-        part = self._cell.seen_parts.get(frame)
-        if part is None:
+        sight = self._cell.sights.get(frame)
+        if sight is None:
             return self._believed.locate(frame, now)
-        return part_pose(self._data, part) @ self._cell.parts[part].grasp, self._cell.vision_time
+        if sight.camera is not None:
+            X_WF = self._seen(frame, sight.camera)
+        elif sight.kind == "part":
+            X_WF = part_pose(self._data, sight.name) @ sight.relation
+        else:
+            X_WF = self._cell.markers[sight.name].pose @ sight.relation
+        if sight.kind == "part":
+            self._believed.part_poses().see(sight.name, X_WF @ inverse(sight.relation), now)
+        return X_WF, self._cell.vision_time
+
+    def _seen(self, frame: str, camera: str) -> Array:
+        """Take a picture and return the pose of a frame that is found in it.
+
+        Raises:
+            DeviceError: it is not found.
+        """
+        if not self._photographers:
+            self._photographers.append(Photographer(self._world.model, self._cell.cameras))
+        carrier = self._cell.cameras[camera].on
+        q = None if carrier is None else self.configuration(carrier, self._now)
+        X_WC = camera_in_world(self._cell, self._cell.cameras[camera], q)
+        seed = (self._seed, self._tick)
+        seen = look(self._photographers[0], self._data, self._cell, frame, X_WC, seed)
+        text = seen.message if seen.pose is None else f"{frame} at {_position_text(seen.pose)}"
+        taken = Picture(
+            time=self._now, camera=camera, frame=frame, png=png(seen.picture), found=seen.pose is not None, text=text
+        )
+        self._pictures = (*self._pictures, taken)[-_MAX_PICTURES:]
+        if seen.pose is None:
+            raise DeviceError(seen.message)
+        return seen.pose
 
     # ---- results -------------------------------------------------------------------------------------------------
 
@@ -375,14 +431,24 @@ class PhysicsCell:
         """Return the pose (4, 4) of a part in the world, as it is now."""
         return part_pose(self._data, part)
 
-    def measured(self) -> tuple[MeasuredStream, ...]:
-        """Return what the servos did so far."""
-        return self._log.streams()
+    def observations(self) -> Observations:
+        """Return what the servos measured, where the parts were, and the largest errors."""
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
 
-    @property
-    def log(self) -> Log:
-        """What has been recorded."""
-        return self._log
+        measured = self._log.streams()
+        facts = {
+            "engine": "MuJoCo",
+            "version": mujoco.__version__,
+            "step": self._cell.period / self._world.substeps,
+            "seed": self._seed,
+            "tracking": {
+                stream.arm: np.abs(stream.q - stream.sent).max(axis=0, initial=0.0).tolist() for stream in measured
+            },
+            "tip": {stream.arm: _tip_error(self._cell, stream) for stream in measured},
+            "slip": self._log.worst_slip,
+            "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
+        }
+        return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)
 
 
 def drawn_parts(cell: Cell, rng: np.random.Generator) -> dict[str, Part]:
@@ -409,11 +475,23 @@ def _initial_data(world: WorldModel) -> Any:
     return data
 
 
+def _tip_error(cell: Cell, stream: MeasuredStream) -> float:
+    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m]."""
+    arm = cell.arms[stream.arm].arm
+    sent, there = (forward(arm, q[::_TIP_TICKS])[:, :3, 3] for q in (stream.sent, stream.q))
+    return float(np.linalg.norm(sent - there, axis=1).max(initial=0.0))
+
+
 def _tracking_limits(cell: Cell, arm: str) -> Array:
     """Return how far each joint may be from where it was sent, (n,) [rad] or [m]."""
     alarms = cell.alarms
     joints = cell.arms[arm].arm.joints
     return np.array([alarms.tracking_angle if joint.revolute else alarms.tracking_length for joint in joints])
+
+
+def _position_text(X: Array) -> str:
+    """Return the text of the position of a pose (4, 4) in the world."""
+    return "({:.1f}, {:.1f}, {:.1f}) mm".format(*(X[:3, 3] * 1e3))
 
 
 def _is_unstable(data: Any) -> bool:

@@ -9,14 +9,16 @@ from typing import Any
 import attrs
 import numpy as np
 
-from armwright.arm.guessed_solids import guessed_solids
-from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.cell.scene import Gripper, Part
+from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.geoms import add_geom, place, quaternion
-from armwright.physics.gripper import add_gripper, gripper_length
+from armwright.physics.gripper import add_gripper
+from armwright.physics.markers import add_marker
+from armwright.physics.pictures import add_camera, add_lights
 from armwright.physics.plant import PlantArm, add_arm, finish, new_world
+from armwright.physics.vision import marker_name
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Solid, centroid, farthest, inertia
 
@@ -90,7 +92,7 @@ def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantA
         bits = {"contype": bit, "conaffinity": affinity}
         arm = cell_arm.plant or cell_arm.arm
         gripper = cell_arm.gripper or Gripper()
-        plant = add_arm(spec, name, arm, cell_arm.base, arm_solids(arm, gripper_length(gripper)), **bits)
+        plant = add_arm(spec, name, arm, cell_arm.base, arm_bodies(name, arm, gripper), **bits)
         hand = {"contype": bit | _HAND, "conaffinity": affinity}
         add_gripper(spec, name, plant.tool, gripper, spec.option.timestep, **hand)
         plants.append(plant)
@@ -99,18 +101,8 @@ def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantA
     for part in parts.values():
         _add_part(spec, part)
     _add_plate(spec, cell)
+    _add_cameras(spec, cell, {plant.name: plant.tool for plant in plants})
     return spec, tuple(plants)
-
-
-def arm_solids(arm: Arm, gripper: float) -> tuple[tuple[Solid, ...], ...]:
-    """Return the solids of the base of an arm in its base frame, and of its links in theirs: known or guessed.
-
-    Args:
-        arm: the arm.
-        gripper: how far its gripper reaches back from the tool point [m].
-    """
-    known = any(link.solids for link in arm.links)
-    return (arm.base_solids, *([link.solids for link in arm.links] if known else guessed_solids(arm, gripper)))
 
 
 def _surface(friction: float) -> dict[str, Any]:
@@ -147,6 +139,20 @@ def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
     )
 
 
+def _add_cameras(spec: Any, cell: Cell, tools: Mapping[str, Any]) -> None:
+    """Add the cameras of a cell, light, and the markers that they look for."""
+    if not cell.cameras:
+        return
+    add_lights(spec)
+    for camera in cell.cameras.values():
+        add_camera(spec.worldbody if camera.on is None else tools[camera.on], camera)
+    for name, marker in cell.markers.items():
+        add_marker(spec, spec.worldbody, marker, marker_name(name))
+    for name, part in cell.parts.items():
+        if part.marker is not None:
+            add_marker(spec, spec.body(name), part.marker, marker_name(name))
+
+
 def _add_part(spec: Any, part: Part) -> None:
     body = spec.worldbody.add_body(name=part.name, **place(part.pose))
     body.add_freejoint(name=part.name)
@@ -167,7 +173,7 @@ def _add_plate(spec: Any, cell: Cell) -> None:
     if plane.height is None:
         return
     plate = spec.worldbody.add_body(name=PLATE, pos=(0.0, 0.0, plane.height), gravcomp=1.0)
-    plate.explicitinertial, plate.mass, plate.inertia = True, _PLATE_MASS, (1.0, 1.0, 1.0)
+    plate.explicitinertial, plate.mass, plate.inertia, plate.ipos = True, _PLATE_MASS, np.ones(3), np.zeros(3)
     plate.add_joint(
         name=PLATE,
         type=mujoco.mjtJoint.mjJNT_SLIDE,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import attrs
 
-from armwright.cell.hardware import Hardware
+from armwright.cell.hardware import Hardware, HardwareFactory
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
@@ -83,6 +83,7 @@ class LoadedProgram:
         cell: what it runs in; None where none was specified and none is imported.
         diagnostics: warnings of the compiler.
         imports: the files that the program imports.
+        hardware: how the cell is set up to run it.
         is_code_file: whether the file holds intermediate code, and not the text of the program.
     """
 
@@ -90,6 +91,7 @@ class LoadedProgram:
     cell: Cell | None
     diagnostics: tuple[Diagnostic, ...] = ()
     imports: tuple[Path, ...] = ()
+    hardware: HardwareFactory = Simulator
     is_code_file: bool = False
 
 
@@ -162,7 +164,7 @@ def run(
     *,
     strict: bool = False,
     std: Standard = Standard.RLO_2,
-    hardware: Hardware | None = None,
+    hardware: Hardware | HardwareFactory | None = None,
     limits: Limits | None = None,
     progress: Progress | None = None,
 ) -> Recording:
@@ -173,7 +175,8 @@ def run(
         cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
         strict: whether an AFFIX that is only implied is an error.
         std: the language it is written in.
-        hardware: the cell at work; simulated unless something else is given.
+        hardware: the cell at work, or what makes it of the cell, such as ``armwright.physics.PhysicsCell``; the
+            kinematic simulator unless something else is given.
         limits: when the program is taken to run for ever.
         progress: told before each statement: the time on the cell's clock [s] and the line.
 
@@ -202,8 +205,10 @@ def run(
         raise ProgramError(compiled)
     if compiled.cell is None:
         raise InvalidValueError(f"{compiled.source.name} needs a cell to run in, and IMPORTs none")
-    hardware = hardware or Simulator(compiled.cell)
-    return interpret(compiled.code, compiled.cell, hardware, progress=progress, limits=limits)
+    at_work = Simulator(compiled.cell) if hardware is None else hardware
+    if callable(at_work):
+        at_work = at_work(compiled.cell)
+    return interpret(compiled.code, compiled.cell, at_work, progress=progress, limits=limits)
 
 
 def load(

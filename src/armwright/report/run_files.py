@@ -19,7 +19,7 @@ from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
 from armwright.program.vm.machine import RunError
-from armwright.program.vm.recording import Effect, Recording, RunStage, motion_csv_lines
+from armwright.program.vm.recording import Effect, Recording, RunStage, measured_csv_lines, motion_csv_lines
 from armwright.report.page import COLLISIONS, run_page
 from armwright.report.run_data import run_page_data
 from armwright.spatial.poses import to_noap
@@ -73,7 +73,7 @@ def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnost
 
 def run_files(
     recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs
-) -> dict[str, str | Iterable[str]]:
+) -> dict[str, str | bytes | Iterable[str]]:
     """Return the files of a run by name, identical for identical runs; those of a failed run end at the failure.
 
     Args:
@@ -83,12 +83,27 @@ def run_files(
     """
     return {
         "motion.csv": motion_csv_lines(recording.streams, _written_ticks(recording, origin.motion_rows)),
+        **_measured_file(recording, origin.motion_rows),
         "events.jsonl": _event_lines(recording),
         "frames.json": _json(frame_data(recording)),
         "report.html": run_page(
             run_page_data(recording, diagnostics, origin.command, omission_notes(recording, origin.motion_rows))
         ),
+        **picture_files(recording),
     }
+
+
+def picture_files(recording: Recording) -> dict[str, bytes]:
+    """Return the pictures of a run by the names of their files."""
+    return {
+        f"seen-{number:03d}-{picture.frame}.png": picture.png for number, picture in enumerate(recording.pictures, 1)
+    }
+
+
+def _measured_file(recording: Recording, most_rows: int) -> dict[str, Iterable[str]]:
+    """Return what the servos measured, in a cell with physics."""
+    streams, ticks = recording.measured, _written_ticks(recording, most_rows)
+    return {"measured.csv": measured_csv_lines(streams, ticks)} if streams else {}
 
 
 def frame_data(recording: Recording) -> dict[str, Any]:
@@ -145,6 +160,8 @@ def summary_data(recording: Recording, diagnostics: Sequence[Diagnostic], hint: 
         "stages": [_stage_data(stage, recording) for stage in recording.stages],
         "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics],
     }
+    if recording.observations.facts:
+        data["physics"] = recording.observations.facts
     return {name: round_numbers(value) for name, value in data.items()}
 
 

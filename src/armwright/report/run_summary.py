@@ -1,6 +1,6 @@
 """The summary of a run: its trace, its stages, and where the frames were when it failed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -48,7 +48,9 @@ class RunSummary:
             f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, "
             f"{counted(moves, 'move')}, {counted(len(recording.stages), 'stage')}, {counted(ticks, 'servo tick')}"
         )
-        return (*shorten_list(slowed, MAX_TERMINAL_LINES, self.hint), numbers, "Collisions are not checked.")
+        physics = physics_note(recording)
+        notes = (numbers, *physics, "Collisions are not checked.")
+        return (*shorten_list(slowed, MAX_TERMINAL_LINES, self.hint), *notes)
 
     def as_data(self) -> dict[str, Any]:
         """Return the summary as plain data in SI units."""
@@ -121,3 +123,16 @@ def frame_table(error: RunError, code: Code) -> ResultTable:
         rows=frames.map(row).join(omitted),
         numbers=(2,),
     )
+
+
+def physics_note(recording: Recording) -> tuple[str, ...]:
+    """Return how well arms and hands did in a cell with physics; nothing of one without."""
+    facts = recording.observations.facts
+    if not facts:
+        return ()
+    tips, slips = facts["tip"], facts["slip"]
+    assert isinstance(tips, Mapping)  # noqa: S101 - of a cell with physics
+    assert isinstance(slips, Mapping)  # noqa: S101
+    arms = [f"{arm}: tip within {tip * 1e3:.2g} mm of where it was sent" for arm, tip in tips.items()]
+    held = [f", parts within {slip * 1e3:.2g} mm in the hand" if slip else "" for slip in slips.values()]
+    return ("; ".join(arm + hand for arm, hand in zip(arms, held, strict=True)),)

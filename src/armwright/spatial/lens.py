@@ -14,6 +14,8 @@ from armwright.arrays import Array, ArrayLike, exact_shape, floats
 _COEFFICIENTS = 5
 # Steps by which distortion is taken away, and when no more are needed.
 _STEPS, _SETTLED = 50, 1e-13
+# Pixels along each side of a picture by which a lens is checked, and how far from itself one may come back [px].
+_GRID, _SAME_PIXEL = 33, 1e-6
 
 
 def _as_pair(value: ArrayLike) -> Array:
@@ -60,11 +62,30 @@ class Lens:
         if self.distortion.any():
             # Newton's steps with the derivative of what the lens does.
             for _ in range(_STEPS):
-                step = np.linalg.solve(self._derivative(flat), (seen - self._distorted(flat))[..., None])[..., 0]
+                (a, b), (c, d) = np.moveaxis(self._derivative(flat), (-2, -1), (0, 1))
+                x, y = np.moveaxis(seen - self._distorted(flat), -1, 0)
+                step = np.stack([d * x - b * y, a * y - c * x], axis=-1) / (a * d - b * c)[..., None]
                 flat = flat + step
                 if np.abs(step).max(initial=0.0) < _SETTLED:
                     break
         return np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
+
+    def field(self) -> Array:
+        """Return the least and the largest x and y, (2, 2), of the directions with z = 1 that its pictures show."""
+        x, y = np.arange(self.width + 1) - 0.5, np.arange(self.height + 1) - 0.5
+        rim = [np.stack(np.broadcast_arrays(x, edge), axis=-1) for edge in (y[0], y[-1])]
+        rim += [np.stack(np.broadcast_arrays(edge, y), axis=-1) for edge in (x[0], x[-1])]
+        seen = self.rays(np.concatenate(rim))[:, :2]
+        return np.array([seen.min(axis=0), seen.max(axis=0)])
+
+    def is_invertible(self) -> bool:
+        """Whether every pixel of its pictures shows one direction; a lens that distorts much can fold the picture."""
+        x, y = (np.linspace(-0.5, size - 0.5, _GRID) for size in (self.width, self.height))
+        pixels = np.stack(np.meshgrid(x, y), axis=-1)
+        with np.errstate(all="ignore"):
+            rays = self.rays(pixels)
+            back = np.abs(self.project(rays) - pixels).max() if np.isfinite(rays).all() else np.inf
+            return bool(back < _SAME_PIXEL and (np.linalg.det(self._derivative(rays[..., :2])) > 0).all())
 
     def _distorted(self, flat: Array) -> Array:
         """Return where points of the plane z = 1 (..., 2) are seen, in that plane."""

@@ -140,10 +140,12 @@ class Solid:
     Attributes:
         shape: its form.
         pose: (4, 4) of the shape in the frame.
+        guessed: whether the shape is a guess, made where no drawing is at hand.
     """
 
     shape: Shape
     pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+    guessed: bool = False
 
     __reduce__ = reduce_by_fields
 
@@ -188,6 +190,37 @@ def support(shape: Shape, direction: Array) -> float:
             return radius
         case Mesh(vertices=vertices):
             return float((vertices @ direction).max())
+
+
+def contains(shape: Shape, points: Array) -> npt.NDArray[np.bool_]:
+    """Return which of some points (k, 3) are inside a solid; a mesh must be closed.
+
+    Source:
+        for meshes, Van Oosterom & Strackee (1983), The solid angle of a plane triangle, eq. (8): all triangles together
+        fill the whole solid angle as seen from inside, and nothing of it from outside.
+    """
+    across = np.hypot(points[:, 0], points[:, 1])
+    match shape:
+        case Box(size=size):
+            return np.asarray((np.abs(points) < size / 2).all(axis=1))
+        case Cylinder(radius=radius, length=length):
+            return np.asarray((across < radius) & (np.abs(points[:, 2]) < length / 2))
+        case Capsule(radius=radius, length=length):
+            beyond = np.maximum(np.abs(points[:, 2]) - length / 2, 0.0)
+            return np.asarray(np.hypot(across, beyond) < radius)
+        case Sphere(radius=radius):
+            return np.asarray(np.linalg.norm(points, axis=1) < radius)
+        case Mesh(vertices=vertices, faces=faces):
+            return np.array([_solid_angle(vertices[faces] - point) > 2 * math.pi for point in points])
+
+
+def _solid_angle(triangles: Array) -> float:
+    """Return the solid angle of triangles (m, 3, 3) seen from the origin: 4 pi from inside of what they enclose."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    la, lb, lc = np.linalg.norm(triangles, axis=2).T
+    above = np.einsum("ki,ki->k", a, np.cross(b, c))
+    below = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    return float(2 * np.arctan2(above, below).sum())
 
 
 def volume(shape: Shape) -> float:

@@ -18,11 +18,12 @@ from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.bytecode.verify import verify
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm import control_flow, devices, expressions, frames, move, output
+from armwright.program.vm.collisions import threatened_error
 from armwright.program.vm.contact import stop_too_deep
 from armwright.program.vm.control_flow import recover, shut_down, switched_off_text
 from armwright.program.vm.machine import Handler, Limits, Machine, RunError
 from armwright.program.vm.move import advance_motion
-from armwright.program.vm.move_diagnostics import obstacle_warning
+from armwright.program.vm.move_diagnostics import clearance_warning, obstacle_warning
 from armwright.program.vm.process import Process
 from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, sort_effects
 from armwright.program.vm.synchronization import deadlock_error
@@ -165,6 +166,8 @@ def _advance(machine: Machine, process: Process) -> None:
     motion = process.motion
     if motion is not None and motion.alarm_tick is not None and motion.alarm_tick <= machine.state.ticks:
         stop_too_deep(machine, process, motion)
+    if motion is not None and motion.threat is not None:
+        raise threatened_error(machine, process, motion)
     if (pending := process.pending_effect) is not None:
         process.pending_effect = None
         if pending.frame_pose is not None:
@@ -216,12 +219,14 @@ def _failure_recording(machine: Machine, failure: Failure, switched_off: Sequenc
 def motion_warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic, ...]:
     """Return the warnings about stages that were run in a cell.
 
-    For every straight line that was gone round, every VIA with stops because corners cannot be rounded, and every
-    joint asked for too much effort.
+    For every straight line that was gone round, every VIA with stops because corners cannot be rounded, every stage
+    that comes too near to other bodies, and every joint asked for too much effort.
     """
     diagnostics = []
     for stage in stages:
         if (warning := obstacle_warning(stage)) is not None:
+            diagnostics.append(warning)
+        if (warning := clearance_warning(stage, cell.clearance)) is not None:
             diagnostics.append(warning)
         arm = cell.arms[stage.arm].arm
         excessive = np.flatnonzero(stage.peak_effort / arm.limits.effort > 1)

@@ -14,6 +14,7 @@ from armwright.cell.hardware import Hardware, SimulatedHardware
 from armwright.cell.model import Cell, base_name
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.physics.collisions import CellCollisions
 from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand
 from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
@@ -74,6 +75,14 @@ class Machine:
         self.code, self.cell, self.hardware, self.limits = code, cell, hardware, limits or Limits()
         self.state = MachineState.initial(code, cell)
         self.constants = constant_values(code.constants)
+        self._collisions: CellCollisions | None = None
+
+    @property
+    def collisions(self) -> CellCollisions | None:
+        """What arms may run into; None where there is nothing of the kind in the cell."""
+        if self._collisions is None and self.cell.collisions_matter:
+            self._collisions = CellCollisions(self.cell)
+        return self._collisions
 
     def copy(self) -> "Machine":
         """Return a machine in the same state; what one of them does changes nothing in the other.
@@ -119,7 +128,8 @@ class Machine:
             streams=streams,
             trees=tuple(state.trees),
             configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
-            parts=self.hardware.part_poses().tracks,
+            observations=self.hardware.observations(),
+            checked=None if self.collisions is None else self.collisions.checked,
         )
 
     # ---- names and values ------------------------------------------------------------------------------------------
