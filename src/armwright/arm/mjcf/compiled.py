@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,10 @@ def compile_mjcf(path: Path, text: MjcfText) -> Any:
         spec.compiler.LRopt.mode = mujoco.mjtLRMode.mjLRMODE_NONE
         _leave_out_pictures(mujoco, spec)
         spec.assets = _mesh_files(spec, path, text)
-        return spec.compile()
+        with warnings.catch_warnings():
+            # That a mass matrix is nearly singular concerns simulations.
+            warnings.simplefilter("ignore")
+            return spec.compile()
     except FileFormatError:
         raise
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
