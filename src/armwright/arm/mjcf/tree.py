@@ -7,7 +7,7 @@ has its joints at 0 of the positions.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -217,7 +217,7 @@ class _Builder:
         self.child_joints: dict[str, list[MjcfJoint]] = {link: [] for link in self.bodies}
         for number in range(1, model.nbody):
             self._add_body(number)
-        leaves = [link for link, joints in self.child_joints.items() if not joints]
+        leaves = {link for link, joints in self.child_joints.items() if not joints}
         for number in range(model.nsite):
             self._add_site(number, leaves)
 
@@ -233,11 +233,12 @@ class _Builder:
         if not count:
             self._add(self._weld(parent, link, before))
 
-    def _add_site(self, number: int, leaves: Collection[str]) -> None:
+    def _add_site(self, number: int, leaves: Container[str]) -> None:
         name, parent = self._model.site(number).name, self._body_names[self._model.site_bodyid[number]]
-        if name:
-            weld = self._weld(parent, self._new_link(name), pose_of(self._model, "site", number))
-            self._add(weld, hangs=parent in leaves)
+        X = pose_of(self._model, "site", number)
+        # One that is its body by name and pose is no other link.
+        if name and not (name == parent and np.array_equal(X, np.eye(4))):
+            self._add(self._weld(parent, self._new_link(name), X), hangs=parent in leaves)
 
     def _new_link(self, name: str) -> str:
         """Return a name for a link that is no body, such as the given one."""
