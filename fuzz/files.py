@@ -1,9 +1,9 @@
 """Fuzzing of what reads files, by changing valid ones: `python fuzz/files.py TARGET [INPUTS] [SEED]`.
 
 Targets are `arm`, `linkage`, `urdf`, `mjcf`, `cell`, `poses`, `iso9283`, `calibration` and `clearance` (measured
-tables). It needs nothing beside armwright. An input is a valid file in which keys, numbers, types, lines and cells were changed,
-lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised, when it takes more
-than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it again.
+tables). It needs nothing beside armwright. An input is a valid file in which keys, numbers, types, lines and cells were
+changed, lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised, when it
+takes more than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it again.
 """
 
 import random

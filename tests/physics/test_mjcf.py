@@ -15,13 +15,15 @@ from armwright.arm.model import Arm, Joint, Limits, Link, Motor
 from armwright.arm.tensors import impossible_moments
 from armwright.arrays import Array
 from armwright.cell.reader import read_cell
+from armwright.cell.scene import Gripper
 from armwright.compiled.arm import compile_arm
-from armwright.errors import InvalidValueError, UnsupportedArmError
+from armwright.errors import FileFormatError, InvalidValueError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.physics.mjcf import arm_mjcf, cell_mjcf
+from armwright.physics.mjcf_cell import read_cell_mjcf
 from armwright.physics.mjcf_text import spec_text
 from armwright.physics.world_model import world_spec
-from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
+from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, volume
 from oracles.arms import of_all_kinds, random_arm, random_pose
 from samples import Sample
 
@@ -297,3 +299,51 @@ def test_a_cell_at_its_start(cell_path: Path) -> None:
         assert model.geom(name).friction[0] == part.friction
     for name, fixture in cell.fixtures.items():
         np.testing.assert_allclose(data.geom(name).xpos, fixture.pose[:3, 3], atol=EXACT)
+
+
+def test_a_cell_comes_back(cell_path: Path, rng: np.random.Generator) -> None:
+    """Arms, grippers, fixtures and parts are read back from the file of a cell as they were written."""
+    cell = read_cell(cell_path)
+    (cell_path.parent / "cell.xml").write_text(cell_mjcf(cell).text, encoding="utf-8")
+
+    reading = read_cell_mjcf(cell_path.parent / "cell.xml")
+
+    again = reading.cell
+    assert (again.name, [*again.arms], reading.notes) == (cell.name, [*cell.arms], ())
+    np.testing.assert_array_equal(again.gravity, cell.gravity)
+    assert again.contact == cell.contact
+    for name, before in cell.arms.items():
+        after = again.arms[name]
+        np.testing.assert_allclose(after.base, before.base, atol=EXACT)
+        np.testing.assert_array_equal(after.start, before.start)
+        assert attrs.astuple(after.gripper or Gripper()) == pytest.approx(attrs.astuple(before.gripper or Gripper()))
+        q, qd = (values[0] for values in states(before.arm, rng, 1))
+        np.testing.assert_allclose(forward(after.arm, q), forward(before.arm, q), atol=EXACT)
+        if holds_its_inertia(before.arm):
+            one, other = (compile_arm(arm, quickly=True).mass_and_bias(q, qd) for arm in (before.arm, after.arm))
+            np.testing.assert_allclose(other[0], one[0], rtol=0, atol=SAME * np.abs(one[0]).max())
+            np.testing.assert_allclose(other[1], one[1], rtol=0, atol=SAME * np.abs(one[1]).max())
+        # Guessed solids of an arm without any are written, since a world needs them.
+        if before.arm.links[-1].solids:
+            assert [len(link.solids) for link in after.arm.links] == [len(link.solids) for link in before.arm.links]
+    for before_all, after_all in ((cell.fixtures, again.fixtures), (cell.parts, again.parts)):
+        assert [*after_all] == [*before_all]
+        for name, thing in before_all.items():
+            after_thing = after_all[name]
+            assert type(after_thing.shape) is type(thing.shape)
+            np.testing.assert_allclose(after_thing.pose, thing.pose, atol=EXACT)
+            np.testing.assert_allclose(volume(after_thing.shape), volume(thing.shape), rtol=SAME)
+            assert after_thing.friction == thing.friction
+    assert {name: part.mass for name, part in again.parts.items()} == {n: part.mass for n, part in cell.parts.items()}
+
+
+def test_other_files_of_cells(tmp_path: Path) -> None:
+    """A file without arms of our names is refused, and other bodies are told."""
+    path = tmp_path / "cell.xml"
+    path.write_text((EXAMPLES / "desk_arm.xml").read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(FileFormatError, match="expected a body of the name ARM_1/base, as armwright writes them"):
+        read_cell_mjcf(path)
+    text = arm_mjcf(small()).text.replace('"base"', '"ARM_1/base"').replace('"tool"', '"ARM_1/tool"')
+    path.write_text(text.replace("<worldbody>", '<worldbody><body name="lamp"/>'), encoding="utf-8")
+
+    assert read_cell_mjcf(path).notes == ("the body 'lamp' is not read",)

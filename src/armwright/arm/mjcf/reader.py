@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
@@ -88,17 +87,20 @@ def arm_in(tree: MjcfTree, base: str | None = None, tip: str | None = None) -> R
         reading = serial_arm(tree, base, tip, np.array(gravity), "stated")
     except (InvalidValueError, ShapeError) as error:
         raise FileFormatError(tree.path, None, "", str(error)) from error
-    return attrs.evolve(reading, notes=(*reading.notes, *_left_out(tree, model)))
+    return attrs.evolve(reading, notes=(*reading.notes, *_left_out(tree, reading.arm.base_link)))
 
 
-def _left_out(tree: MjcfTree, model: Any) -> list[str]:
-    """Say what of bodies is not read."""
-    notes = []
-    for link, number in tree.bodies.items():
+def _left_out(tree: MjcfTree, base: str) -> list[str]:
+    """Say what of the bodies that hang on a link is not read."""
+    notes, pending = [], [base]
+    while pending:
+        link = pending.pop()
+        pending += [joint.child for joint in reversed(tree.child_joints[link])]
+        number = tree.bodies[link]
         if number is None:
             continue
-        if model.body_gravcomp[number]:
+        if tree.model.body_gravcomp[number]:
             notes.append(f"body '{link}': its gravity compensation is not read")
-        if ellipsoids_of(model, number):
+        if ellipsoids_of(tree.model, number):
             notes.append(f"body '{link}': ellipsoids are not read")
     return notes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
 import numpy as np
@@ -26,17 +27,19 @@ def geoms_of(model: Any, body: int) -> list[int]:
     return [i for i in geoms if is_solid(model.geom(i))] or geoms
 
 
-def solids_of(model: Any, body: int) -> tuple[Solid, ...]:
-    """Return the solids of a body, in its frame; planes and ellipsoids are left out."""
-    solids = []
-    for geom in geoms_of(model, body):
-        shape, X = _shape(model, geom), pose_of(model, "geom", geom)
-        if isinstance(shape, Mesh):
-            # MuJoCo has turned the mesh to its axes of inertia; here it is as in its file.
-            X = X @ inverse(pose_of(model, "mesh", model.geom_dataid[geom]))
-        if shape is not None:
-            solids.append(Solid(shape=shape, pose=X))
-    return tuple(solids)
+def solids_of(model: Any, body: int, left_out: Container[str] = ()) -> tuple[Solid, ...]:
+    """Return the solids of a body, in its frame; planes, ellipsoids and geoms of some names are left out."""
+    geoms = (geom for geom in geoms_of(model, body) if model.geom(geom).name not in left_out)
+    return tuple(solid for geom in geoms if (solid := solid_of(model, geom)) is not None)
+
+
+def solid_of(model: Any, geom: int) -> Solid | None:
+    """Return a geom as a solid, in the frame of its body; None where it is a plane or an ellipsoid."""
+    shape, X = _shape(model, geom), pose_of(model, "geom", geom)
+    if isinstance(shape, Mesh):
+        # MuJoCo has turned the mesh to its axes of inertia; here it is as in its file.
+        X = X @ inverse(pose_of(model, "mesh", model.geom_dataid[geom]))
+    return None if shape is None else Solid(shape=shape, pose=X)
 
 
 def ellipsoids_of(model: Any, body: int) -> list[int]:

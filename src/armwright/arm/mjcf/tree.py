@@ -133,6 +133,7 @@ class MjcfTree:
         parent_joints: by the name of a link: the joint that carries it.
         child_joints: by the name of a link: the joints that hang on it; of those of sites, only where nothing else
             hangs there, so that a site at the end is the tool.
+        left_out: names of geoms that are no solids of links.
     """
 
     path: Path
@@ -141,6 +142,7 @@ class MjcfTree:
     bodies: Mapping[str, int | None]
     parent_joints: Mapping[str, MjcfJoint]
     child_joints: Mapping[str, list[MjcfJoint]]
+    left_out: Container[str] = ()
 
     @property
     def function(self) -> str:
@@ -195,7 +197,7 @@ class MjcfTree:
     def solids(self, link: str) -> tuple[Solid, ...]:
         """Return what of a link meets other bodies, in its frame."""
         number = self.bodies[link]
-        return () if number is None else solids_of(self.model, number)
+        return () if number is None else solids_of(self.model, number, self.left_out)
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the whole file."""
