@@ -9,7 +9,7 @@ import pytest
 from armwright.arm.model import STANDARD_GRAVITY
 from armwright.cell.scene import Gripper
 from armwright.physics.geoms import add_geom
-from armwright.physics.gripper import GripperDrive, add_gripper
+from armwright.physics.gripper import GripperDrive, add_gripper, grip
 from armwright.physics.plant import new_world
 from armwright.spatial.shapes import Box, Shape, Solid, Sphere
 
@@ -31,6 +31,7 @@ def holding(
     solid = Solid(shape=shape or Box(size=(SIDE,) * 3))
     options = {"contype": 2, "conaffinity": 7, "condim": 4, "friction": (0.8, 0.005, 1e-4)}
     add_geom(spec, block, "BLOCK", solid, mass=0.0, **options)
+    grip(spec, "A", gripper, "BLOCK")
     model = spec.compile()
     data = mujoco.MjData(model)
     drive = GripperDrive(model, "A", gripper)

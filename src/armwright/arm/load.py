@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -34,11 +35,12 @@ def arm_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _CATALOGUE.glob("*.toml")))
 
 
-def load_arm(name: str | Path) -> Arm:
+def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = None) -> Arm:
     """Return an arm by its name in the catalogue, or from a file.
 
     Args:
         name: such as ``puma560``; something with a slash or ending in .toml, .json, .urdf or .xml (MJCF) is a path.
+        packages: folders of packages, by name, in which the meshes of a URDF file are.
 
     Raises:
         MissingExtraError: the file is URDF or MJCF, and lxml or MuJoCo is not installed.
@@ -50,7 +52,9 @@ def load_arm(name: str | Path) -> Arm:
         raise KindError(f"name: expected the name of an arm or the path of a file, got {shown(name)}")
     if is_path(name):
         suffix = Path(name).suffix.lower()
-        return load_urdf(name) if suffix in _URDF else load_mjcf(name) if suffix == _MJCF else read_arm(name)
+        if suffix in _URDF:
+            return load_urdf(name, packages=packages)
+        return load_mjcf(name) if suffix == _MJCF else read_arm(name)
     if name not in arm_names():
         raise UnknownNameError("arm", str(name), arm_names())
     return read_arm(_CATALOGUE / f"{name}.toml")

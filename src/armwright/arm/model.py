@@ -347,7 +347,7 @@ class Arm:
     reach: float = math.inf
     tool_speed: float = math.inf
     base_solids: tuple[Solid, ...] = attrs.field(default=(), converter=_solids, eq=False)
-    collisions: CollisionPairs = attrs.field(default=CollisionPairs(), eq=False, validator=of_its_bodies)
+    collisions: CollisionPairs = attrs.field(factory=CollisionPairs, eq=False, validator=of_its_bodies)
     base_link: str = ""
     tool_link: str = ""
     source: str = ""

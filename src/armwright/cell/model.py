@@ -110,6 +110,7 @@ class Cell:
             default, see ``corner_deviation``.
         clearance: distance to other bodies below which a stage of a MOVE gets a warning [m]; 0 for none.
         period: of the servo [s].
+        plan: whether a path is planned past other bodies where a point-to-point motion would run into one.
         around: the kind of detour of an infeasible straight line, by ``via`` poses or ``damped`` least squares; None
             for no detour.
     """
@@ -135,6 +136,7 @@ class Cell:
     clearance: float = 0.0
     period: float = 1e-3
     around: Around | None = None
+    plan: bool = False
 
     def __attrs_post_init__(self) -> None:
         """Give every arm the gravity of the cell, with a warning where its file states another."""

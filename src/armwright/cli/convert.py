@@ -1,4 +1,4 @@
-"""``armwright convert``: convert an arm or a cell from one file format to another."""
+"""``armwright convert``: convert an arm or a cell from one file format to another, or an assembly to frames."""
 
 import enum
 import math
@@ -11,6 +11,7 @@ from typer import Argument, Option
 
 from armwright.cli.options import Json, usage_error
 from armwright.cli.output import print_json
+from armwright.cli.package_option import Packages, package_folders
 from armwright.errors import counted
 
 if TYPE_CHECKING:
@@ -62,12 +63,24 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
         str | None,
         Option(help="Joints of such a file to lock, at 0 or a position in degrees or mm, as in J1,J2=30."),
     ] = None,
+    package: Packages = None,
     as_json: Json = False,
 ) -> None:
     """Write an arm as URDF, as MJCF or as an arm file, or a cell as MJCF, and report what the format cannot represent.
 
+    Of an assembly in STEP or glTF, write the frames of its named components, for IMPORT.
+
     **Example:** `armwright convert puma560 -o puma560.urdf`
     """
+    from armwright.cell.assembly import is_assembly
+
+    if is_assembly(Path(arm)):
+        from armwright.cli.convert_assembly import convert_assembly
+
+        if output is None:
+            raise usage_error("-o", "missing; specify the file for the frames of the assembly, such as frames.toml")
+        convert_assembly(Path(arm), output, as_json=as_json)
+        return
     from armwright.files.output import write_file
 
     to = _format(output, to)
@@ -75,7 +88,7 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--json", "expected -o and the name of a file to write")
     if output is not None and output.exists() and Path(arm).exists() and output.samefile(arm):
         raise usage_error("-o", "expected another file than the input, which may hold more than an arm")
-    done = _converted_cell(arm, to) if _is_cell(arm) else _converted_arm(to, _read(arm, base, tip, lock))
+    done = _converted_cell(arm, to) if _is_cell(arm) else _converted_arm(to, _read(arm, base, tip, lock, package))
     if output is None:
         print(done.text, end="")
         for sentence in (*done.notes, *done.lost):
@@ -160,7 +173,9 @@ def _locked_positions(text: str | None, slides: Callable[[], Collection[str]]) -
     return locked
 
 
-def _read(name: str, base: str | None, tip: str | None, lock: str | None) -> "tuple[Arm, list[str]]":
+def _read(
+    name: str, base: str | None, tip: str | None, lock: str | None, package: list[str] | None
+) -> "tuple[Arm, list[str]]":
     """Return an arm, and notes on what its file states otherwise."""
     from armwright.arm.load import load_arm
 
@@ -174,10 +189,15 @@ def _read(name: str, base: str | None, tip: str | None, lock: str | None) -> "tu
             tree: Tree = read_robot(path) if kind == "urdf" else read_tree(path)
             return [joint.name for joint in tree.parent_joints.values() if joint.prismatic]
 
-        read = read_urdf if kind == "urdf" else read_mjcf
-        reading = read(name, base=base, tip=tip, lock=_locked_positions(lock, slides))
+        locked = _locked_positions(lock, slides)
+        if kind == "urdf":
+            reading = read_urdf(name, base=base, tip=tip, lock=locked, packages=package_folders(package))
+        elif package:
+            raise usage_error("--package", f"expected a URDF file, whose meshes are in packages, got '{name}'")
+        else:
+            reading = read_mjcf(name, base=base, tip=tip, lock=locked)
         return reading.arm, list(reading.notes)
-    for option, value in (("--base", base), ("--tip", tip), ("--lock", lock)):
+    for option, value in (("--base", base), ("--tip", tip), ("--lock", lock), ("--package", package)):
         if value:
             message = f"expected a URDF or MJCF file, whose links and joints have names, got '{name}'"
             raise usage_error(option, message)

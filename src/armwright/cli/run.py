@@ -55,6 +55,13 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         Around | None,
         Option(help="Replace an infeasible straight line: via, by a detour; damped, by damped least squares; none."),
     ] = None,
+    plan: Annotated[
+        bool | None,
+        Option(
+            "--plan/--no-plan",
+            help="Plan a path past other bodies where a point-to-point motion would run into one (extra planning).",
+        ),
+    ] = None,
     physics: Physics = False,
     seed: Seed = 0,
     std: Std = Standard.RLO_2,
@@ -91,7 +98,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     if loaded.cell is None:
         needs = "needs a cell to run in, and IMPORTs none; try examples/stanford_cell.toml"
         raise usage_error("--cell", f"missing: {program} {needs}")
-    used_cell = _adjust_cell(loaded.cell, servo_ms, deviation_mm, around)
+    used_cell = _adjust_cell(loaded.cell, servo_ms, deviation_mm, around, plan=plan)
     limits = Limits(steps=max_steps, time=max_time)
     error: RunError | None = None
     try:
@@ -107,6 +114,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         "deviation_mm": used_cell.deviation * 1e3,
         "corner_mm": used_cell.corner_deviation * 1e3,
         "around": used_cell.around or "none",
+        "plan": used_cell.plan,
         "std": std.value,
         "strict": strict,
         **({"physics": True, "seed": seed} if physics else {}),
@@ -164,7 +172,9 @@ def _finish(
         raise typer.Exit(error.exit_status)
 
 
-def _adjust_cell(cell: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
+def _adjust_cell(
+    cell: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None, *, plan: bool | None
+) -> "Cell":
     import attrs
 
     from armwright.cell.reader import DETOURS, DEVIATION_MM, SERVO_MS
@@ -174,7 +184,9 @@ def _adjust_cell(cell: "Cell", servo_ms: float | None, deviation_mm: float | Non
     if deviation_mm is not None:
         deviation = within(deviation_mm, DEVIATION_MM, "--deviation-mm") * 1e-3
     detour = cell.around if around is None else DETOURS[around]
-    return attrs.evolve(cell, period=period, deviation=deviation, around=detour)
+    return attrs.evolve(
+        cell, period=period, deviation=deviation, around=detour, plan=cell.plan if plan is None else plan
+    )
 
 
 def _interpret(

@@ -45,6 +45,15 @@ class Document:
         path = file_path(path)
         text = read_text(path)
         is_json = path.suffix.lower() == ".json" or (path.suffix.lower() != ".toml" and text.lstrip().startswith("{"))
+        return cls.parse(path, text, is_json=is_json)
+
+    @classmethod
+    def parse(cls, path: Path, text: str, *, is_json: bool) -> "Document":
+        """Parse a text that was read from a file.
+
+        Raises:
+            FileFormatError: it has a slip of syntax, is beyond a limit, or is no table.
+        """
         data = _parse(path, text, is_json=is_json)
         if not isinstance(data, dict):
             raise FileFormatError(path, 1, "", f"expected keys and values in braces, got {_value_text(data)}")
@@ -70,6 +79,11 @@ class Table:
         """Take the table at ``keys`` of a document."""
         self._document, self.keys, self._data = document, keys, data
         self._read: set[str] = set()
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._document.path
 
     def __contains__(self, key: str) -> bool:
         """Whether the table has the key."""
@@ -143,6 +157,15 @@ class Table:
         value = self._value(key, default, f"a list of {_numbers_text(length)}")
         return np.asarray(default, dtype=np.float64) if value is default else self._numbers((key,), value, length)
 
+    def numbers(self, key: str) -> Array:
+        """Return an array of finite numbers, of any length.
+
+        Raises:
+            FileFormatError: it is missing, or not such an array.
+        """
+        value = self._value(key, _MISSING, "a list of numbers")
+        return self._numbers((key,), value, len(value) if isinstance(value, list) else 0)
+
     def vectors(self, key: str, length: int) -> list[Array]:
         """Return a list of arrays of that many finite numbers each.
 
@@ -192,6 +215,17 @@ class Table:
         for i, row in enumerate(value):
             if not isinstance(row, list) or len(row) != length or not all(isinstance(text, str) for text in row):
                 raise self.error(key, f"expected {length} texts in quotes, got {_value_text(row)}", i)
+        return value
+
+    def flag(self, key: str, default: Any = _MISSING) -> bool:
+        """Return a truth value.
+
+        Raises:
+            FileFormatError: it is missing without a default, or something else.
+        """
+        value = self._value(key, default, "true or false")
+        if not isinstance(value, bool):
+            raise self.error(key, f"expected true or false, got {_value_text(value)}")
         return value
 
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
@@ -244,6 +278,10 @@ class Table:
     def is_table(self, key: str) -> bool:
         """Whether the value of a key is a table."""
         return isinstance(self._data.get(key), dict)
+
+    def is_empty(self, key: str) -> bool:
+        """Whether the value of a key is an empty list."""
+        return self._data.get(key) == []
 
     def is_text(self, key: str) -> bool:
         """Whether the value of a key is a text."""

@@ -25,7 +25,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.distances import TOLERANCE, Distances
-from armwright.spatial.shapes import Solid, farthest
+from armwright.spatial.shapes import Solid, box_about, farthest
 
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
@@ -94,6 +94,20 @@ class Closest(NamedTuple):
     time: float
 
 
+class Meeting(NamedTuple):
+    """Two bodies that are too near at a configuration.
+
+    Attributes:
+        number: of the configuration, from 0.
+        bodies: their numbers.
+        distance: between them [m]; below 0 where they overlap.
+    """
+
+    number: int
+    bodies: tuple[int, int]
+    distance: float
+
+
 class Least(NamedTuple):
     """The least distance on motions.
 
@@ -158,9 +172,12 @@ class ClearanceChecker:
             bodies: with their arms among those.
             pairs: the numbers of bodies that may not meet.
         """
-        self._arms = arms
+        self.arms = arms
         self._distances = Distances([body.solid.shape for body in bodies])
         self._radii = np.array([farthest(body.solid.shape) for body in bodies])
+        boxes = [box_about(body.solid.shape) for body in bodies]
+        self._boxes = np.array([box for box, _ in boxes]).reshape(-1, 3)
+        self._around = np.array([around for _, around in boxes])
         self._arrange(bodies, pairs)
 
     def _arrange(self, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> None:
@@ -173,6 +190,16 @@ class ClearanceChecker:
         self._of_one = (arms[a] == arms[b]) & (arms[a] != "")
         self._from = np.where(self._of_one, np.minimum(links[a], links[b]), 0)
         self._outer = np.where(self._of_one & (links[a] > links[b]), a, b)
+
+    @property
+    def bodies(self) -> Sequence[Body]:
+        """The bodies."""
+        return self._bodies
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """The numbers of bodies that may not meet."""
+        return [(a, b) for a, b in self._pairs.tolist()]
 
     def rearranged(self, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> ClearanceChecker:
         """Return a checker of the same solids, which other links carry or which are at other poses.
@@ -207,9 +234,7 @@ class ClearanceChecker:
                 if not len(near.places):
                     continue
                 margins = window.margins[near.places]
-                # An allowed overlap is followed more closely.
-                fine = np.where(margins < 0, np.minimum(-_PART_OF_OVERLAP * margins, RESOLUTION), RESOLUTION)
-                met = np.flatnonzero(near.moved <= fine)
+                met = np.flatnonzero(near.moved <= resolution(margins))
                 if len(met) and not halves:
                     return self._closest(window, near, met[near.distances[met].argmin()])
                 # Something may be earlier than a contact: it is looked at again when that is decided.
@@ -262,6 +287,61 @@ class ClearanceChecker:
             row[near.places] = near.distances
         return result
 
+    def first_meeting(self, configurations: Mapping[str, Array], margins: Array) -> Meeting | None:
+        """Return the first of several configurations at which bodies are closer than they may be; None for none.
+
+        Args:
+            configurations: (k, n) of each arm; (n,) of one that stands.
+            margins: (p,) the distance that each pair has to keep [m].
+        """
+        poses = self._poses_at(configurations)
+        nearest = self._least_distances(poses)
+        standing: set[int] = set()
+        for i in np.flatnonzero((nearest < margins).any(axis=1)).tolist():
+            near = np.flatnonzero(nearest[i] < margins)
+            moving = set(self._pairs[near].ravel().tolist()) - standing
+            for body in moving:
+                self._distances.place(body, poses[i, body])
+            standing |= {body for body in moving if self._bodies[body].arm is None}
+            for (a, b), margin in zip(self._pairs[near].tolist(), margins[near].tolist(), strict=True):
+                distance = self._distances.between(a, b, max(margin, TOLERANCE))
+                if distance < margin:
+                    return Meeting(i, (a, b), distance)
+        return None
+
+    def distances_of(self, configurations: Mapping[str, Array], within: float) -> Array:
+        """Return the distances (p,) of all pairs at one configuration (n,) of each arm [m]; ``within`` where more."""
+        poses = self._poses_at(configurations)
+        result = np.full(len(self._pairs), within)
+        for body, pose in enumerate(poses[0]):
+            self._distances.place(body, pose)
+        for k in np.flatnonzero(self._least_distances(poses)[0] < within).tolist():
+            a, b = self._pairs[k].tolist()
+            result[k] = self._distances.between(a, b, within)
+        return result
+
+    def _poses_at(self, configurations: Mapping[str, Array]) -> Array:
+        """Return the poses (k, b, 4, 4) of all bodies at configurations."""
+        frames = {}
+        for name, q in configurations.items():
+            frames[name] = self.arms[name].base @ self.arms[name].arm.link_poses(np.atleast_2d(q))
+        poses = np.empty((max(map(len, frames.values())), len(self._bodies), 4, 4))
+        for number, body in enumerate(self._bodies):
+            carrier = np.eye(4) if body.arm is None else frames[body.arm][:, body.link]
+            poses[:, number] = carrier @ body.solid.pose
+        return poses
+
+    def _least_distances(self, poses: Array) -> Array:
+        """Return lower bounds (k, p) of the distances of pairs: from a ball about one body to a box about the other."""
+        bounds = np.full((len(poses), len(self._pairs)), -np.inf)
+        positions, R = poses[:, :, :3, 3], poses[:, :, :3, :3]
+        for ball, box in (self._pairs.T, self._pairs.T[::-1]):
+            away = positions[:, ball] - positions[:, box]
+            inside = np.einsum("kpi,kpij->kpj", away, R[:, box])
+            beyond = np.maximum(np.abs(inside) - self._boxes[box], 0.0)
+            np.maximum(bounds, np.linalg.norm(beyond, axis=2) - self._around[box] - self._radii[ball], out=bounds)
+        return bounds
+
     def nearest_points(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:
         """Return the points (2, 3) of two bodies that are nearest to each other, or deepest in each other [m]."""
         poses, _ = self._placed(motions, np.array([time]), np.array([time]))
@@ -308,9 +388,9 @@ class ClearanceChecker:
         """
         middles = (starts + ends) / 2
         poses = np.empty((len(starts), len(self._bodies), 4, 4))
-        links = max((placed.arm.arm.n for placed in self._arms.values()), default=0)
+        links = max((placed.arm.arm.n for placed in self.arms.values()), default=0)
         moved = np.zeros((len(starts), len(self._bodies), links + 1))
-        for name, placed in self._arms.items():
+        for name, placed in self.arms.items():
             motion = motions[name]
             frames = placed.base @ placed.arm.link_poses(motion(middles))
             changes = _largest_changes(motion, starts, ends)
@@ -325,6 +405,14 @@ class ClearanceChecker:
             if body.arm is None:
                 poses[:, number] = body.solid.pose
         return poses, moved
+
+
+def resolution(margins: Array) -> Array:
+    """Return by how much nearer than their margins pairs (k,) count as too near [m].
+
+    An allowed overlap is followed more closely.
+    """
+    return np.where(margins < 0, np.minimum(-_PART_OF_OVERLAP * margins, RESOLUTION), RESOLUTION)
 
 
 def _movement(arm: Arm, frames: Array, pose: Array, radius: float, changes: Array) -> Array:

@@ -17,8 +17,11 @@ from armwright.cell.part_poses import PartPoses
 from armwright.compiled.arm import planning_arm
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.trajectory import Trajectory, hold
-from armwright.physics.cell_bodies import CellBodies, Role, has_solids, pairs_of
+from armwright.physics.cell_bodies import has_solids
 from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, Closest, PlacedArm, Window
+from armwright.physics.joint_space import Margins
+from armwright.physics.placed_bodies import CellBodies, Role
+from armwright.physics.planner import PlannedPath, plan_path
 from armwright.physics.wanted_contacts import PlannedMove, Surroundings, WantedContacts
 
 # Larger distances are not looked for [m].
@@ -99,7 +102,7 @@ class CheckedBodies:
     Attributes:
         pairs: how many pairs of bodies may not meet, at the start.
         guessed: by arm of which no solids are known, the radii of the guessed ones, the largest and the smallest [m].
-        left_out: pairs of names that do not count, because they meet at the start where one of them is guessed.
+        left_out: pairs of names that do not count, because they meet at the start though one of them is a guess.
     """
 
     pairs: int
@@ -130,21 +133,26 @@ class CellCollisions:
         }
         at_start = PartPoses(cell)
         bodies = self._bodies.arranged(at_start)
-        pairs = pairs_of(bodies)
+        pairs = self._bodies.pairs(bodies)
         self._checker = ClearanceChecker(self._arms, bodies, pairs)
         self._left_out = self._too_fat(bodies, pairs)
         self._count = len(pairs) - len(self._left_out)
 
     def _too_fat(self, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> frozenset[tuple[int, int]]:
-        """Return the pairs that meet where the cell starts, of which one is a guess or both are of one arm."""
+        """Return the pairs that meet where the cell starts, though one of them is only a guess."""
         motions = {name: hold(arm.start, 0.0) for name, arm in self._cell.arms.items()}
         distances = self._checker.distances_at(motions, np.zeros(1), np.arange(len(pairs)), RESOLUTION)[0]
-        roles = self._bodies.roles
         return frozenset(
             pair
             for pair, distance in zip(pairs, distances.tolist(), strict=True)
-            if distance <= 0 and (any(roles[i].guessed for i in pair) or (bodies[pair[0]].arm == bodies[pair[1]].arm))
+            if distance <= 0 and self._may_be_too_fat(bodies, pair)
         )
+
+    def _may_be_too_fat(self, bodies: Sequence[Body], pair: tuple[int, int]) -> bool:
+        """Whether a link of a pair is a guess, or the gripper before a link of its own arm."""
+        roles = [self._bodies.roles[i] for i in pair]
+        of_one = bodies[pair[0]].arm == bodies[pair[1]].arm
+        return any(role.guessed or (of_one and role.in_gripper) for role in roles)
 
     @cached_property
     def checked(self) -> CheckedBodies:
@@ -175,23 +183,84 @@ class CellCollisions:
             beside: by arm, the parts that its fingers may touch.
             clearances: whether they are asked for.
         """
+        wanted = self._wanted(move, others, parts, beside)
+        contact = wanted.first_contact()
+        if contact is not None:
+            return MoveCheck(collision=self._collision(wanted, contact))
+        stages = range(len(move.stages)) if clearances else ()
+        found = (_clearance(wanted, stage) for stage in stages)
+        return MoveCheck(collision=None, clearances=tuple(found))
+
+    def path_past(
+        self,
+        move: PlannedMove,
+        others: Mapping[str, Trajectory],
+        parts: PartPoses,
+        beside: Mapping[str, frozenset[str]],
+        *,
+        stage: int,
+        goals: ArrayLike,
+        speed: float,
+    ) -> PlannedPath:
+        """Return a path instead of a stage of a MOVE that would run into something.
+
+        Args:
+            move: the MOVE.
+            others: as for ``check``.
+            parts: as for ``check``.
+            beside: as for ``check``.
+            stage: which of its stages, from 0; it goes from one configuration to another.
+            goals: (k, n) joint positions that it may end at.
+            speed: 1 to 120.
+
+        Raises:
+            PlanningError: there is none, with the cause.
+            IncapableArmError: gravity alone takes more than a joint may give on the path.
+            MissingExtraError: OMPL is not installed.
+        """
+        wanted = self._wanted(move, others, parts, beside)
+        begin = wanted.starts[stage]
+        old = move.stages[stage]
+
+        def certify(trajectory: Trajectory) -> Closest | None:
+            stages = (*move.stages[:stage], trajectory, *move.stages[stage + 1 :])
+            tried = self._wanted(attrs.evolve(move, stages=stages), others, parts, beside)
+            contact = tried.first_contact()
+            # What comes before and after is looked at by ``check``.
+            if contact is None or not begin <= contact.time <= begin + trajectory.duration:
+                return None
+            return contact._replace(time=contact.time - begin)
+
+        return plan_path(
+            wanted.surroundings.checker,
+            move.arm,
+            old(0.0),
+            goals,
+            others=others,
+            certify=certify,
+            speed=speed,
+            period=self._cell.period,
+            margin=Margins(*(wanted.margins_at(begin + part * old.duration) for part in (0.0, 0.5, 1.0))),
+        )
+
+    def _wanted(
+        self,
+        move: PlannedMove,
+        others: Mapping[str, Trajectory],
+        parts: PartPoses,
+        beside: Mapping[str, frozenset[str]],
+    ) -> WantedContacts:
         bodies = self._bodies.arranged(parts)
         pairs = [
             (i, j)
-            for i, j in pairs_of(bodies)
+            for i, j in self._bodies.pairs(bodies)
             if move.arm in (bodies[i].arm, bodies[j].arm) and (i, j) not in self._left_out
         ]
         checker = self._checker.rearranged(bodies, pairs)
         motions = {**others, move.arm: move.trajectory}
         known = list(zip(bodies, self._bodies.roles, strict=True))
         around = Surroundings(checker, motions, known, pairs, beside)
-        wanted = WantedContacts(move, around, self._cell.arms[move.arm].arm)
-        contact = checker.first_contact(motions, windows=wanted.windows)
-        if contact is not None:
-            return MoveCheck(collision=self._collision(wanted, contact))
-        stages = range(len(move.stages)) if clearances else ()
-        found = (_clearance(wanted, stage) for stage in stages)
-        return MoveCheck(collision=None, clearances=tuple(found))
+        return WantedContacts(move, around, self._cell.arms[move.arm].arm)
 
     def _collision(self, wanted: WantedContacts, contact: Closest) -> Collision:
         move, (checker, motions, bodies, pairs, _) = wanted.move, wanted.surroundings

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.physics.gripper import LIP_TOUCHES
-from armwright.physics.world_model import FLOOR, PLATE, WorldModel
+from armwright.physics.world_model import FLOOR, PIECE, PLATE, WorldModel
 
 # Parts, fixtures and arms that overlap by more at the start stand inside one another [m].
 OVERLAP = 1e-3
@@ -53,24 +53,26 @@ class Contacts:
         self._hand: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
         self._parts: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
         self._pads: dict[str, list[int]] = {name: [] for name in world.cell.arms}
-        self._part_geoms = {name: world.model.geom(name).id for name in world.parts}
+        self._part_geoms: dict[str, list[int]] = {name: [] for name in world.parts}
+        self._tools = {name: world.model.body(f"{name}/tool").id for name in world.cell.arms}
+        for number in range(world.model.ngeom):
+            self._add_geom(world, number)
         # What parts press with by their weight [N].
         self._weights = np.zeros(world.model.ngeom)
         for name, part in world.parts.items():
             self._weights[self._part_geoms[name]] = part.mass * float(np.linalg.norm(world.cell.gravity))
-        self._tools = {name: world.model.body(f"{name}/tool").id for name in world.cell.arms}
-        for number in range(world.model.ngeom):
-            self._add_geom(world, number)
         self._unwanted: npt.NDArray[np.bool_] = np.zeros((world.model.ngeom,) * 2, dtype=bool)
         self.hold({})
 
     def _add_geom(self, world: WorldModel, number: int) -> None:
-        name = world.model.geom(number).name
+        name = world.model.geom(number).name.partition(PIECE)[0]
         arm, slash, what = name.partition("/")
         if not slash or arm not in world.cell.arms:
             self.names.append(name)
             self._owners.append(_UNOWNED)
-            self._parts[number] = name in world.parts
+            if name in world.parts:
+                self._parts[number] = True
+                self._part_geoms[name].append(number)
             return
         self._owners.append(arm)
         self._hand[number] = not (what.startswith(("link", "base")))
@@ -125,20 +127,19 @@ class Contacts:
         if not data.ncon:
             return None
         geoms = data.contact.geom
-        touches: Counter[int] = Counter()
+        touches: Counter[str] = Counter()
         for pad in self._pads[arm]:
             first, second = geoms[:, 0] == pad, geoms[:, 1] == pad
             others = {*geoms[first, 1].tolist(), *geoms[second, 0].tolist()}
-            touches.update(other for other in others if self._parts[other])
+            touches.update({self.names[other] for other in others if self._parts[other]})
         needed = min(len(self._pads[arm]), LIP_TOUCHES)
-        held = min((other for other, count in touches.items() if count >= needed), default=None)
-        return None if held is None else self.names[held]
+        return min((part for part, count in touches.items() if count >= needed), default=None)
 
     def touches(self, data: Any, part: str) -> list[str]:
         """Return what a part touches."""
-        number = self._part_geoms[part]
-        pairs = data.contact.geom[: data.ncon]
-        others = {*pairs[pairs[:, 0] == number, 1].tolist(), *pairs[pairs[:, 1] == number, 0].tolist()}
+        numbers, pairs = self._part_geoms[part], data.contact.geom
+        mine = np.isin(pairs, numbers)
+        others = {*pairs[mine[:, 0] & ~mine[:, 1], 1].tolist(), *pairs[mine[:, 1] & ~mine[:, 0], 0].tolist()}
         return sorted({self.names[other] for other in others})
 
     def overlaps(self, data: Any) -> list[Overlap]:

@@ -26,6 +26,8 @@ _NEAR, LIP_TOUCHES, _FLAT = 1e-3, 3, 0.99
 _FINGER_MASS, _FINGER_INERTIA = 5e-3, 1e-6
 # What the drive of a finger moves, and its damping; gains with which it is positioned.
 _DRIVE_INERTIA, _DRIVE_DAMPING, _STIFFNESS, _SPEED_GAIN = 0.1, 20.0, 4000.0, 60.0
+# Damping of friction of held parts, by the step of the world.
+_FRICTION_DAMPING = 1.8
 # So far inside what they hold fingers are sent [m]: the limit of their force decides.
 _INSIDE = 0.01
 # A soft constraint of one geom with what it touches: rolling and torsional friction are small.
@@ -62,6 +64,33 @@ def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: flo
         solid = Solid(shape=pad.shape, pose=pad.pose)
         add_geom(spec, finger, f"{name}/{side} finger", solid, mass=0.0, **geoms | pads)
     _couple(spec, name)
+
+
+def grip(spec: Any, name: str, gripper: Gripper, part: str) -> None:
+    """Let the pads of an arm hold a part by friction that lets it slip as little as can be.
+
+    MuJoCo's contacts leave out the centripetal acceleration of what they carry, so a part that is carried on a curve
+    slips at 1 / damping - step / 2 times that acceleration. Friction is damped by nearly 2 / step; beyond that it would
+    swing.
+
+    Args:
+        spec: of the world, with the gripper and the part in it.
+        name: of the arm.
+        gripper: its gripper.
+        part: name of the part and of its geom.
+    """
+    step, sliding = spec.option.timestep, gripper.friction
+    for pad in pad_names(gripper):
+        pair = spec.add_pair(name=f"{name}/{pad} {part}", geomname1=f"{name}/{pad}", geomname2=part)
+        pair.condim, pair.friction = 4, (sliding, sliding, _ROLLING[0], _ROLLING[1], _ROLLING[1])
+        pair.solref, pair.solimp = (2 * step, 1.0), _STIFF
+        pair.solreffriction = (-1.0, -_FRICTION_DAMPING * _STIFF[1] / step)
+        pair.gap = 0.0 if gripper.kind == "fingers" else _NEAR
+
+
+def pad_names(gripper: Gripper) -> list[str]:
+    """Return the names of the geoms that touch what a gripper holds."""
+    return ["left finger", "right finger"] if gripper.kind == "fingers" else [f"lip{i}" for i in range(LIP)]
 
 
 def _add_cup(spec: Any, name: str, tool: Any, gripper: Gripper, options: dict[str, Any]) -> None:

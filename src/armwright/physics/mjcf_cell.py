@@ -94,7 +94,7 @@ def _arm(tree: MjcfTree, name: str, q: Array) -> tuple[CellArm, tuple[str, ...]]
     children = {
         link: [joint for joint in joints if joint.child not in gripper] for link, joints in tree.child_joints.items()
     }
-    alone = attrs.evolve(tree, child_joints=children, left_out={f"{name}/palm"})
+    alone = attrs.evolve(tree, child_joints=children, no_solids={f"{name}/palm"})
     reading = arm_in(alone, base, tool)
     starts = [float(q[model.joint(joint.name).qposadr[0]]) for joint in reading.arm.joints]
     cell_arm = CellArm(

@@ -22,13 +22,27 @@ _JOINT = (
     *("springref", "actuatorfrcrange"),
 )
 _GEOM = (
-    *("type", "size", "pos", "quat", "mass", "contype", "conaffinity", "condim", "friction", "priority", "margin"),
-    *("solref", "solimp", "group", "rgba"),
+    *(
+        "type",
+        "size",
+        "pos",
+        "quat",
+        "mass",
+        "contype",
+        "conaffinity",
+        "condim",
+        "friction",
+        "priority",
+        "margin",
+        "gap",
+    ),
+    *("solref", "solimp", "adhesion", "group", "rgba"),
 )
 _GENERAL = (
     *("forcelimited", "forcerange", "ctrllimited", "ctrlrange", "gear", "gaintype", "gainprm", "biastype", "biasprm"),
     "dyntype",
 )
+_PAIR = ("condim", "friction", "solref", "solreffriction", "solimp", "gap", "margin")
 _SPEC_NAMES = {"actuatorfrcrange": "actfrcrange"}
 
 
@@ -59,6 +73,7 @@ def spec_text(spec: Any, name: str, comment: Iterable[str], rename: Rename = lam
     _add_body(SubElement(root, "worldbody"), spec.worldbody, rename, mujoco)
     _add_actuators(root, spec, rename, mujoco)
     _add_couplings(root, spec, rename, mujoco)
+    _add_pairs(root, spec, rename, mujoco)
     if spec.keys:
         keys = SubElement(root, "keyframe")
         for key in spec.keys:
@@ -120,6 +135,19 @@ def _add_couplings(root: Element, spec: Any, rename: Rename, mujoco: Any) -> Non
         element.set("joint2", rename("joint", equality.name2))
         element.set("polycoef", _numbers(np.array(equality.data[:5])))
         _set(element, equality, plain, ("solref", "solimp"), mujoco)
+
+
+def _add_pairs(root: Element, spec: Any, rename: Rename, mujoco: Any) -> None:
+    if not spec.pairs:
+        return
+    contact, plain = SubElement(root, "contact"), mujoco.MjSpec().add_pair()
+    for pair in spec.pairs:
+        element = _named(contact, "pair", "pair", pair, rename)
+        element.set("geom1", rename("geom", pair.geomname1))
+        element.set("geom2", rename("geom", pair.geomname2))
+        _set(
+            element, pair, plain, ("condim", "friction", "solref", "solreffriction", "solimp", "gap", "margin"), mujoco
+        )
 
 
 def _named(element: Element, tag: str, kind: str, item: Any, rename: Rename) -> Element:

@@ -94,6 +94,13 @@ def self_pairs(arm: Arm, bodies: Iterable[Body] | None = None, held: Iterable[Bo
     return SelfPairs(tuple(checked), tuple(left_out))
 
 
+def random_configurations(arm: Arm) -> Array:
+    """Return the configurations (10000, n) that tell which bodies always touch: within limits, the same every time."""
+    lower, upper = ranges(arm)
+    draws = np.random.default_rng(_SEED).random((CONFIGURATIONS, arm.n))
+    return np.asarray(lower + draws * (upper - lower))
+
+
 def _neighbours(arm: Arm, a: int, b: int) -> str:
     """Say why two bodies are neighbours."""
     if b == arm.n + 1 and a == arm.n:
@@ -106,15 +113,13 @@ def _neighbours(arm: Arm, a: int, b: int) -> str:
 
 
 class _Touching:
-    """The bodies of an arm in random configurations within the limits of its joints."""
+    """The bodies of an arm in random configurations."""
 
     def __init__(self, arm: Arm, solids: Sequence[Sequence[Solid]]) -> None:
         self._solids = solids
         self._distances: Distances | None = None
         self._numbers: dict[tuple[int, int], int] = {}
-        lower, upper = ranges(arm)
-        draws = np.random.default_rng(_SEED).random((CONFIGURATIONS, arm.n))
-        self._frames = link_poses(arm, lower + draws * (upper - lower))
+        self._frames = link_poses(arm, random_configurations(arm))
         # What the tool holds is in the frame of the last link.
         self._frames[:, arm.n + 1] = self._frames[:, arm.n]
 
@@ -129,7 +134,7 @@ class _Touching:
         unknown: list[tuple[tuple[int, int], tuple[int, int], Flags]] = []
         for i, one in enumerate(self._solids[a]):
             for j, other in enumerate(self._solids[b]):
-                surely, maybe = _touch(one, other, frames_a, frames_b)
+                surely, maybe = touch_bounds(one, other, frames_a, frames_b)
                 touch |= surely
                 if (maybe & ~surely).any():
                     unknown.append(((a, i), (b, j), maybe & ~surely))
@@ -157,10 +162,16 @@ class _Rod(NamedTuple):
     axis: int = 2
 
 
-def _touch(one: Solid, other: Solid, frames: Array, others: Array) -> tuple[Flags, Flags]:
+def touch_bounds(one: Solid, other: Solid, frames: Array, others: Array) -> tuple[Flags, Flags]:
     """Return in which configurations (k,) two solids touch for sure, and in which they may.
 
     Capsules within the solids, and capsules around them, tell: for capsules and spheres that is all.
+
+    Args:
+        one: a solid.
+        other: another one.
+        frames: (k, 4, 4) poses of the frame of the first.
+        others: (k, 4, 4) poses of that of the second.
     """
     X, Y = frames @ one.pose, others @ other.pose
     inner = _gap(_within(one.shape), X, _within(other.shape), Y)

@@ -18,11 +18,11 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Flags
+from armwright.arrays import Array, Flags
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, join
-from armwright.physics.cell_bodies import Role
-from armwright.physics.clearance import Body, ClearanceChecker, Numbers, Window
+from armwright.physics.clearance import Body, ClearanceChecker, Closest, Numbers, Window
+from armwright.physics.placed_bodies import Role
 
 # How deep a held part may touch what it stands on, and on which length of the path [m].
 REST_DEPTH, REST_LENGTH = 0.5e-3, 0.01
@@ -175,6 +175,20 @@ class WantedContacts:
             zones += [(start + float(near[0][0]), start + float(near[0][-1]))]
             zones += [(start + float(near[1][0]), start + float(near[1][-1]))]
         return zones
+
+    def first_contact(self) -> Closest | None:
+        """Return where bodies meet for the first time that may not; None where none do."""
+        return self._checker.first_contact(self._motions, windows=self.windows)
+
+    def margins_at(self, time: float) -> Array:
+        """Return the margins of all pairs at a time [m], the smallest where it changes; minus infinity for none."""
+        margins = np.full(len(self._pairs), np.inf)
+        for window in self.windows:
+            if window.start <= time <= window.end:
+                here = np.full(len(self._pairs), -np.inf)
+                here[window.pairs] = window.margins
+                margins = np.minimum(margins, here)
+        return margins
 
     def margin_at_start(self, number: int) -> float:
         """Return the margin of a pair when the MOVE begins [m]; minus infinity where it may touch."""

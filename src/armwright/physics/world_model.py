@@ -14,13 +14,13 @@ from armwright.cell.model import Cell
 from armwright.cell.scene import Gripper, Part
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.geoms import add_geom, place, quaternion
-from armwright.physics.gripper import add_gripper
+from armwright.physics.gripper import add_gripper, grip
 from armwright.physics.markers import add_marker
 from armwright.physics.pictures import add_camera, add_lights
 from armwright.physics.plant import PlantArm, add_arm, finish, new_world
 from armwright.physics.vision import marker_name
 from armwright.spatial.poses import inverse
-from armwright.spatial.shapes import Solid, centroid, farthest, inertia
+from armwright.spatial.shapes import Solid, centroid, convex_solids, farthest, inertia
 
 # No step of the world is longer [s].
 _MAX_STEP = 1e-3
@@ -38,7 +38,13 @@ _SOFT = 0.02
 _BELOW, _FLOOR = 0.5, 20.0
 # The plate under a plane that yields: light, so that it adds nothing to what presses on it [kg], and damped.
 _PLATE_MASS, _PLATE_DAMPING, _PLATE = 0.3, 30.0, np.array([5.0, 5.0, 0.02])
+# Between the name of a body and the number of a piece of it.
+PIECE = "#"
 FLOOR, PLATE = "the floor", "the plane"
+# Colours: red, green, blue and opacity.
+_ARM, _GRIPPER, _FURNITURE = (0.78, 0.8, 0.83, 1.0), (0.25, 0.27, 0.3, 1.0), (0.62, 0.56, 0.48, 1.0)
+_GROUND = (0.35, 0.38, 0.41, 1.0)
+_PARTS = ((0.85, 0.5, 0.2, 1.0), (0.25, 0.5, 0.75, 1.0), (0.4, 0.6, 0.3, 1.0), (0.7, 0.35, 0.5, 1.0))
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -89,20 +95,29 @@ def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantA
         bit = 4 << number
         # An arm does not meet itself: that is looked for before it moves.
         affinity = _ALL - bit - _HAND
-        bits = {"contype": bit, "conaffinity": affinity}
+        bits = {"contype": bit, "conaffinity": affinity, "rgba": _ARM}
         arm = cell_arm.plant or cell_arm.arm
         gripper = cell_arm.gripper or Gripper()
         plant = add_arm(spec, name, arm, cell_arm.base, arm_bodies(name, arm, gripper), **bits)
-        hand = {"contype": bit | _HAND, "conaffinity": affinity}
+        hand = {"contype": bit | _HAND, "conaffinity": affinity, "rgba": _GRIPPER}
         add_gripper(spec, name, plant.tool, gripper, spec.option.timestep, **hand)
         plants.append(plant)
     _add_standing(spec, cell)
     _add_floor(spec, cell, parts)
-    for part in parts.values():
-        _add_part(spec, part)
+    for number, part in enumerate(parts.values()):
+        _add_part(spec, part, _PARTS[number % len(_PARTS)])
+    for name, cell_arm in cell.arms.items():
+        for label in (label for part in parts.values() for label, _ in _pieces(part.name, Solid(shape=part.shape))):
+            grip(spec, name, cell_arm.gripper or Gripper(), label)
     _add_plate(spec, cell)
     _add_cameras(spec, cell, {plant.name: plant.tool for plant in plants})
     return spec, tuple(plants)
+
+
+def _pieces(name: str, solid: Solid) -> list[tuple[str, Solid]]:
+    """Return the convex pieces of a solid, by names that begin with its own."""
+    pieces = convex_solids([solid])
+    return [(f"{name}{PIECE}{number}" if number else name, piece) for number, piece in enumerate(pieces)]
 
 
 def _surface(friction: float) -> dict[str, Any]:
@@ -118,7 +133,8 @@ def _add_standing(spec: Any, cell: Cell) -> None:
     for name, fixture in cell.fixtures.items():
         solid = Solid(shape=fixture.shape, pose=fixture.pose)
         bits = {"contype": _STANDING, "conaffinity": _ALL}
-        add_geom(spec, spec.worldbody, name, solid, **bits, **_furniture(fixture.friction))
+        for label, piece in _pieces(name, solid):
+            add_geom(spec, spec.worldbody, label, piece, rgba=_FURNITURE, **bits, **_furniture(fixture.friction))
 
 
 def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
@@ -133,6 +149,7 @@ def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=(_FLOOR, _FLOOR, 0.1),
         pos=(0.0, 0.0, min(0.0, lowest) - _BELOW),
+        rgba=_GROUND,
         contype=0,
         conaffinity=_PART,
         **_surface(1.0),
@@ -153,7 +170,7 @@ def _add_cameras(spec: Any, cell: Cell, tools: Mapping[str, Any]) -> None:
             add_marker(spec, spec.body(name), part.marker, marker_name(name))
 
 
-def _add_part(spec: Any, part: Part) -> None:
+def _add_part(spec: Any, part: Part, colour: tuple[float, ...]) -> None:
     body = spec.worldbody.add_body(name=part.name, **place(part.pose))
     body.add_freejoint(name=part.name)
     moments, axes = np.linalg.eigh(inertia(part.shape))
@@ -162,7 +179,8 @@ def _add_part(spec: Any, part: Part) -> None:
     body.explicitinertial, body.mass, body.inertia = True, part.mass, part.mass * moments
     body.ipos, body.iquat = centroid(part.shape), quaternion(axes)
     bits = {"contype": _PART, "conaffinity": _ALL}
-    add_geom(spec, body, part.name, Solid(shape=part.shape), mass=0.0, **bits, **_surface(part.friction))
+    for label, piece in _pieces(part.name, Solid(shape=part.shape)):
+        add_geom(spec, body, label, piece, mass=0.0, rgba=colour, **bits, **_surface(part.friction))
 
 
 def _add_plate(spec: Any, cell: Cell) -> None:
@@ -188,6 +206,7 @@ def _add_plate(spec: Any, cell: Cell) -> None:
         pos=(0.0, 0.0, -_PLATE[2]),
         mass=0.0,
         # Links of an arm may stand in the plane; what it holds and holds with may not.
+        rgba=_FURNITURE,
         contype=0,
         conaffinity=_PART | _HAND,
         **_furniture(0.8),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import attrs
 
+from armwright.cell.assembly import assembly_cell, is_assembly
 from armwright.cell.hardware import Hardware, HardwareFactory
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
@@ -22,7 +23,7 @@ from armwright.program.flow_analysis import analysis
 from armwright.program.flow_analysis.analysis import Flow
 from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
-from armwright.program.language.words import Standard
+from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.semantics import check
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport, known_cell
 from armwright.program.semantics.symbols import Symbols
@@ -242,11 +243,24 @@ def imported_files(program: Path, compiled: Compilation) -> tuple[Path, ...]:
     return tuple(program.parent / node.path.value for node in imports)
 
 
+def read_imported_cell(path: Path) -> Cell:
+    """Return what a file that a program IMPORTs has: a cell, or the frames of an assembly.
+
+    Raises:
+        MissingExtraError: it is STEP, and cascadio is not installed.
+        FileFormatError: the file cannot be read.
+    """
+    # A program names the file, and it may not name what never ends.
+    if is_assembly(path):
+        return assembly_cell(regular_file(path), VOCABULARIES[Standard.RLO_2].reserved)
+    return read_cell(regular_file(path), arms_needed=False)
+
+
 def import_reader(folder: Path) -> ReadImport:
     """Return what reads the files that a program of this folder IMPORTs."""
 
     def read(name: str) -> ImportedFrames:
-        cell = read_cell(regular_file(folder / name), arms_needed=False)
+        cell = read_imported_cell(folder / name)
         return ImportedFrames(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     return read

@@ -12,7 +12,9 @@ from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, Excerpt, excerpt, omission_text, shorten_line, shorten_list
 from armwright.program.vm.machine import RunError
+from armwright.program.vm.move_diagnostics import path_text
 from armwright.program.vm.recording import Effect, Recording, RunStage
+from armwright.report.collision_text import collision_text
 from armwright.report.run_files import ending_data, summary_data
 
 
@@ -42,15 +44,27 @@ class RunSummary:
             for run in recording.stages
             if run.stage.slowed
         ]
+        planned = [
+            f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.goal_names[-1]}: "
+            f"{path_text(run.path)}"
+            for run in recording.stages
+            if run.path is not None
+        ]
         moves = sum(effect.kind == "MOVE" for effect in recording.effects)
         ticks = len(recording.streams[0].t) if recording.streams else 0
         numbers = (
             f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, "
             f"{counted(moves, 'move')}, {counted(len(recording.stages), 'stage')}, {counted(ticks, 'servo tick')}"
         )
-        physics = physics_note(recording)
-        notes = (numbers, *physics, "Collisions are not checked.")
-        return (*shorten_list(slowed, MAX_TERMINAL_LINES, self.hint), *notes)
+        collisions = (
+            "Collisions are not checked." if recording.checked is None else f"Collisions: {collision_text(recording)}."
+        )
+        return (
+            *shorten_list([*slowed, *planned], MAX_TERMINAL_LINES, self.hint),
+            numbers,
+            *physics_note(recording),
+            collisions,
+        )
 
     def as_data(self) -> dict[str, Any]:
         """Return the summary as plain data in SI units."""

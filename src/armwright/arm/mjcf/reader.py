@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import attrs
 import numpy as np
 
 from armwright.arm.mjcf.compiled import compile_mjcf
 from armwright.arm.mjcf.elements import read_text
-from armwright.arm.mjcf.solids import ellipsoids_of
 from armwright.arm.mjcf.tree import MjcfTree, tree_of
 from armwright.arm.model import Arm
 from armwright.arm.tree.kinematic_tree import Lock, locked_positions
@@ -84,23 +82,6 @@ def arm_in(tree: MjcfTree, base: str | None = None, tip: str | None = None) -> R
     model = tree.model
     gravity = model.opt.gravity * (not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     try:
-        reading = serial_arm(tree, base, tip, np.array(gravity), "stated")
+        return serial_arm(tree, base, tip, np.array(gravity), "stated")
     except (InvalidValueError, ShapeError) as error:
         raise FileFormatError(tree.path, None, "", str(error)) from error
-    return attrs.evolve(reading, notes=(*reading.notes, *_left_out(tree, reading.arm.base_link)))
-
-
-def _left_out(tree: MjcfTree, base: str) -> list[str]:
-    """Say what of the bodies that hang on a link is not read."""
-    notes, pending = [], [base]
-    while pending:
-        link = pending.pop()
-        pending += [joint.child for joint in reversed(tree.child_joints[link])]
-        number = tree.bodies[link]
-        if number is None:
-            continue
-        if tree.model.body_gravcomp[number]:
-            notes.append(f"body '{link}': its gravity compensation is not read")
-        if ellipsoids_of(tree.model, number):
-            notes.append(f"body '{link}': ellipsoids are not read")
-    return notes

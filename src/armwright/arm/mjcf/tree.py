@@ -16,7 +16,7 @@ import numpy as np
 
 from armwright.arm.mjcf.couplings import couplings
 from armwright.arm.mjcf.drives import limits_of, motor_of
-from armwright.arm.mjcf.solids import pose_of, solids_of
+from armwright.arm.mjcf.solids import ellipsoids_of, pose_of, solids_of
 from armwright.arm.model import Limits, Link, Motor
 from armwright.arm.tree.kinematic_tree import check_lock, listed
 from armwright.arrays import Array
@@ -133,7 +133,7 @@ class MjcfTree:
         parent_joints: by the name of a link: the joint that carries it.
         child_joints: by the name of a link: the joints that hang on it; of those of sites, only where nothing else
             hangs there, so that a site at the end is the tool.
-        left_out: names of geoms that are no solids of links.
+        no_solids: names of geoms that are no solids of links.
     """
 
     path: Path
@@ -142,7 +142,7 @@ class MjcfTree:
     bodies: Mapping[str, int | None]
     parent_joints: Mapping[str, MjcfJoint]
     child_joints: Mapping[str, list[MjcfJoint]]
-    left_out: Container[str] = ()
+    no_solids: Container[str] = ()
 
     @property
     def function(self) -> str:
@@ -197,7 +197,18 @@ class MjcfTree:
     def solids(self, link: str) -> tuple[Solid, ...]:
         """Return what of a link meets other bodies, in its frame."""
         number = self.bodies[link]
-        return () if number is None else solids_of(self.model, number, self.left_out)
+        return () if number is None else solids_of(self.model, number, self.no_solids)
+
+    def left_out(self, links: Sequence[str]) -> list[str]:
+        """Return sentences on what of links is not read."""
+        notes = []
+        for link in links:
+            number = self.bodies[link]
+            if number is not None and self.model.body_gravcomp[number]:
+                notes.append(f"body '{link}': its gravity compensation is not read")
+            if number is not None and ellipsoids_of(self.model, number):
+                notes.append(f"body '{link}': ellipsoids are not read")
+        return notes
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the whole file."""

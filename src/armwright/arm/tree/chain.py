@@ -85,10 +85,14 @@ def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Cha
         raise tree.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(movable))}")
     X, moving = np.eye(4), []
     branches: list[TreeJoint] = []
+    # What moves beside the chain and hangs on the base is no load of the arm.
+    standing = list(_welded_links(tree, base, X, []))
+    links = [link for link, _ in standing]
     for joint in path:
         X = X @ joint.origin
         if not joint.fixed:
-            welded = _welded_links(tree, joint.child, X, branches)
+            welded = list(_welded_links(tree, joint.child, X, branches))
+            links += [link for link, _ in welded]
             bodies = tuple(carry(tree.body(link), X_BL) for link, X_BL in welded)
             X_BJ = X @ homogeneous(np.eye(3), joint.anchor)
             moving.append(MovingJoint(joint=joint, X_BJ=X_BJ, axis=X[:3, :3] @ joint.axis, bodies=bodies))
@@ -98,7 +102,8 @@ def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Cha
         root = tree.parent_joints[root].parent
     for joint in _joint_path(tree, root, base):
         X_RB = X_RB @ joint.origin
-    solids = [x.moved(X_BL) for link, X_BL in _welded_links(tree, base, np.eye(4), []) for x in tree.solids(link)]
+    solids = [solid.moved(X_BL) for link, X_BL in standing for solid in tree.solids(link)]
+    notes += tuple(tree.left_out(links))
     return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, base_solids=tuple(solids), notes=notes)
 
 
@@ -151,7 +156,8 @@ def _joint_path(tree: Tree, base: str, tip: str) -> list[TreeJoint]:
 def _welded_links(tree: Tree, link: str, X_BL: Array, branches: list[TreeJoint]) -> Iterator[tuple[str, Array]]:
     """Walk through the links that are fixed to a link and to one another, with their poses in the frame of the base.
 
-    Joints that move and hang on one of them are put into ``branches``.
+    Joints that move and hang on one of them are put into ``branches``, links with shapes that are not read into
+    ``unread``.
     """
     pending = [(link, X_BL)]
     while pending:

@@ -112,6 +112,9 @@ class Tree(Protocol):
     def solids(self, link: str) -> tuple[Solid, ...]:
         """Return what of a link meets other bodies, in its frame."""
 
+    def left_out(self, links: Sequence[str]) -> list[str]:
+        """Return sentences on what of links is not read, once they have been read."""
+
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the whole file."""
 

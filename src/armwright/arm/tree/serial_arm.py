@@ -16,6 +16,7 @@ from armwright.arm.tree.chain import Chain, chain_of
 from armwright.arm.tree.kinematic_tree import Tree
 from armwright.arrays import Array
 from armwright.spatial.poses import inverse
+from armwright.spatial.shapes import Solid
 
 # Axes that are this near to parallel were meant to be [rad]: a half turn typed as 3.1416 is 0.7e-5 rad off.
 _MEANT_PARALLEL = 1e-4
@@ -86,17 +87,22 @@ def serial_arm(
 
 def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:
     """Weld bodies that are given in the frame of the base, and see them from the frame of a link."""
+    X_LB = inverse(X_BL)
+    solids = [_cleared(solid.moved(X_LB), size) for body in bodies for solid in body.solids]
     unknown = [body for body in bodies if body.unknown]
-    whole = unknown[0] if unknown else _welded([body for body in bodies if body.mass or body.inertia.any()])
-    solids = [solid for body in bodies for solid in body.solids]
-    seen = carry(attrs.evolve(whole, solids=solids), inverse(X_BL))
     if unknown:
-        return seen
+        return attrs.evolve(unknown[0], solids=solids)
+    whole = _welded([body for body in bodies if body.mass or body.inertia.any()])
+    seen = carry(attrs.evolve(whole, solids=()), X_LB)
     # What has no mass has no centre of mass either; it is put at the origin.
     com = cleared(seen.com, size) if seen.mass else np.zeros(3)
     inertia = cleared(seen.inertia, float(np.abs(seen.inertia).max()))
     known = impossible_moments(seen.mass, com, inertia) is None
-    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known, solids=seen.solids)
+    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known, solids=solids)
+
+
+def _cleared(solid: Solid, size: float) -> Solid:
+    return attrs.evolve(solid, pose=cleared_pose(solid.pose, size))
 
 
 def _welded(bodies: Sequence[Link]) -> Link:

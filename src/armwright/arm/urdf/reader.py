@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
@@ -12,7 +13,14 @@ from armwright.errors import KindError, shown
 from armwright.files.inputs import file_path
 
 
-def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Arm:
+def load_urdf(
+    path: Path | str,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    lock: Lock = (),
+    packages: Mapping[str, Path | str] | None = None,
+) -> Arm:
     """Return the serial arm between two links of a URDF file.
 
     Positions of the arm are those of the joints in the file; the base is the frame of the base link, the tool that of
@@ -25,23 +33,34 @@ def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
             that carries all of them.
         lock: names of joints that are held at 0, as if they were fixed, such as those of a gripper; or where joints
             are held by their names [rad] or [m].
+        packages: folders of packages, by name, in which the meshes are that the file names as ``package://NAME/...``;
+            others are looked for below the folder of the file.
 
     Raises:
-        KindError: ``path`` is no path, ``lock`` one text, or a position no number.
+        KindError: ``path`` is no path, ``packages`` no mapping, ``lock`` one text, or a position no number.
         InvalidValueError: a joint is to be held where its limits do not let it.
         MissingExtraError: lxml is not installed.
         UnknownNameError: there is no link, or no joint, of that name.
         FileFormatError: the file is missing, broken, or has no such arm; the text has file, line and key.
     """
-    return read_urdf(path, base=base, tip=tip, lock=lock).arm
+    return read_urdf(path, base=base, tip=tip, lock=lock, packages=packages).arm
 
 
-def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Reading:
+def read_urdf(
+    path: Path | str,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    lock: Lock = (),
+    packages: Mapping[str, Path | str] | None = None,
+) -> Reading:
     """Return the serial arm between two links of a URDF file, and what was not taken as it stands.
 
     Arguments and errors are those of ``load_urdf``.
     """
     if not isinstance(path, str | Path):
         raise KindError(f"path: expected the path of a URDF file, got {shown(path)}")
-    path = file_path(path)
-    return serial_arm(read_robot(path, locked_positions(lock)), base, tip, UPRIGHT_GRAVITY)
+    if packages is not None and not isinstance(packages, Mapping):
+        raise KindError(f"packages: expected folders by the names of packages, got {shown(packages)}")
+    robot = read_robot(file_path(path), locked_positions(lock), packages)
+    return serial_arm(robot, base, tip, UPRIGHT_GRAVITY)

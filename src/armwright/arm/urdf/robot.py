@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -13,14 +13,15 @@ import numpy as np
 from armwright.arm.model import Limits, Link, Motor
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.tree.kinematic_tree import check_lock, listed
-from armwright.arm.urdf.elements import Element, read_elements
+from armwright.arm.urdf.elements import Element, origin_of, read_elements
+from armwright.arm.urdf.geometry import has_unread_shapes, solids_of
+from armwright.arm.urdf.meshes import MeshFiles
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, closest, one_of
 from armwright.files.limits import limit, limit_message
-from armwright.spatial.euler import from_rpy
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
-from armwright.spatial.shapes import Solid
+from armwright.spatial.shapes import LARGEST_SIZE, Solid
 
 # URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
 NO_LIMIT = 1e30
@@ -117,6 +118,7 @@ class Robot:
         links: by name, in the order of the file.
         parent_joints: by the name of a link: the joint that carries it.
         child_joints: by the name of a link: the joints that hang on it.
+        meshes: where the meshes of links are.
     """
 
     path: Path
@@ -124,6 +126,7 @@ class Robot:
     links: dict[str, Element]
     parent_joints: dict[str, UrdfJoint]
     child_joints: dict[str, list[UrdfJoint]]
+    meshes: MeshFiles
 
     @property
     def function(self) -> str:
@@ -142,24 +145,34 @@ class Robot:
         return roots[0]
 
     def body(self, link: str) -> Link:
-        """Return the body of a link, in its frame."""
-        return body_of(self.links[link])
+        """Return the body of a link, in its frame, with its solids."""
+        return attrs.evolve(body_of(self.links[link]), solids=self.solids(link))
 
-    def solids(self, link: str) -> tuple[Solid, ...]:  # noqa: ARG002 - no shapes are read
-        """Return what of a link meets other bodies: nothing is known of it."""
-        return ()
+    def solids(self, link: str) -> tuple[Solid, ...]:
+        """Return what of a link meets other bodies, in its frame."""
+        return solids_of(self.links[link], self.meshes)
+
+    def left_out(self, links: Sequence[str]) -> list[str]:
+        """Return sentences on the shapes of links that are not read."""
+        unread = [link for link in links if has_unread_shapes(self.links[link], self.meshes)]
+        kinds = f"boxes, cylinders, spheres and capsules up to {LARGEST_SIZE:g} m"
+        notes = [f"of shapes, {kinds} are read; links with others: {listed(unread)}"] if unread else []
+        return [*notes, *self.meshes.notes()]
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the whole file."""
         return FileFormatError(self.path, None, "", message)
 
 
-def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
+def read_robot(
+    path: Path, lock: Mapping[str, float] | None = None, packages: Mapping[str, Path | str] | None = None
+) -> Robot:
     """Read a URDF file.
 
     Args:
         path: the file.
         lock: where joints are held by their names [rad] or [m], as if they were fixed.
+        packages: folders of packages, by name, in which meshes are.
 
     Raises:
         MissingExtraError: the library that parses it is not installed.
@@ -190,7 +203,10 @@ def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
     if not links:
         raise root.error("", "expected at least one <link> in <robot>")
     name = root.attributes.get("name") or path.stem
-    robot = Robot(path=path, name=name, links=links, parent_joints=parent_joints, child_joints=child_joints)
+    meshes = MeshFiles(folder=path.parent, packages=packages or {})
+    robot = Robot(
+        path=path, name=name, links=links, parent_joints=parent_joints, child_joints=child_joints, meshes=meshes
+    )
     _refuse_cycles(robot)
     return robot
 
@@ -228,19 +244,6 @@ def _refuse_cycles(robot: Robot) -> None:
         cycle = sorted(set(error.args[1]))
         joint = robot.parent_joints[cycle[0]]
         raise joint.element.error("", f"links form a cycle: {', '.join(map(repr, cycle))}") from None
-
-
-def origin_of(element: Element) -> Array:
-    """Return the pose (4, 4) that the <origin> in an element gives; the same frame where there is none.
-
-    Raises:
-        FileFormatError: it is not written as one.
-    """
-    origin = element.find("origin")
-    if origin is None:
-        return np.eye(4)
-    rpy, xyz = (origin.vector(key, (0.0, 0.0, 0.0)) for key in ("rpy", "xyz"))
-    return homogeneous(from_rpy(*rpy), xyz)
 
 
 def axis_of(joint: UrdfJoint) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import attrs
 import numpy as np
@@ -12,11 +13,13 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.physics.collisions import Collision, MoveCheck
+from armwright.physics.planner import PlannedPath
 from armwright.physics.wanted_contacts import PlannedMove
 from armwright.program.language.source import Span
 from armwright.program.vm.machine import Machine, RunError
 from armwright.program.vm.move_diagnostics import collision_advice, collision_location, collision_message
 from armwright.program.vm.move_request import MoveRequest
+from armwright.program.vm.planned_paths import can_be_passed, replanned
 from armwright.program.vm.process import Motion, PendingStage, Process, Threat
 
 # A motion that has so little left is over [s].
@@ -52,14 +55,43 @@ def checked_stages(
         after_force=hand.pressed,
         on_force=any(guard.reads_force for guard in request.guards),
     )
-    check = _check(machine, move)
+    done = replanned(
+        machine,
+        move,
+        [stage for stage, _ in planned],
+        partial(_path_past, machine, request.speed),
+        partial(_check, machine),
+        fixed_duration=request.duration is not None,
+    )
+    move, check = done.move, done.check
     if check.collision is not None:
         goal = request.goals[planned[check.collision.stage][1][-1]]
-        raise _error(machine, process, check.collision, arm, (goal.label, goal.span))
+        can_plan = can_be_passed(check.collision, done.stages[check.collision.stage])
+        error = _error(machine, process, check.collision, arm, (goal.label, goal.span), can_plan=can_plan)
+        raise _with_failure(error, done.failure) if done.failure else error
     parts = machine.hardware.part_poses()
     hand.beside = frozenset({move.goal_part} if move.goal_part else ()) | hand.beside - set(parts.held_by(arm))
     hand.pressed = move.on_force
-    return [stage._replace(clearance=clearance) for stage, clearance in zip(stages, check.clearances, strict=True)]
+    starts = np.cumsum([0, *(round(stage.trajectory.duration / period) for stage in done.stages)]).tolist()
+    return [
+        PendingStage(stage, names, machine.state.ticks + starts[k], check.clearances[k], done.paths.get(k))
+        for k, (stage, (_, names)) in enumerate(zip(done.stages, planned, strict=True))
+    ]
+
+
+def _path_past(machine: Machine, speed: float, move: PlannedMove, stage: int, goals: Array) -> PlannedPath:
+    """Plan a path instead of a stage of a MOVE."""
+    collisions = machine.collisions
+    assert collisions is not None  # noqa: S101 - asked for only then
+    others, beside = _surroundings(machine, move.arm)
+    parts = machine.hardware.part_poses()
+    return collisions.path_past(move, others, parts, beside, stage=stage, goals=goals, speed=speed)
+
+
+def _with_failure(error: RunError, failure: str) -> RunError:
+    """Return an error that also says why no path past what is in the way was planned."""
+    notes = (*error.diagnostic.notes, f"no path past it was planned: {failure}")
+    return RunError(attrs.evolve(error.diagnostic, notes=notes), error.tree, error.time)
 
 
 def _goal_part(machine: Machine, arm: str, last: Trajectory) -> str | None:
@@ -79,9 +111,14 @@ def _check(machine: Machine, move: PlannedMove, *, clearances: bool = True) -> M
     """Look for what a motion of an arm runs into, from now on."""
     collisions = machine.collisions
     assert collisions is not None  # noqa: S101 - asked for only then
-    others = {name: _course(machine, name) for name in machine.cell.arms if name != move.arm}
-    beside = {name: hand.beside for name, hand in machine.state.hands.items()}
+    others, beside = _surroundings(machine, move.arm)
     return collisions.check(move, others, machine.hardware.part_poses(), beside, clearances=clearances)
+
+
+def _surroundings(machine: Machine, arm: str) -> tuple[dict[str, Trajectory], dict[str, frozenset[str]]]:
+    """Return what all other arms do from now on, and the parts that the fingers of each arm may touch."""
+    others = {name: _course(machine, name) for name in machine.cell.arms if name != arm}
+    return others, {name: hand.beside for name, hand in machine.state.hands.items()}
 
 
 def _course(machine: Machine, arm: str) -> Trajectory:
@@ -182,9 +219,18 @@ def threatened_error(machine: Machine, process: Process, motion: Motion) -> RunE
     return RunError(diagnostic, error.tree, error.time)
 
 
-def _error(machine: Machine, process: Process, collision: Collision, arm: str, goal_at: tuple[str, Span]) -> RunError:
+def _error(
+    machine: Machine,
+    process: Process,
+    collision: Collision,
+    arm: str,
+    goal_at: tuple[str, Span],
+    *,
+    can_plan: bool = False,
+) -> RunError:
     """Return the error of a MOVE of an arm that would run into something on its way to a goal, called so there."""
     goal, span = goal_at
+    plan_advice = ["`armwright run --plan` looks for a path past it"] if can_plan and not machine.cell.plan else []
     frame = next((name for name in machine.state.tree if machine.spelling(name) == goal), None)
     return machine.error(
         process,
@@ -194,5 +240,5 @@ def _error(machine: Machine, process: Process, collision: Collision, arm: str, g
         "cannot be reached on this path",
         secondary=machine.origin_labels(frame, f"`{goal}` got its pose here") if frame else [],
         notes=collision_location(collision, arm),
-        helps=collision_advice(collision, arm),
+        helps=[*collision_advice(collision, arm), *plan_advice],
     )

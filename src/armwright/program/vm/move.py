@@ -67,6 +67,7 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
         goal=machine.variable_name(process, request.begin.operands[1]) or request.form.goal,
         implied_affix=implied,
         stages=stages,
+        paths=tuple(stage.path for stage in stages if stage.path is not None),
         speed=request.speed,
         stack_depth=len(process.stack),
         start=machine.next_start(),
@@ -273,7 +274,7 @@ def _unit_advice(machine: Machine, process: Process, goal: Goal, arm: str) -> tu
 def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     """Begin the next stage of a motion."""
     check_late_stage(machine, process, motion)
-    (stage, goal_names, _, clearance), period = motion.stages.pop(0), machine.cell.period
+    (stage, goal_names, _, clearance, path), period = motion.stages.pop(0), machine.cell.period
     arm, trajectory = machine.cell.arms[motion.arm].arm, stage.trajectory
     ticks = round(trajectory.duration / period)
     # A run that lasts longer comes to its end before.
@@ -304,6 +305,7 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
             peak_effort=peak,
             peak_time=when,
             clearance=clearance,
+            path=path,
         )
     )
     run = TrajectorySegment(t0=machine.now, trajectory=trajectory, duration=trajectory.duration, tau=tau)

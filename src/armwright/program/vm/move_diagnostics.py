@@ -6,10 +6,12 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.errors import counted
 from armwright.motion.detour import Detour
 from armwright.motion.plan import Obstacle
 from armwright.physics.clearance import RESOLUTION
 from armwright.physics.collisions import LOOKED_FOR, Collision, StageClearance
+from armwright.physics.planner import PlannedPath
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm.recording import RunStage
 
@@ -136,6 +138,13 @@ def clearance_warning(run: RunStage, wanted: float) -> Diagnostic | None:
     )
 
 
+def path_text(path: PlannedPath) -> str:
+    """Return how a path past other bodies was planned."""
+    corners = len(path.waypoints) - 2
+    by = f"by {counted(corners, 'rounded corner')}" if corners else "straight to another configuration"
+    return f"a path past other bodies was planned {by}, with {counted(path.checked, 'checked configuration')}"
+
+
 def _detour_course(detour: Detour, arm: str) -> str:
     """Return the course of a detour."""
     if detour.via is None:
@@ -147,6 +156,8 @@ def stage_note(run: RunStage) -> str:
     """Return what a report has to say beside a stage: where it was stopped, its detour, why it is slow."""
     stage, where = run.stage, _stage_obstacle(run)
     notes = [stage.slowed] if stage.slowed else []
+    if run.path is not None:
+        notes.append(path_text(run.path))
     if run.stopped:
         notes.append(
             f"stopped on its path, after {run.duration:.3f} s and {run.length * 1e3:.1f} mm "

@@ -11,6 +11,7 @@ from armwright.cell.hardware import PeakContact
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.collisions import Collision, StageClearance
+from armwright.physics.planner import PlannedPath
 from armwright.program.language.source import Span
 from armwright.program.vm.recording import TimedKind
 
@@ -119,12 +120,14 @@ class PendingStage(NamedTuple):
         goal_names: the frames it goes to, as the program spells them.
         start_tick: when it is to begin [ticks].
         clearance: how near it comes to other bodies; None where that is not looked at.
+        path: that was planned past other bodies; None where the straight one of the joints was free.
     """
 
     planned: PlannedStage
     goal_names: tuple[str, ...]
     start_tick: int
     clearance: StageClearance | None = None
+    path: PlannedPath | None = None
 
 
 class Threat(NamedTuple):
@@ -174,6 +177,7 @@ class Motion:
         threat: what it would run into, because another arm was stopped; None where that is not so.
         first_contact: the trajectory of a stage that comes into contact, and when on it [s]; None before.
         deepest_contact: the deepest contact so far.
+        paths: the paths past other bodies that were planned for its stages.
         early_end: what ended it before its goal; None where nothing did.
     """
 
@@ -198,6 +202,7 @@ class Motion:
     threat: Threat | None = None
     first_contact: tuple[Trajectory, float] | None = None
     deepest_contact: PeakContact = attrs.field(factory=lambda: PeakContact(0.0, 0.0))
+    paths: tuple[PlannedPath, ...] = ()
     early_end: "EarlyEnd | None" = None
 
     @property
@@ -208,7 +213,14 @@ class Motion:
     @property
     def event_data(self) -> dict[str, object]:
         """Further facts for the events."""
-        data = {"moved": self.moved, "goal": self.goal, "speed": self.speed, "implied_affix": self.implied_affix}
+        data: dict[str, object] = {
+            "moved": self.moved,
+            "goal": self.goal,
+            "speed": self.speed,
+            "implied_affix": self.implied_affix,
+        }
+        if self.paths:
+            data["planned_paths"] = [path.as_data() for path in self.paths]
         return data if self.early_end is None else {**data, self.early_end.value: True}
 
 

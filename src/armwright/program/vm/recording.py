@@ -19,6 +19,7 @@ from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
 from armwright.physics.collisions import CheckedBodies, StageClearance
+from armwright.physics.planner import PlannedPath
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Span
@@ -82,6 +83,7 @@ class RunStage:
         peak_time: (n,) when, since it began [s].
         stopped: whether it was stopped on its path.
         clearance: how near it was to come to other bodies; None where that is not looked at.
+        path: that was planned past other bodies; None where the straight one of the joints was free.
     """
 
     t0: float
@@ -96,6 +98,7 @@ class RunStage:
     peak_time: Array
     stopped: bool = False
     clearance: StageClearance | None = None
+    path: PlannedPath | None = None
 
     @property
     def duration(self) -> float:
