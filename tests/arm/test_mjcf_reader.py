@@ -277,8 +277,7 @@ def test_what_is_left_out(tmp_path: Path) -> None:
     reading = read_mjcf(written(tmp_path, text))
 
     assert reading.arm.links[0].solids == ()
-    assert reading.notes[0] == "joint 'turn': its spring is not read"
-    assert reading.notes[-1] == "body 'arm': ellipsoids are not read"
+    assert {"joint 'turn': its spring is not read", "body 'arm': ellipsoids are not read"} <= {*reading.notes}
 
 
 def test_limits_are_raised(tmp_path: Path) -> None:

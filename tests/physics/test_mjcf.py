@@ -337,6 +337,20 @@ def test_a_cell_comes_back(cell_path: Path, rng: np.random.Generator) -> None:
     assert {name: part.mass for name, part in again.parts.items()} == {n: part.mass for n, part in cell.parts.items()}
 
 
+def test_a_cup_comes_back(cell_path: Path) -> None:
+    """A cell whose arm holds by suction is the same world in the file; of the cup only the force is lost."""
+    cell = read_cell(cell_path)
+    arms = {name: attrs.evolve(arm, gripper=Gripper(kind="suction", friction=0.7)) for name, arm in cell.arms.items()}
+    cell = attrs.evolve(cell, arms=arms)
+    file = cell_mjcf(cell)
+    (cell_path.parent / "cell.xml").write_text(file.text, encoding="utf-8")
+
+    again = read_cell_mjcf(cell_path.parent / "cell.xml").cell
+
+    assert f"{next(iter(arms))}: the force of its suction is not in the file" in file.lost
+    assert {arm.gripper for arm in again.arms.values()} == {Gripper(kind="suction", friction=0.7)}
+
+
 def test_other_files_of_cells(tmp_path: Path) -> None:
     """A file without arms of our names is refused, and other bodies are told."""
     path = tmp_path / "cell.xml"

@@ -201,6 +201,11 @@ def _lost_of_cell(cell: Cell) -> list[str]:
         or part.symmetry > 1
         or not np.array_equal(part.grasp, np.eye(4))
     ]
+    lost += [
+        f"{name}: the force of its suction is not in the file"
+        for name, arm in cell.arms.items()
+        if arm.gripper is not None and arm.gripper.kind == "suction"
+    ]
     lost.append(
         "the times of grippers and cameras, the servos, the sensors and the tolerances of motions are not in the file"
     )

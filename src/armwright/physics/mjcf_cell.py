@@ -19,12 +19,13 @@ from armwright.cell.scene import Fixture, Gripper, Part
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.inputs import file_path
 from armwright.physics.mjcf import START
-from armwright.physics.world_model import FLOOR, PLATE
+from armwright.physics.world_model import FLOOR, PIECE, PLATE
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_quaternion
 
 _BASE = re.compile(r"(ARM_(?:0|[1-9][0-9]*))/base", re.ASCII)
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.ASCII)
+_GRIPPER = re.compile(r"ARM_[0-9]+/[^/]*", re.ASCII)
 _FINGERS = ("left", "right")
 
 
@@ -79,6 +80,8 @@ def read_cell_mjcf(path: Path | str) -> CellReading:
         raise
     except ArmwrightError as error:
         raise tree.error(str(error)) from error
+    cut = {name.partition(PIECE)[0] for i in range(model.ngeom) if PIECE in (name := model.geom(i).name)}
+    notes += [f"'{name}' is not read: it is made of several convex pieces" for name in sorted(cut)]
     read = {f"{name}/base" for name in arms} | set(parts) | {PLATE}
     others = [joint.child for joint in tree.child_joints[WORLD] if joint.child not in read]
     notes += [f"the body '{name}' is not read" for name in others]
@@ -90,11 +93,13 @@ def _arm(tree: MjcfTree, name: str, q: Array) -> tuple[CellArm, tuple[str, ...]]
     model, base, tool = tree.model, f"{name}/base", f"{name}/tool"
     if tool not in tree.links:
         raise tree.error(f"expected a body of the name {tool} at the end of {name}")
-    gripper = {f"{name}/{part}" for part in (*_FINGERS, "cup")}
+    fingers = {f"{name}/{side}" for side in _FINGERS}
     children = {
-        link: [joint for joint in joints if joint.child not in gripper] for link, joints in tree.child_joints.items()
+        link: [joint for joint in joints if joint.child not in fingers] for link, joints in tree.child_joints.items()
     }
-    alone = attrs.evolve(tree, child_joints=children, no_solids={f"{name}/palm"})
+    # Solids of links are called NAME/link1/solid1, those of the gripper NAME/palm.
+    of_gripper = {each for i in range(model.ngeom) if _GRIPPER.fullmatch(each := model.geom(i).name)}
+    alone = attrs.evolve(tree, child_joints=children, no_solids=of_gripper)
     reading = arm_in(alone, base, tool)
     starts = [float(q[model.joint(joint.name).qposadr[0]]) for joint in reading.arm.joints]
     cell_arm = CellArm(
@@ -122,28 +127,30 @@ def _with_short_names(arm: Arm, name: str) -> Arm:
 
 
 def _gripper(tree: MjcfTree, name: str) -> Gripper | None:
-    model = tree.model
-    actuators = {model.actuator(i).name for i in range(model.nu)}
+    """Return what an arm holds parts with; of a cup the file does not know how strong it is."""
+    model, left = tree.model, f"{name}/left"
     geoms = {model.geom(i).name for i in range(model.ngeom)}
-    if f"{name}/suction" in actuators and f"{name}/cup" in geoms:
-        force = float(model.actuator(f"{name}/suction").gainprm[0])
-        return Gripper(kind="suction", force=force, friction=float(model.geom(f"{name}/cup").friction[0]))
-    left = f"{name}/left"
-    if left not in actuators or f"{left} pad" not in geoms or left not in {j.name for j in tree.parent_joints.values()}:
+    if f"{name}/lip0" in geoms:
+        return Gripper(kind="suction", friction=float(model.geom(f"{name}/lip0").friction[0]))
+    actuators = {model.actuator(i).name for i in range(model.nu)}
+    joints = {joint.name for joint in tree.parent_joints.values()}
+    if left not in actuators or left not in joints or f"{left} finger" not in geoms:
         return None
     return Gripper(
         force=float(model.actuator(left).forcerange[1]),
         opening=2 * float(model.joint(left).range[1]),
-        friction=float(model.geom(f"{left} pad").friction[0]),
+        friction=float(model.geom(f"{left} finger").friction[0]),
     )
 
 
 def _fixtures(model: Any) -> dict[str, Fixture]:
     """Return the geoms of the world that have names of frames."""
     fixtures = {}
-    for geom in range(int(model.body_geomnum[0])):
-        name, solid = model.geom(geom).name, solid_of(model, geom)
-        if name != FLOOR and solid is not None and _NAME.fullmatch(name):
+    names = [model.geom(i).name for i in range(int(model.body_geomnum[0]))]
+    cut = {name.partition(PIECE)[0] for name in names if PIECE in name}
+    for geom, name in enumerate(names):
+        solid = solid_of(model, geom)
+        if name not in cut and name != FLOOR and solid is not None and _NAME.fullmatch(name):
             friction = float(model.geom_friction[geom][0])
             fixtures[name] = Fixture(name=name, shape=solid.shape, pose=solid.pose, friction=friction)
     return fixtures
