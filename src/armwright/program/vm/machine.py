@@ -126,7 +126,7 @@ class Machine:
             streams=streams,
             trees=tuple(state.trees),
             configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
-            checked=None if self.collisions is None else self.collisions.checked,
+            checked=None if self._collisions is None else self._collisions.checked,
             parts=self.hardware.part_poses().tracks,
         )
 
