@@ -30,9 +30,9 @@ mistake is reported once; errors that follow from it are not reported.
 
 Comments at the beginning of a program below state how it is checked: `// std=83` and `// strict` are options of \
 `armwright check`; `// cell: arms ARM_1` describes the cell against which the program is checked, and `// import:` the \
-contents of the imported file. `// run in one_arm` means that the message appears at run time, in one of four small \
-cells: a Stanford arm (`one_arm`), the same above a plane of contact (`plane`), a PUMA 560 (`puma`) and a UR5 \
-(`ur5`); `// limits:`, `// around:` and `// effort:` give the options and limits of the run.
+contents of the imported file. `// run in one_arm` means that the message appears at run time, in one of five small \
+cells: a Stanford arm (`one_arm`), the same above a plane of contact (`plane`) and above a table (`table`), a PUMA 560 \
+(`puma`) and a UR5 (`ur5`); `// limits:`, `// around:` and `// effort:` give the options and limits of the run.
 """
 
 

@@ -1,11 +1,14 @@
 """Fuzzing of what reads files, by changing valid ones: `python fuzz/files.py TARGET [INPUTS] [SEED]`.
 
-Targets are `arm`, `linkage`, `urdf`, `cell`, `poses`, `iso9283`, `calibration` and `clearance` (measured tables). It
-needs nothing beside armwright. An input is a valid file in which keys, numbers, types, lines and cells were changed,
-lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised, when it takes more
-than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it again.
+Targets are `arm`, `linkage`, `urdf`, `cell`, `mesh`, `poses`, `iso9283`, `calibration` and `clearance` (measured
+tables). It needs nothing beside armwright. An input is a valid file in which keys, numbers, types, lines and cells were
+changed, lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised, when it
+takes more than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it again.
 """
 
+import base64
+import contextlib
+import json
 import random
 import re
 import resource
@@ -17,14 +20,18 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from armwright.accuracy.measurement_file import read_measurements as read_accuracy
 from armwright.arm.load import load_arm, load_urdf, read_arm
 from armwright.calibration.measurements import read_measurements
+from armwright.cell.assembly import read_assembly_frames
 from armwright.cell.reader import read_cell
 from armwright.clearance.estimation.measurement_file import read_clearance_measurements
 from armwright.clearance.reader import read_linkage
 from armwright.errors import ArmwrightError
 from armwright.motion.poses_file import read_poses
+from armwright.spatial.meshes.reader import read_mesh
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "armwright"
@@ -159,11 +166,73 @@ def _tables(*paths: Path, lines: int) -> list[str]:
     return [*texts, *european, european[0].replace("commanded_", "nominal ")]
 
 
+def _meshes() -> list[str]:
+    """Return a tetrahedron as OBJ, as STL in text, as glTF, and as binary STL and glTF in hexadecimal digits."""
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype="<f4")
+    faces = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)], dtype="u1")
+    v = [f"v {x} {y} {z}" for x, y, z in corners]
+    obj = "\n".join([*v, "vt 0 0", *(f"f {a + 1}/1 {b + 1}/1 {c - 4}/1" for a, b, c in faces.tolist())])
+    loops = "\n".join(
+        "facet normal 0 0 0\nouter loop\n" + "".join(f"vertex {x} {y} {z}\n" for x, y, z in corners[face]) + "endloop"
+        for face in faces
+    )
+    records = b"".join(bytes(12) + corners[face].tobytes() + bytes(2) for face in faces)
+    stl = bytes(80) + len(faces).to_bytes(4, "little") + records
+    buffer = corners.tobytes() + faces.tobytes()
+    uri = f"data:application/octet-stream;base64,{base64.b64encode(buffer).decode()}"
+    gltf = json.dumps(
+        {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [
+                {"name": "top", "children": [1, 2], "translation": [0, 0, 1]},
+                {"name": "a", "mesh": 0, "rotation": [0, 0, 0, 1], "scale": [1, 2, 1]},
+                {"name": "b", "mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1]},
+            ],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": 4}]}],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "byteOffset": 0},
+                {"bufferView": 1, "componentType": 5121, "count": 12, "type": "SCALAR"},
+            ],
+            "bufferViews": [
+                {"buffer": 0, "byteOffset": 0, "byteLength": 48, "byteStride": 12},
+                {"buffer": 0, "byteOffset": 48, "byteLength": 12},
+            ],
+            "buffers": [{"byteLength": 60, "uri": uri}],
+        },
+        indent=1,
+    )
+    chunk = gltf.encode() + b" " * (-len(gltf) % 4)
+    size = (20 + len(chunk)).to_bytes(4, "little")
+    glb = b"glTF" + (2).to_bytes(4, "little") + size + len(chunk).to_bytes(4, "little") + b"JSON" + chunk
+    return [obj, f"solid\n{loops}\nendsolid", gltf, gltf, stl.hex(" ", 4), glb.hex(" ", 4)]
+
+
+def _read_mesh(path: Path) -> None:
+    """Read a text as the format that it is, and its components, where it has some."""
+    data = path.read_bytes()
+    if data[:1] in b"06":
+        digits = re.sub(rb"[^0-9a-f]", b"", data).decode()
+        data = bytes.fromhex(digits[: len(digits) // 2 * 2])
+    suffix = ".glb" if data[:4] == b"glTF" else ".gltf" if data.lstrip()[:1] in b"{[" else ".stl"
+    suffix = ".obj" if suffix == ".stl" and data[:2] == b"v " else suffix
+    named = path.with_suffix(suffix)
+    named.write_bytes(data)
+    if suffix in {".glb", ".gltf"}:
+        with contextlib.suppress(ArmwrightError):
+            read_assembly_frames(named)
+        read_mesh(named)
+    else:
+        read_mesh(named, unit="m")
+
+
 TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]] = {
     "arm": (".toml", read_arm, lambda: _texts(*(SOURCE / "arm" / "catalogue").glob("*.toml"))),
     "linkage": (".toml", read_linkage, lambda: _texts(*(SOURCE / "clearance" / "catalogue").glob("*.toml"))),
     "urdf": (".urdf", load_urdf, lambda: _texts(EXAMPLES / "seven_joints.urdf")),
     "cell": (".toml", read_cell, lambda: _texts(*EXAMPLES.glob("*cell*.toml"))),
+    "mesh": (".mesh", _read_mesh, _meshes),
     "poses": (".toml", read_poses, lambda: _texts(EXAMPLES / "puma_poses.toml", EXAMPLES / "round_the_post.toml")),
     "iso9283": (
         ".csv",

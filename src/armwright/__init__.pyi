@@ -8,6 +8,7 @@ from . import (
     dynamics as dynamics,
     kinematics as kinematics,
     motion as motion,
+    physics as physics,
     program as program,
     simulation as simulation,
     spatial as spatial,

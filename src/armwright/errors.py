@@ -159,6 +159,10 @@ class UnitWarning(UserWarning):
     """A number is probably in another unit: degrees instead of radians."""
 
 
+class MeshWarning(UserWarning):
+    """A mesh is not what collisions are found with: its convex hull is much larger, or it is not closed."""
+
+
 class IncompleteRowsWarning(UserWarning):
     """Rows of a table with empty cells were omitted on request."""
 

@@ -1,6 +1,7 @@
 """Libraries that the core does not install: they come with the extras of the package."""
 
 from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType
 
 from armwright.errors import MissingExtraError
@@ -21,7 +22,18 @@ def import_extra(module: str, purpose: str, extra: str, library: str = "") -> Mo
     try:
         return import_module(module)
     except ImportError as error:
-        library = library or module.partition(".")[0]
-        raise MissingExtraError(
-            f"{purpose} needs {library}; install it by: pip install 'armwright[{extra}]'"
-        ) from error
+        raise _missing(purpose, extra, library or module.partition(".")[0]) from error
+
+
+def require_extra(module: str, purpose: str, extra: str) -> None:
+    """Refuse to go on without a library that another process imports.
+
+    Raises:
+        MissingExtraError: the library is not installed.
+    """
+    if find_spec(module) is None:
+        raise _missing(purpose, extra, module)
+
+
+def _missing(purpose: str, extra: str, library: str) -> MissingExtraError:
+    return MissingExtraError(f"{purpose} needs {library}; install it by: pip install 'armwright[{extra}]'")

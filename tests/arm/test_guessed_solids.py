@@ -29,6 +29,7 @@ def test_a_chain_of_capsules(name: str, rng: np.random.Generator) -> None:
             axis, origin = frames[i, :3, 2], frames[i, :3, 3]
             away = [np.linalg.norm(np.cross(p - origin, axis)) for p in points]
             near = guessed_radii(arm)[i] * 0.1 + 1e-12
+            assert all(solid.guessed for solid in solids)
             assert min(away) <= near
             assert min(np.linalg.norm(p - frames[i + 1, :3, 3]) for p in points) <= near
 

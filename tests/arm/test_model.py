@@ -17,6 +17,7 @@ from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Moto
 from armwright.dynamics.payloads import payload
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.spatial.rotations import exact_cosine, exact_sine
+from armwright.spatial.shapes import Box
 from oracles.arms import random_arm
 
 
@@ -42,7 +43,8 @@ def test_arrays_cannot_be_written(name: str) -> None:
     arm = load_arm(name)
     arrays = arrays_of(arm)
 
-    assert len(arrays) == 3 + 2 * arm.n
+    solids = [*arm.base_solids, *(solid for link in arm.links for solid in link.solids)]
+    assert len(arrays) == 3 + 2 * arm.n + sum(2 if isinstance(solid.shape, Box) else 1 for solid in solids)
     for array in arrays:
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 9

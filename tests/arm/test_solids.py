@@ -45,6 +45,7 @@ def assert_same(a: Solid, b: Solid) -> None:
     assert type(a.shape) is type(b.shape)
     assert numbers_of(a.shape) == numbers_of(b.shape)
     np.testing.assert_array_equal(a.pose, b.pose)
+    assert a.guessed is b.guessed
 
 
 def test_solids_of_an_arm_file(tmp_path: Path) -> None:
@@ -69,7 +70,7 @@ def test_written_and_read(tmp_path: Path, rng: np.random.Generator) -> None:
         Cylinder(radius=rng.uniform(), length=rng.uniform()),
         Sphere(radius=rng.uniform()),
     ]
-    solids = [Solid(shape=shape, pose=random_pose(rng)) for shape in shapes]
+    solids = [Solid(shape=shape, pose=random_pose(rng), guessed=rng.random() < 0.5) for shape in shapes]
     arm = random_arm(rng, 3)
     links = [attrs.evolve(link, solids=solids[i:]) for i, link in enumerate(arm.links)]
     arm = attrs.evolve(arm, links=links, base_solids=solids[:1])
@@ -127,13 +128,17 @@ def test_equal_arms_may_have_other_solids(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize(
     ("solid", "message"),
     [
-        ('{kind = "ball"}', "solids 1, kind: expected one of box, capsule, cylinder, sphere, got the text 'ball'"),
+        (
+            '{kind = "ball"}',
+            "solids 1, kind: expected one of box, capsule, cylinder, mesh, sphere, got the text 'ball'",
+        ),
         ('{kind = "box"}', "solids 1: missing, expected size_mm or size_m"),
         ('{kind = "box", size_mm = [1, 0, 1]}', "solids 1: size: expected three lengths above 0"),
         ('{kind = "sphere", diameter_mm = -1}', "diameter_mm: expected a number above 0, got -1"),
         ('{kind = "capsule", diameter_mm = 1}', "solids 1: missing, expected length_mm or length_m"),
         ('{kind = "sphere", diameter_mm = 3e7}', "radius: expected no more than 1000 m, got 15000"),
         ('{kind = "sphere", diameter_mm = 3, length_mm = 4}', "length_mm: unknown key"),
+        ('{kind = "sphere", diameter_mm = 3, guess = 1}', "solids 1, guess: expected true or false, got 1"),
     ],
 )
 def test_mistakes(solid: str, message: str, tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def test_the_simulator_answers_with_markers(tmp_path: Path) -> None:
     )
 
     for _ in range(2):
-        pose, time = simulator.locate("GOAL")
+        pose, time = simulator.locate("GOAL", 0.0)
         # x of the marker is y of the world.
         np.testing.assert_allclose(pose[:3, 3], (0.6, 0.21, 0.08), atol=1e-12)
         np.testing.assert_allclose(pose[:3, 2], (0, 0, -1), atol=1e-12)

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
-from armwright.errors import FileFormatError
-from armwright.spatial.shapes import Box, Cylinder, Sphere
+from armwright.errors import FileFormatError, MeshWarning
+from armwright.spatial.shapes import Box, Cylinder, Mesh, Sphere, centroid, inertia
 
 ARM = """[arms.ARM_1]
 hand = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.25]
@@ -97,7 +98,7 @@ def test_grippers(tmp_path: Path) -> None:
         (f'[scene]\nspheres = [{{ name = "A B", at = {HERE}, diameter_mm = 1 }}]\n', "'A B' cannot name a frame"),
         ("[scene]\nboxs = []\n", "boxs: unknown key; did you mean 'boxes'?"),
         (f"[parts.A]\nsize_mm = [1, 1, 1]\nat = {HERE}\n", "parts, A, mass_kg: missing, expected a number"),
-        ('[parts.A]\nshape = "ball"\n', "expected one of box, cylinder, sphere, got the text 'ball'"),
+        ('[parts.A]\nshape = "ball"\n', "expected one of box, cylinder, mesh, sphere, got the text 'ball'"),
         (
             "\n".join(
                 f"[parts.{name}]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\n"
@@ -120,3 +121,90 @@ def test_mistakes(text: str, message: str, tmp_path: Path) -> None:
         cell(tmp_path, text)
 
     assert message in str(caught.value)
+
+
+def write_block(folder: Path, name: str = "block.stl", *, opened: bool = False) -> trimesh.Trimesh:
+    """Write a plate of 40 x 20 x 10 mm in millimetres, beside the origin, and return it in metres."""
+    plate = trimesh.creation.box((40, 20, 10)).apply_translation((30, 0, 0))
+    if opened:
+        plate.update_faces(np.arange(len(plate.faces)) != 3)
+    plate.export(folder / name)
+    return plate.apply_scale(1e-3)
+
+
+def test_meshes(tmp_path: Path) -> None:
+    """Parts and fixtures are meshes of files below the folder of the cell, in the unit that it says."""
+    (tmp_path / "cad").mkdir()
+    oracle = write_block(tmp_path / "cad")
+    read = cell(
+        tmp_path,
+        f"""[scene]
+meshes = [{{ name = "NEST", mesh = "cad/block.stl", unit = "cm", at = {HERE} }}]
+[parts.BLOCK]
+mesh = "cad/block.stl"
+unit = "mm"
+mass_kg = 0.2
+at = {HERE}
+""",
+    )
+    nest, part = read.fixtures["NEST"].shape, read.parts["BLOCK"]
+
+    assert isinstance(nest, Mesh)
+    assert isinstance(part.shape, Mesh)
+    assert part.shape.name == "block.stl"
+    np.testing.assert_allclose(nest.vertices.max(0), (0.5, 0.1, 0.05), atol=1e-7)
+    np.testing.assert_array_equal(part.pose[:3, 3], (0.5, 0.1, 0.2))
+    np.testing.assert_allclose(centroid(part.shape), (0.03, 0, 0), atol=1e-9)
+    oracle.density = 0.2 / oracle.volume
+    np.testing.assert_allclose(part.mass * inertia(part.shape), oracle.moment_inertia, atol=1e-12)
+
+
+def test_hulls_that_lie(tmp_path: Path) -> None:
+    """A mesh whose hull is much larger is warned of with its name, not where it has pieces; an open one too."""
+    ring = trimesh.creation.torus(0.1, 0.02)
+    ring.export(tmp_path / "ring.stl")
+    trimesh.creation.box((0.05, 0.05, 0.05)).export(tmp_path / "piece.stl")
+    write_block(tmp_path, "open.stl", opened=True)
+    ratio = ring.convex_hull.volume / ring.volume
+    text = f'meshes = [{{ name = "RING", mesh = "ring.stl", unit = "m", at = {HERE}'
+
+    with pytest.warns(
+        MeshWarning, match=rf"cell 'cell.toml': in collisions, .* much larger: RING \({ratio:.3g} times\)"
+    ):
+        cell(tmp_path, f"[scene]\n{text} }}]")
+    read = cell(tmp_path, f'[scene]\n{text}, pieces = ["piece.stl", "piece.stl"] }}]')
+    with pytest.warns(MeshWarning, match=r"meshes that are not closed .*: LID \(3 open edges\)"):
+        cell(tmp_path, f'[scene]\nmeshes = [{{ name = "LID", mesh = "open.stl", unit = "mm", at = {HERE} }}]')
+
+    shape = read.fixtures["RING"].shape
+    assert isinstance(shape, Mesh)
+    assert len(shape.pieces) == 2
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ('mesh = "block.stl"', "unit: missing, as STL files have none; expected one of m, mm, cm, in"),
+        ('mesh = "block.stl"\nunit = "inch"', "unit: expected one of cm, in, m, mm, got the text 'inch'"),
+        ('mesh = "block.stl"\nunit = "m"', "40 m long, probably in another unit"),
+        ('mesh = "blok.stl"\nunit = "mm"', "no such file; did you mean"),
+        ('mesh = "../block.stl"\nunit = "mm"', "mesh: {folder}: expected the name of a file below this folder"),
+        ('mesh = "/etc/passwd"\nunit = "mm"', "expected the name of a file below this folder"),
+        (
+            'mesh = "open.stl"\nunit = "mm"',
+            "mesh: open.stl is not closed (3 edges without one triangle on either",
+        ),
+        ('mesh = "block.stl"\nunit = "mm"\nsize_mm = [1, 1, 1]', "size_mm: unknown key"),
+        ('mesh = "block.stl"\nshape = "box"\nsize_mm = [1, 1, 1]', "mesh: unknown key"),
+        ('shape = "mesh"', "mesh: missing, expected a text in quotes"),
+        ('mesh = "block.stl"\nunit = "mm"\npieces = ["none.stl"]', "pieces: {folder}/none.stl: no such file"),
+        ('mesh = "block.stl"\nunit = "mm"\npieces = 3', "pieces: expected a list of texts in quotes, got 3"),
+    ],
+)
+def test_mistakes_of_meshes(keys: str, said: str, tmp_path: Path) -> None:
+    """A mesh of a part that cannot be read, lies elsewhere, has no unit, or encloses no mass is refused."""
+    write_block(tmp_path)
+    write_block(tmp_path, "open.stl", opened=True)
+    with pytest.raises(FileFormatError) as error:
+        cell(tmp_path, f"[parts.BLOCK]\n{keys}\nmass_kg = 0.2\nat = {HERE}\n")
+    assert said.replace("{folder}", str(tmp_path)) in str(error.value)

@@ -45,33 +45,33 @@ def test_camera_answers_one_after_the_other(tmp_path: Path) -> None:
         bench(tmp_path, BENCH.replace("time_s = 0.25", 'time_s = 0.25\nafter_last = "same"'))
     )
 
-    places = [hardware.locate("OBJ")[0][:3, 3] for _ in range(4)]
+    places = [hardware.locate("OBJ", 0.0)[0][:3, 3] for _ in range(4)]
 
     # The camera stands at x = 1 and is turned a quarter to the left: 0.1 m along its x is 0.1 m along y of the world.
     np.testing.assert_allclose(places, [(1, 0.1, 0), (1, 0.2, 0), (1, 0.2, 0), (1, 0.2, 0)], atol=1e-12)
-    assert hardware.locate("OBJ")[1] == 0.25
+    assert hardware.locate("OBJ", 0.0)[1] == 0.25
 
 
 def test_camera_answers_run_out(tmp_path: Path) -> None:
     """After its last answer the camera finds nothing more, and says how many there were."""
     hardware = Simulator(bench(tmp_path))
-    hardware.locate("OBJ")
-    hardware.locate("OBJ")
+    hardware.locate("OBJ", 0.0)
+    hardware.locate("OBJ", 0.0)
 
     with pytest.raises(DeviceError, match=r"the camera found nothing more for OBJ: cell 'bench' has 2 answers for it"):
-        hardware.locate("OBJ")
+        hardware.locate("OBJ", 0.0)
 
 
 def test_two_simulators_of_one_cell(tmp_path: Path) -> None:
     """What one simulator has seen and switched does not change what another one finds."""
     place = bench(tmp_path)
     first = Simulator(place)
-    first.locate("OBJ")
+    first.locate("OBJ", 0.0)
     first.operate("PRESS", on=True)
 
     second = Simulator(place)
 
-    assert second.locate("OBJ")[0][1, 3] == pytest.approx(0.1)
+    assert second.locate("OBJ", 0.0)[0][1, 3] == pytest.approx(0.1)
     assert second.active_devices() == frozenset()
 
 
@@ -79,7 +79,7 @@ def test_two_simulators_of_one_cell(tmp_path: Path) -> None:
 def test_camera_that_finds_nothing(frame: str, tmp_path: Path) -> None:
     """A frame without an answer is not found; the message lists what the camera knows."""
     with pytest.raises(DeviceError, match=f"the camera found nothing for {frame}; in cell 'bench' it finds EMPTY, OBJ"):
-        Simulator(bench(tmp_path)).locate(frame)
+        Simulator(bench(tmp_path)).locate(frame, 0.0)
 
 
 def test_camera_without_any_answer(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_camera_without_any_answer(tmp_path: Path) -> None:
     text = "[arms.ARM_1]\njoint_positions = [0, 0, 0.3, 0, 0, 0]\n"
 
     with pytest.raises(DeviceError, match=r"in cell 'bench\.toml' it finds nothing"):
-        Simulator(bench(tmp_path, text)).locate("OBJ")
+        Simulator(bench(tmp_path, text)).locate("OBJ", 0.0)
 
 
 def test_any_device_where_none_is_listed(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_what_is_let_go_does_not_press(tmp_path: Path) -> None:
 
     hardware.start_motion("ARM_1", hold(motion(1.0), 1.0), 1.0, np.eye(4))
     assert hardware.contact_force("ARM_1", 2.0)[2] == pytest.approx(pressed, rel=1e-9)
-    hardware.move_fingers("ARM_1", closed=False)
+    hardware.move_fingers("ARM_1", 0.0, closed=False)
     assert hardware.contact_force("ARM_1", 2.0)[2] == 0
 
 
@@ -204,8 +204,14 @@ def test_fingers_take_their_time(tmp_path: Path) -> None:
     """Opening and closing take as long as the cell file says, and 0.3 s where it says nothing."""
     hardware = Simulator(bench(tmp_path))
 
-    assert (hardware.move_fingers("ARM_1", closed=False), hardware.move_fingers("ARM_1", closed=True)) == (0.2, 0.5)
-    assert (hardware.move_fingers("ARM_2", closed=False), hardware.move_fingers("ARM_2", closed=True)) == (0.3, 0.3)
+    assert (hardware.move_fingers("ARM_1", 0.0, closed=False), hardware.move_fingers("ARM_1", 0.0, closed=True)) == (
+        0.2,
+        0.5,
+    )
+    assert (hardware.move_fingers("ARM_2", 0.0, closed=False), hardware.move_fingers("ARM_2", 0.0, closed=True)) == (
+        0.3,
+        0.3,
+    )
 
 
 def test_a_start_that_does_not_fit_the_arm(tmp_path: Path) -> None:

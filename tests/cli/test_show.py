@@ -139,6 +139,60 @@ def test_an_arm_file(tmp_path: Path) -> None:
     assert "+0 / -4 N" in result.stdout
 
 
+def rows_of(text: str) -> list[list[str]]:
+    """The cells of the rows of tables."""
+    return [re.split(r"\s{2,}", line.strip()) for line in text.splitlines()]
+
+
+def test_collisions_of_the_ur5() -> None:
+    """The solids of an arm are listed with their sizes, and every pair of its seven bodies once, with the reason."""
+    result = armwright("show", "ur5", "--collisions")
+
+    rows = rows_of(result.stdout)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert ["link 2", "capsule", "radius 58 mm, length 365 mm", "arm file"] in rows
+    assert ["link 4", "link 6"] in rows
+    assert ["link 2", "link 3", "neighbours: joint 3 joins them"] in rows
+    assert "guess" not in result.stdout
+
+    data = json.loads(armwright("show", "ur5", "--collisions", "--json").stdout)
+
+    bodies = ["base", *(f"link {i}" for i in range(1, 7))]
+    assert [body["body"] for body in data["bodies"]] == bodies
+    pairs = data["checked"] + [entry["bodies"] for entry in data["left_out"]]
+    assert sorted(map(tuple, pairs)) == [(a, b) for i, a in enumerate(bodies) for b in bodies[i + 1 :]]
+    (forearm,) = [solid for solid in data["bodies"][3]["solids"] if solid["length"] > 0.3]
+    assert (forearm["kind"], forearm["radius"], forearm["guessed"]) == ("capsule", 0.039, False)
+    # The upper arm lies 135.85 mm beside the plane of the frames, and the forearm 119.7 mm before it.
+    assert forearm["pose"][2][3] == pytest.approx(0.13585 - 0.1197, abs=1e-4)
+
+
+def test_guesses_are_called_so() -> None:
+    """A guessed capsule is called a guess, with its radius."""
+    result = armwright("show", "ntu-3r", "--collisions")
+
+    # 5 % of the length of the arm, whose steps are 76, 400, 12 and 354.3 mm, and a quarter less.
+    assert ["link 2", "capsule", f"radius {0.75 * 0.05 * 842.3:.5g} mm, length 400 mm", "guess"] in rows_of(
+        result.stdout
+    )
+    assert result.stdout.splitlines()[-2].startswith(
+        "All solids are guesses; the keys base_solids and solids of an arm"
+    )
+
+
+def test_pairs_of_an_arm_file(tmp_path: Path) -> None:
+    """What a file says of its pairs is told as such, and links are called by their names too."""
+    joint = '[[joint]]\nkind = "revolute"\na_mm = 300\n[joint.link]\nsolids = [{kind = "sphere", diameter_mm = 90}]\n'
+    pairs = '[collisions]\nleave_out = [["link 1", "fore"]]\ncheck = [["fore", "link 2"]]\n'
+    (tmp_path / "three.toml").write_text(f'{pairs}{joint * 3}name = "fore"\n', encoding="utf-8")
+
+    rows = rows_of(armwright("show", tmp_path / "three.toml", "--collisions").stdout)
+
+    assert ["link 1", "link 3 ('fore')", "left out by the arm file"] in rows
+    assert ["link 2", "link 3 ('fore')"] in rows
+    assert ["link 3 ('fore')", "sphere", "radius 45 mm", "arm file"] in rows
+
+
 def test_a_narrow_screen() -> None:
     """On 40 columns tables are wider than the screen, but every number is there."""
     wide, narrow = armwright("show", "ur5").stdout, armwright("show", "ur5", columns=40).stdout

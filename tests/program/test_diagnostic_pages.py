@@ -78,6 +78,7 @@ def test_run_time_pages_run() -> None:
         "W401",
         "W402",
         "W403",
+        "W404",
     ):
         assert "// run in " in find_page(code).wrong, code
 

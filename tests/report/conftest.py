@@ -10,19 +10,8 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.report.page import (
-    Animation,
-    ArmFigure,
-    ArmRecord,
-    Effect,
-    FrameTrack,
-    JointInfo,
-    Message,
-    RunPage,
-    StageRow,
-    TreeChange,
-    run_page,
-)
+from armwright.report.animation import Animation, ArmFigure, Body, ChainJoint, FrameTrack, TreeChange
+from armwright.report.page import ArmRecord, Effect, JointInfo, Message, RunPage, StageRow, run_page
 
 FPS = 25.0
 SHOULDER, UPPER, FORE, HAND = 0.42, 0.43, 0.40, 0.14
@@ -66,37 +55,47 @@ def angles_of(places: Array) -> Array:
     return np.stack([waist, lift, bend, 0 * x, -math.pi / 2 - lift - bend, waist], axis=-1)
 
 
+SHAPES = (
+    {"kind": "capsule", "radius": 0.045, "length": 0.42},
+    {"kind": "cylinder", "radius": 0.06, "length": 0.1},
+    {"kind": "box", "size": [0.02, 0.012, 0.09]},
+)
+
+
 def figure_of(q: Array, base: Array, turn: float, grip: Array) -> ArmFigure:
     """Draw the arm at angles (M, 6), its base at a place and turned about the vertical."""
-    waist = q[:, 0] + turn
-    ahead = np.stack([np.cos(waist), np.sin(waist), 0 * waist], axis=-1)
-    across = np.stack([-np.sin(waist), np.cos(waist), 0 * waist], axis=-1)
-    up = np.broadcast_to((0.0, 0.0, 1.0), ahead.shape)
-
-    def along(angle: Array) -> Array:
-        return np.cos(angle)[:, None] * ahead + np.sin(angle)[:, None] * up
-
-    upper, fore, hand = along(q[:, 1]), along(q[:, 1] + q[:, 2]), along(q[:, 1] + q[:, 2] + q[:, 4])
-    shoulder = base + SHOULDER * up
-    elbow = shoulder + UPPER * upper
-    wrist = elbow + FORE * fore
-    tip = wrist + HAND * hand
-    points = np.stack([np.broadcast_to(base, up.shape), shoulder, elbow, wrist, tip], axis=1)
-    pairs = (
-        (shoulder - 0.2 * up, up),
-        (shoulder, across),
-        (elbow, across),
-        (elbow + 0.3 * (wrist - elbow), fore),
-        (wrist, across),
-        (wrist + 0.3 * (tip - wrist), hand),
+    straight = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    to_side = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0)
+    behind = (
+        (*to_side, 0.0, 0.0, 0.0),
+        (*straight, UPPER, 0.0, 0.0),
+        (*straight, FORE, 0.0, 0.0),
+        (*straight, 0.0, 0.0, 0.0),
+        (0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0, HAND, 0.0, 0.0),
+        (*straight, 0.0, 0.0, 0.0),
     )
-    axes = np.stack([np.concatenate(pair, axis=-1) for pair in pairs], axis=1)
+    joints = [
+        ChainJoint(revolute=True, theta=0.0, d=SHOULDER if i == 0 else 0.0, behind=np.array(row))
+        for i, row in enumerate(behind)
+    ]
+    along_x = (0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
+    bodies = [
+        Body(name="column", shape=0, pose=np.array((*straight, 0.0, 0.0, SHOULDER / 2)), frame=0, tint="base"),
+        Body(name="upper", shape=0, pose=np.array((*along_x, -UPPER / 2, 0.0, 0.0)), frame=2, tint="link"),
+        Body(name="fore", shape=0, pose=np.array((*along_x, -FORE / 2, 0.0, 0.0)), frame=3, tint="link"),
+        Body(name="elbow", shape=1, pose=np.array((*straight, 0.0, 0.0, 0.0)), frame=2, tint="joint"),
+        Body(name="finger", shape=2, pose=np.array((*straight, 0.0, -0.006, -0.03)), frame=7, tint="joint", slide=-1),
+        Body(name="finger", shape=2, pose=np.array((*straight, 0.0, 0.006, -0.03)), frame=7, tint="joint", slide=1),
+    ]
+    c, s = math.cos(turn), math.sin(turn)
     return ArmFigure(
-        points=points,
-        hand_axes=np.concatenate([np.cross(across, hand), across, hand], axis=-1),
+        q=q,
+        base=np.array((c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0, *base)),
+        joints=joints,
+        tool=np.array((*straight, 0.0, 0.0, 0.0)),
+        bodies=bodies,
         grip=grip,
-        joint_axes=axes,
-        radii=[0.055, 0.045, 0.036, 0.024],
+        opening=0.08,
     )
 
 
@@ -226,7 +225,7 @@ def animate(first: ArmRecord, second: ArmRecord, second_base: Array) -> Animatio
         "ARM_1": figure_of(first.q[rows], np.zeros(3), 0.0, grip),
         "ARM_2": figure_of(second.q[rows], second_base, math.pi, np.ones(len(t))),
     }
-    return Animation(fps=FPS, t=t, arms=arms, frames=frames, tree=tree)
+    return Animation(fps=FPS, t=t, arms=arms, frames=frames, tree=tree, shapes=SHAPES)
 
 
 @pytest.fixture(scope="session")

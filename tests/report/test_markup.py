@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from armwright.report.animation import FrameTrack
 from armwright.report.markup import json_text
-from armwright.report.page import Animation, ArmFigure, FrameTrack, run_page
+from armwright.report.page import run_page
 
 # Five significant digits: half a unit in the last of them.
 LAST_DIGIT = 0.5e-4
@@ -79,14 +80,14 @@ def test_size_of_half_a_minute(rng, bench) -> None:
     record = attrs.evolve(
         arm, t=t, q=noise(2000, 6), qd=noise(2000, 6), qdd=noise(2000, 6), tau=noise(2000, 6), hand=noise(2000, 3)
     )
-    figure = ArmFigure(points=noise(750, 8, 3), hand_axes=noise(750, 9), grip=noise(750), joint_axes=noise(750, 6, 6))
+    figure = attrs.evolve(bench.animation.arms[arm.name], q=noise(750, 6), grip=noise(750))
     frames = [FrameTrack(name=f"f{i}", poses=noise(750, 12)) for i in range(10)]
     run = attrs.evolve(
         bench,
         duration=30.0,
         stages=(),
         arms=(record,),
-        animation=Animation(fps=25, t=film, arms={arm.name: figure}, frames=frames),
+        animation=attrs.evolve(bench.animation, fps=25, t=film, arms={arm.name: figure}, frames=frames),
     )
 
     assert len(run_page(run)) < 3 * MEGABYTE

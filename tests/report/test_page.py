@@ -342,16 +342,6 @@ def test_arm_never_recorded(visit, bench) -> None:
     assert text(opened, "#readout-name") == "Joints of ARM_1"
 
 
-def test_balls_for_joints(visit, bench) -> None:
-    """Without the axes of the joints, and without radii, the arm is drawn all the same."""
-    figures = {name: attrs.evolve(each, joint_axes=None, radii=None) for name, each in bench.animation.arms.items()}
-    opened = visit(attrs.evolve(bench, animation=attrs.evolve(bench.animation, arms=figures)))
-    drums = visit(bench)
-
-    assert opened.complaints == []
-    assert opened.pixels() != drums.pixels()
-
-
 def test_names_are_text(visit, bench) -> None:
     """Whatever stands in a name is shown letter by letter and never obeyed."""
     nasty = '</script><script>window.bitten = 1</script><b>"it\'s"</b> & $title {x} 機械手 ☃'

@@ -52,3 +52,21 @@ def test_a_lens_that_folds_the_picture() -> None:
         focal = np.hypot(320, 240) / reach
         lens = Lens(width=640, height=480, focal=(focal, focal), centre=(319.5, 239.5), distortion=(-1, 0, 0, 0, 0))
         assert lens.is_invertible() == whole
+
+
+def test_derivatives_are_quotients_of_differences(rng: np.random.Generator) -> None:
+    """The derivatives of a pixel by its point and by the lens are those that small steps show."""
+    numbers = np.concatenate([[600, 590, 310, 250], rng.uniform(-1, 1, 5) * [0.2, 0.05, 0.003, 0.003, 0.01]])
+
+    def lens(values: np.ndarray) -> Lens:
+        return Lens(width=640, height=480, focal=values[:2], centre=values[2:4], distortion=values[4:])
+
+    points = np.stack([rng.uniform(-0.4, 0.4, 20), rng.uniform(-0.3, 0.3, 20), rng.uniform(0.8, 2, 20)], axis=1)
+    step = 1e-6
+    by_point = [lens(numbers).project(points + s * np.eye(3)[:, None] * step) for s in (1, -1)]
+    by_lens = [[lens(numbers + s * row).project(points) for row in np.eye(9) * step] for s in (1, -1)]
+
+    found_point, found_lens = lens(numbers).derivatives(points)
+
+    np.testing.assert_allclose(found_point, np.moveaxis(by_point[0] - by_point[1], 0, -1) / (2 * step), atol=1e-5)
+    np.testing.assert_allclose(found_lens, np.moveaxis(np.subtract(*by_lens), 0, -1) / (2 * step), atol=1e-5)

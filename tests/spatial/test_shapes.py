@@ -17,7 +17,7 @@ from armwright.spatial.shapes import (
     farthest,
     inertia,
     is_closed,
-    reach,
+    support,
     volume,
 )
 
@@ -70,8 +70,8 @@ def test_what_solids_contain(shape: Shape, rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(contains(shape, points), inside(shape, points))
     for direction in rng.normal(size=(20, 3)):
         unit = direction / np.linalg.norm(direction)
-        assert (there @ unit).max() == pytest.approx(reach(shape, unit), rel=0.1)
-        assert (there @ unit).max() <= reach(shape, unit)
+        assert (there @ unit).max() == pytest.approx(support(shape, unit), rel=0.1)
+        assert (there @ unit).max() <= support(shape, unit)
 
 
 def hull(points: np.ndarray) -> Mesh:
@@ -107,7 +107,7 @@ def test_what_meshes_contain(rng: np.random.Generator) -> None:
 
     np.testing.assert_array_equal(contains(hull(points), tried), below)
     assert 100 < below.sum() < 900
-    assert reach(hull(points), direction) == (points @ direction).max()
+    assert support(hull(points), direction) == (points @ direction).max()
 
 
 def test_open_meshes(rng: np.random.Generator) -> None:

@@ -1,3 +1,4 @@
+from .collision_pairs import CollisionPairs as CollisionPairs
 from .load import arm_names as arm_names, load_arm as load_arm
 from .model import Arm as Arm, Joint as Joint, Limits as Limits, Link as Link, Motor as Motor
 from .uncertainty import Uncertainty as Uncertainty

@@ -30,9 +30,7 @@ def guessed_solids(arm: Arm) -> tuple[tuple[Solid, ...], ...]:
     slide begins where it is at its lower limit.
     """
     radii = guessed_radii(arm)
-    return tuple(
-        tuple(_along(arm, i, float(radii[i]))) or (Solid(shape=Sphere(radius=float(radii[i]))),) for i in range(arm.n)
-    )
+    return tuple(tuple(_along(arm, i, float(radii[i]))) or (_ball(float(radii[i])),) for i in range(arm.n))
 
 
 def _along(arm: Arm, i: int, radius: float) -> list[Solid]:
@@ -54,4 +52,8 @@ def _capsule(a: Array, b: Array, radius: float) -> Solid:
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)
     R = np.stack([x, np.cross(z, x), z], axis=1)
-    return Solid(shape=Capsule(radius=radius, length=length), pose=homogeneous(R, (a + b) / 2))
+    return Solid(shape=Capsule(radius=radius, length=length), pose=homogeneous(R, (a + b) / 2), guessed=True)
+
+
+def _ball(radius: float) -> Solid:
+    return Solid(shape=Sphere(radius=radius), guessed=True)

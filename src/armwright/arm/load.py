@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from armwright.arm.collision_pairs import collision_pairs_in
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
@@ -31,11 +33,12 @@ def arm_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _CATALOGUE.glob("*.toml")))
 
 
-def load_arm(name: str | Path) -> Arm:
+def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = None) -> Arm:
     """Return an arm by its name in the catalogue, or from a file.
 
     Args:
         name: such as ``puma560``; something with a slash or ending in .toml, .json or .urdf is a path.
+        packages: folders of packages, by name, in which the meshes of a URDF file are.
 
     Raises:
         MissingExtraError: the file is URDF, and lxml is not installed.
@@ -46,7 +49,7 @@ def load_arm(name: str | Path) -> Arm:
     if not isinstance(name, str | Path):
         raise KindError(f"name: expected the name of an arm or the path of a file, got {shown(name)}")
     if is_path(name):
-        return load_urdf(name) if Path(name).suffix.lower() in _URDF else read_arm(name)
+        return load_urdf(name, packages=packages) if Path(name).suffix.lower() in _URDF else read_arm(name)
     if name not in arm_names():
         raise UnknownNameError("arm", str(name), arm_names())
     return read_arm(_CATALOGUE / f"{name}.toml")
@@ -96,6 +99,7 @@ def read_arm(path: Path | str) -> Arm:
         reach=number_in(hand, "reach", LENGTH, default=math.inf, positive=True),
         tool_speed=number_in(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
         base_solids=solids_in(top, "base_solids"),
+        collisions=collision_pairs_in(top.table("collisions"), [link.name for link in links]),
         base_link=top.text("base_link", default=""),
         tool_link=top.text("tool_link", default=""),
         source=top.text("source", default=""),

@@ -19,6 +19,7 @@ from typing import Any, Literal, TypeAlias, TypeVar, get_args
 import attrs
 import numpy as np
 
+from armwright.arm.collision_pairs import CollisionPairs, of_its_bodies
 from armwright.arm.tensors import ROUNDING, impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.units import PRISMATIC, REVOLUTE, JointUnits
@@ -319,6 +320,7 @@ class Arm:
         reach: greatest distance of the hand from the base axis that the report's speed rule divides by [m].
         tool_speed: speed of the hand at full reach [m/s].
         base_solids: what of the base meets other bodies, in the base frame.
+        collisions: pairs of its bodies that are checked for collisions, or not, whatever the rule says.
         base_link: what the base frame is called in its file; empty where it has no name.
         tool_link: what the tool is called.
         source: where the numbers come from.
@@ -345,6 +347,7 @@ class Arm:
     reach: float = math.inf
     tool_speed: float = math.inf
     base_solids: tuple[Solid, ...] = attrs.field(default=(), converter=_solids, eq=False)
+    collisions: CollisionPairs = attrs.field(factory=CollisionPairs, eq=False, validator=of_its_bodies)
     base_link: str = ""
     tool_link: str = ""
     source: str = ""

@@ -1,15 +1,20 @@
-"""Solids in files that people write: boxes, cylinders, capsules and spheres, the unit in the key."""
+"""Solids in files that people write: boxes, cylinders, capsules, spheres and the meshes of other files."""
 
 from __future__ import annotations
 
+from pathlib import PurePath
+
+import attrs
 import numpy as np
 
 from armwright.arm.quantities import number_in, typed_pose, unit_of, vector_in
-from armwright.errors import ArmwrightError, FileFormatError
+from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError
 from armwright.files.document import Table
-from armwright.spatial.shapes import Box, Capsule, Cylinder, Shape, Solid, Sphere
+from armwright.files.inputs import file_below
+from armwright.files.limits import limit, limit_message
+from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
 
-KINDS = ("box", "capsule", "cylinder", "sphere")
+KINDS = ("box", "capsule", "cylinder", "mesh", "sphere")
 _UNITS = {"m": 1.0, "mm": 1e-3}
 
 
@@ -26,17 +31,20 @@ def solids_in(table: Table, key: str) -> tuple[Solid, ...]:
 
 
 def _solid(entry: Table) -> Solid:
-    solid = Solid(shape=shape_in(entry, entry.choice("kind", KINDS)), pose=typed_pose(entry).X)
+    shape = shape_in(entry, entry.choice("kind", KINDS))
+    solid = Solid(shape=shape, pose=typed_pose(entry).X, guessed=entry.flag("guess"))
     entry.refuse_unknown_keys()
     return solid
 
 
 def shape_in(entry: Table, kind: str) -> Shape:
-    """Read a shape of a kind: ``size`` of a box, ``diameter`` and ``length`` of the others.
+    """Read a shape of a kind: ``size`` of a box, the files of a ``mesh``, ``diameter`` and ``length`` of the others.
 
     Raises:
-        FileFormatError: a length is missing or out of range.
+        FileFormatError: a length is missing or out of range, or a mesh cannot be read.
     """
+    if kind == "mesh":
+        return _mesh(entry)
     try:
         if kind == "box":
             _require(entry, "size")
@@ -49,6 +57,34 @@ def shape_in(entry: Table, kind: str) -> Shape:
         raise
     except ArmwrightError as error:
         raise entry.error(None, str(error)) from error
+
+
+def _mesh(entry: Table) -> Mesh:
+    """Read a mesh, and the convex pieces that count in its place in collisions."""
+    from armwright.spatial.meshes.reader import UNITS, has_unit  # noqa: PLC0415 - few files have meshes
+
+    unit = entry.choice("unit", UNITS) if "unit" in entry else None
+    entry.allow("unit", "pieces")
+    mesh = _mesh_file(entry, "mesh", entry.text("mesh"), unit)
+    if "pieces" not in entry:
+        return mesh
+    names = entry.texts("pieces")
+    if len(names) > limit("bodies"):
+        raise entry.error("pieces", f"too many: {limit_message('bodies', len(names))}")
+    # The unit is that of files without one.
+    pieces = [_mesh_file(entry, "pieces", name, None if has_unit(PurePath(name)) else unit) for name in names]
+    return attrs.evolve(mesh, pieces=pieces)
+
+
+def _mesh_file(entry: Table, key: str, name: str, unit: str | None) -> Mesh:
+    from armwright.spatial.meshes.reader import read_mesh  # noqa: PLC0415 - few files have meshes
+
+    try:
+        return read_mesh(file_below(entry.path.parent, name), unit=unit)
+    except InvalidValueError as error:
+        raise entry.error("unit", str(error).removeprefix("unit: ")) from error
+    except FileFormatError as error:
+        raise entry.error(key, str(error)) from error
 
 
 def _length(entry: Table, name: str) -> float:

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import attrs
 import numpy as np
 
+from armwright.arm.collision_pairs import body_names
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link, Motor
 from armwright.arm.positions import known_arm
 from armwright.arm.tensors import impossible_moments
@@ -46,6 +47,7 @@ def _lines(arm: Arm) -> Iterator[str]:
     yield from _pose("tool", arm.tool)
     if arm.gravity_from == "stated" or not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         yield from _table("gravity", {"m_per_s2": arm.gravity})
+    yield from _collisions(arm)
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         yield f"[[joint]]  # {i}"
         yield f'kind = "{joint.kind}"'
@@ -61,6 +63,18 @@ def _lines(arm: Arm) -> Iterator[str]:
         yield from _table("joint.motor", _motor(arm, i, motor, joint))
     if arm.uncertainty is not None:
         yield from _uncertainty(arm.uncertainty)
+
+
+def _collisions(arm: Arm) -> Iterator[str]:
+    """Write the pairs of bodies that are checked for collisions, or not, whatever the rule says."""
+    names = body_names(arm.n)
+    lists = {"leave_out": arm.collisions.leave_out, "check": arm.collisions.check}
+    if any(lists.values()):
+        yield "[collisions]"
+        for key, pairs in lists.items():
+            if pairs:
+                yield f"{key} = {json.dumps([[names[a], names[b]] for a, b in pairs])}"
+        yield ""
 
 
 def _uncertainty(known: Uncertainty) -> Iterator[str]:
@@ -116,7 +130,8 @@ def _solid(solid: Solid) -> str:
         values["xyz_m"] = X[:3, 3].tolist()
     if not np.array_equal(X[:3, :3], np.eye(3)):
         values["rotation"] = X[:3, :3].tolist()
-    return ", ".join([f'kind = "{kind}"', *(f"{name} = {value!r}" for name, value in values.items())])
+    guess = ["guess = true"] if solid.guessed else []
+    return ", ".join([f'kind = "{kind}"', *(f"{name} = {value!r}" for name, value in values.items()), *guess])
 
 
 def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:

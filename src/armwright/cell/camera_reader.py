@@ -14,7 +14,7 @@ from armwright.errors import closest
 from armwright.files.document import Table
 from armwright.spatial.lens import Lens, simple_lens
 from armwright.spatial.poses import inverse_pose
-from armwright.spatial.shapes import LARGEST_SIZE, Shape, Solid, contains, reach
+from armwright.spatial.shapes import LARGEST_SIZE, Shape, Solid, contains, support
 
 # Sides of pictures [px], and how many pixels one may have.
 _SIDES, _MAX_PIXELS = (16, 4096), 4_194_304
@@ -154,7 +154,7 @@ def _sight(
 
 def lowest(shape: Shape, pose: Array) -> float:
     """Return the height of the lowest point of a solid at a pose (4, 4) [m]."""
-    return float(pose[2, 3] - reach(shape, -pose[2, :3]))
+    return float(pose[2, 3] - support(shape, -pose[2, :3]))
 
 
 def _named(entry: Table, key: str, known: Collection[str], what: str) -> str:
@@ -177,7 +177,7 @@ def _height(entry: Table, fixtures: Mapping[str, Fixture], start: float) -> floa
     if TABLE not in fixtures:
         raise entry.error("on", "the scene has no table")
     table = fixtures[TABLE]
-    return float(table.pose[2, 3] + reach(table.shape, table.pose[2, :3]))
+    return float(table.pose[2, 3] + support(table.shape, table.pose[2, :3]))
 
 
 def refuse_hidden_markers(

@@ -1,8 +1,12 @@
 """The protocol by which the interpreter controls a cell, simulated or real."""
 
-from typing import NamedTuple, Protocol
+from collections.abc import Callable
+from typing import NamedTuple, Protocol, Self, TypeAlias, runtime_checkable
 
 from armwright.arrays import Array
+from armwright.cell.model import Cell
+from armwright.cell.observations import Observations
+from armwright.cell.part_poses import PartPoses
 from armwright.errors import ArmwrightError
 from armwright.motion.trajectory import Trajectory
 
@@ -23,20 +27,47 @@ class PeakContact(NamedTuple):
     force: float
 
 
+class Mishap(NamedTuple):
+    """Something that goes wrong in a cell between the statements of a program.
+
+    Attributes:
+        time: when [s], on a servo tick.
+        arm: the arm it happens to; None where it is none.
+        code: of the message, such as ``R605``.
+        message: what happened.
+        label: what is said at the statement under way.
+        helps: what to do.
+    """
+
+    time: float
+    arm: str | None
+    code: str
+    message: str
+    label: str
+    helps: tuple[str, ...] = ()
+
+
 class Hardware(Protocol):
     """The devices of a cell. Times are in [s] on the clock of the cell, poses (4, 4) in the world."""
+
+    def advance(self, now: float) -> Mishap | None:
+        """Let time go by, until now or until something goes wrong; then the cell stands at the time of that."""
 
     def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) that the sensors of an arm read."""
 
-    def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
-        """Let an arm follow a trajectory that begins at its configuration, instead of its current motion.
+    def sent_configuration(self, arm: str, now: float) -> Array:
+        """Return the joint positions (n,) that an arm is sent to, now or at a time to come: motions begin there."""
+
+    def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array, *, guarded: bool = False) -> None:
+        """Let an arm follow a trajectory that begins where it has been sent, instead of its current motion.
 
         Args:
             arm: its name.
             trajectory: from now on.
             now: the time.
             tip: (4, 4) pose relative to the gripper of what is moved to the goal: the part that may touch something.
+            guarded: whether the program looks out for contact meanwhile.
         """
 
     def contact_time(self, arm: str) -> float | None:
@@ -61,8 +92,17 @@ class Hardware(Protocol):
         remains constant.
         """
 
-    def move_fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:
-        """Close or open the fingers of an arm, completely or to a width [m]; return the time it takes.
+    def move_fingers(
+        self, arm: str, now: float, *, closed: bool, width: float | None = None, frame: str | None = None
+    ) -> float:
+        """Close or open the fingers of an arm; return the time it takes.
+
+        Args:
+            arm: its name.
+            now: the time [s].
+            closed: whether they close.
+            width: to which they move [m]; None for as far as they can.
+            frame: the frame that they close on, if the program says so.
 
         Raises:
             DeviceError: the gripper did not answer.
@@ -75,12 +115,30 @@ class Hardware(Protocol):
             DeviceError: there is no such device.
         """
 
-    def locate(self, frame: str) -> tuple[Array, float]:
+    def part_poses(self) -> PartPoses:
+        """Return where the parts are believed to be, and on whose hands. It is not to be changed."""
+
+    def locate(self, frame: str, now: float) -> tuple[Array, float]:
         """Let the camera locate the object of a frame; return its pose in the world and the time it takes.
 
         Raises:
             DeviceError: nothing was found.
         """
 
+    def observations(self) -> Observations:
+        """Return what the cell leaves of the run up to now."""
+
     def active_devices(self) -> frozenset[str]:
         """Return the devices that are on."""
+
+
+@runtime_checkable
+class SimulatedHardware(Hardware, Protocol):
+    """Devices that are simulated: their state can be copied, so that a run can be gone back in."""
+
+    def copy(self) -> Self:
+        """Return devices in the same state; later commands to one do not change the other."""
+
+
+# How a cell is set up to run programs.
+HardwareFactory: TypeAlias = Callable[[Cell], SimulatedHardware]

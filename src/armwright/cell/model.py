@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arm.gravity import in_world
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
+from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight
 from armwright.errors import ShapeError
@@ -45,6 +46,10 @@ class CellArm:
         open_time: time in which the fingers open [s].
         grasp_time: time in which they close [s].
         gripper: what it holds parts with; None where nothing is known of it.
+        servo: the controller of its joints, in a cell with physics.
+        plant: the arm that stands in such a cell, where it is another than ``arm``, which its controller believes in.
+        sensors: what its controller knows of its joints there.
+        force_sensor: between the arm and its tool there.
     """
 
     arm: Arm
@@ -53,6 +58,10 @@ class CellArm:
     open_time: float = 0.3
     grasp_time: float = 0.3
     gripper: Gripper | None = None
+    servo: Servo = attrs.field(factory=Servo)
+    plant: Arm | None = None
+    sensors: Sensors = attrs.field(factory=Sensors)
+    force_sensor: ForceSensor = attrs.field(factory=ForceSensor)
 
     def __attrs_post_init__(self) -> None:
         """Refuse a start of another number of joints."""
@@ -88,18 +97,20 @@ class Cell:
         parts: bodies that grippers hold and move, by name.
         markers: of the scene, by name, with their poses in the world.
         cameras: that take pictures, by name.
-        seen_parts: by frame name, the part whose grasp pose the camera answers with.
-        sights: by frame name, what a camera looks for: these parts, and markers of the scene.
+        sights: by frame name, what a camera looks for: parts, and markers of the scene.
         visions: other answers of the camera by frame name, in order, (4, 4) relative to the camera.
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
         devices: names of the devices that can be operated; None allows any name.
         contact: plane with which arms and what they carry come into contact.
+        alarms: what stops a program in this cell with physics.
         vision_time: time that the camera takes for an answer [s].
         deviation: allowed distance from straight lines [m].
         corner: how far a path past several frames may be from the straight legs between them [m]; 20 deviations by
             default, see ``corner_deviation``.
+        clearance: distance to other bodies below which a stage of a MOVE gets a warning [m]; 0 for none.
         period: of the servo [s].
+        plan: whether a path is planned past other bodies where a point-to-point motion would run into one.
         around: the kind of detour of an infeasible straight line, by ``via`` poses or ``damped`` least squares; None
             for no detour.
     """
@@ -112,18 +123,20 @@ class Cell:
     parts: Mapping[str, Part] = attrs.field(factory=dict)
     markers: Mapping[str, Marker] = attrs.field(factory=dict)
     cameras: Mapping[str, Camera] = attrs.field(factory=dict)
-    seen_parts: Mapping[str, str] = attrs.field(factory=dict)
     sights: Mapping[str, Sight] = attrs.field(factory=dict)
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False
     devices: frozenset[str] | None = None
     contact: ContactPlane = attrs.field(factory=ContactPlane)
+    alarms: Alarms = attrs.field(factory=Alarms)
     vision_time: float = 0.1
     deviation: float = 1e-3
     corner: float | None = None
+    clearance: float = 0.0
     period: float = 1e-3
     around: Around | None = None
+    plan: bool = False
 
     def __attrs_post_init__(self) -> None:
         """Give every arm the gravity of the cell, with a warning where its file states another."""
@@ -134,9 +147,24 @@ class Cell:
         object.__setattr__(self, "arms", arms)
 
     @property
+    def seen_parts(self) -> Mapping[str, str]:
+        """By frame name, the part whose grasp pose a camera answers with."""
+        return {name: sight.name for name, sight in self.sights.items() if sight.kind == "part"}
+
+    @property
     def corner_deviation(self) -> float:
         """How far a path past several frames may be from the straight legs between them [m]."""
         return _CORNER_DEVIATIONS * self.deviation if self.corner is None else self.corner
+
+    @property
+    def seen_frames(self) -> frozenset[str]:
+        """The frames that the camera has answers for."""
+        return frozenset({*self.visions, *self.sights})
+
+    @property
+    def collisions_matter(self) -> bool:
+        """Whether there is anything in the cell that an arm could run into: fixtures, parts or another arm."""
+        return bool(self.fixtures or self.parts) or len(self.arms) > 1
 
     def tree(self) -> FrameTree:
         """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.

@@ -1,6 +1,7 @@
 """Cell files: TOML for people, JSON for programs, with the same content."""
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -11,20 +12,23 @@ from armwright.arm.load import is_path, load_arm
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array
+from armwright.cell.assembly import is_assembly
 from armwright.cell.camera_reader import read_cameras, read_visions, refuse_hidden_markers
+from armwright.cell.control_reader import read_alarms, read_force_sensor, read_plant, read_sensors, read_servo
 from armwright.cell.entries import ARM_NAME, read_name, read_pose, refuse_too_many
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane
 from armwright.cell.names import arm_name
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
 from armwright.dynamics.arguments import weighed
-from armwright.errors import ArmwrightError, closest
+from armwright.errors import ArmwrightError, FileFormatError, MeshWarning, closest
 from armwright.files.document import Document, Table
 from armwright.files.inputs import file_path, regular_file
 from armwright.files.limits import limit, limit_message
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.spatial.poses import inverse as inverse_pose
+from armwright.spatial.shapes import Mesh
 
 # Smallest distance of the bases of two arms [m].
 _MIN_BASE_DISTANCE = 0.01
@@ -37,6 +41,8 @@ SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
 # Corner deviations: below a hundredth of a millimetre the arm would stop.
 CORNER_MM = (1e-2, 1e3)
+# Distances to other bodies that can be asked for: larger ones are not looked for.
+CLEARANCE_MM = (0.0, 50.0)
 # The kind of detour of a straight line, by its word in the file.
 DETOURS: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
 # What the camera finds after its last answer, by its word in the file.
@@ -58,6 +64,8 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         FileFormatError: the file is missing or invalid; the message has file, line and key.
     """
     path = file_path(path)
+    if is_assembly(path):
+        raise FileFormatError(path, None, "", "expected a cell file; an assembly is for IMPORT")
     top = Document.read(path).root
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
@@ -76,11 +84,11 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         parts=parts,
         markers=markers,
         cameras=cameras,
-        seen_parts={name: sight.name for name, sight in sights.items() if sight.kind == "part"},
         sights=sights,
         visions=visions,
         camera=read_pose(camera, "pose", default=np.eye(4)),
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
+        alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
         devices=_read_devices(top.table("devices")) if "devices" in top else None,
         contact=ContactPlane(
@@ -91,12 +99,30 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
         corner=_optional_number(motion, "corner_mm", 1e-3, *CORNER_MM),
+        clearance=motion.number("clearance_mm", default=0.0, lower=CLEARANCE_MM[0], upper=CLEARANCE_MM[1]) * 1e-3,
         around=DETOURS[motion.choice("around", DETOURS, default="none")],
+        plan=motion.flag("plan", default=False),
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):
         table.refuse_unknown_keys()
+    _warn_of_hulls(cell)
     return cell
+
+
+def _warn_of_hulls(cell: Cell) -> None:
+    """Warn where collisions are found with shapes that differ much from the meshes of bodies."""
+    solids = {f"{name} base": arm.arm.base_solids for name, arm in cell.arms.items()}
+    for name, arm in cell.arms.items():
+        solids |= {f"{name} {link.name or f'link {i}'}": link.solids for i, link in enumerate(arm.arm.links, 1)}
+    bodies = [(name, solid.shape) for name, row in solids.items() for solid in row]
+    bodies += [(name, fixture.shape) for name, fixture in cell.fixtures.items()]
+    bodies += [(name, part.shape) for name, part in cell.parts.items()]
+    if any(isinstance(shape, Mesh) for _, shape in bodies):
+        from armwright.spatial.meshes.hulls import hull_messages  # noqa: PLC0415 - few cells have meshes
+
+        for message in hull_messages(bodies):
+            warnings.warn(f"cell '{cell.name}': {message}", MeshWarning, stacklevel=3)
 
 
 def _read_gravity(top: Table) -> Array:
@@ -144,9 +170,10 @@ def _read_arms(table: Table, folder: Path) -> dict[str, CellArm]:
 
 def _read_arm(table: Table, folder: Path) -> CellArm:
     name = table.text("model", default=_DEFAULT_ARM)
+    packages = {key: folder / table.table("packages").text(key) for key in table.table("packages")}
     try:
-        # The path of an arm file is relative to the folder of the cell file.
-        arm = load_arm(regular_file(folder / name) if is_path(name) else name)
+        # The paths of an arm file and of packages are relative to the folder of the cell file.
+        arm = load_arm(regular_file(folder / name) if is_path(name) else name, packages=packages)
     except ArmwrightError as error:
         raise table.error("model", str(error)) from error
     if arm.n < _MIN_JOINTS:
@@ -158,17 +185,33 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         weighed(arm)
     except ArmwrightError as error:
         raise table.error("model", f"{error}, but the motions of a program are computed with efforts") from error
-    arm = attrs.evolve(arm, tool=read_pose(table, "tool", default=arm.tool))
+    arm = _with_tool(arm, table)
     base = read_pose(table, "base", default=np.eye(4))
     table.allow("hand", "joint_positions")
     start = _read_start(table, arm, base)
     open_time, grasp_time = (
         table.number(key, default=0.3, lower=0.0, upper=_MAX_DURATION) for key in ("open_s", "grasp_s")
     )
-    gripper = read_gripper(table.table("gripper")) if "gripper" in table else None
-    table.allow("gripper")
+    result = CellArm(
+        arm=arm,
+        base=base,
+        start=start,
+        open_time=open_time,
+        grasp_time=grasp_time,
+        gripper=read_gripper(table.table("gripper")) if "gripper" in table else None,
+        servo=read_servo(table.table("servo")),
+        plant=_with_tool(read_plant(table.table("plant"), arm, folder), table) if "plant" in table else None,
+        sensors=read_sensors(table.table("sensors")),
+        force_sensor=read_force_sensor(table.table("force")),
+    )
+    table.allow("gripper", "plant")
     table.refuse_unknown_keys()
-    return CellArm(arm=arm, base=base, start=start, open_time=open_time, grasp_time=grasp_time, gripper=gripper)
+    return result
+
+
+def _with_tool(arm: Arm, table: Table) -> Arm:
+    """Return an arm with the tool that the cell file specifies, if it does."""
+    return attrs.evolve(arm, tool=read_pose(table, "tool", default=arm.tool))
 
 
 def _read_start(table: Table, arm: Arm, base: Array) -> Array:

@@ -7,8 +7,9 @@ import numpy as np
 from armwright.arm.solid_entries import shape_in
 from armwright.cell.entries import read_name, read_pose, read_whole, refuse_too_many
 from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, Spread, table
+from armwright.errors import counted
 from armwright.files.document import Table
-from armwright.spatial.shapes import LARGEST_SIZE
+from armwright.spatial.shapes import LARGEST_SIZE, Mesh, Shape, is_closed, open_edges
 
 # A coefficient of friction beyond this is that of glue.
 _MAX_FRICTION = 10.0
@@ -17,7 +18,8 @@ _MAX_FORCE = 1e5
 # Markers of the dictionary 4X4_50.
 _MARKERS = 50
 _MAX_SYMMETRY = 360
-_SHAPES = ("box", "cylinder", "sphere")
+_SHAPES = ("box", "cylinder", "mesh", "sphere")
+_FIXTURES = {"boxes": "box", "cylinders": "cylinder", "meshes": "mesh", "spheres": "sphere"}
 
 
 def read_fixtures(scene: Table) -> dict[str, Fixture]:
@@ -30,12 +32,12 @@ def read_fixtures(scene: Table) -> dict[str, Fixture]:
     if "table" in scene:
         fixtures[TABLE] = _table(scene.table("table"))
     scene.allow("table")
-    for kind in ("boxes", "cylinders", "spheres"):
+    for kind, shape in _FIXTURES.items():
         for entry in scene.tables(kind) if kind in scene else ():
             name = read_name(entry, "name", fixtures, entry.text("name"))
             fixtures[name] = Fixture(
                 name=name,
-                shape=shape_in(entry, {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere"}[kind]),
+                shape=shape_in(entry, shape),
                 pose=read_pose(entry, "at"),
                 friction=_friction(entry),
             )
@@ -100,7 +102,7 @@ def read_parts(parts: Table) -> dict[str, Part]:
         entry.allow("marker")
         result[name] = Part(
             name=name,
-            shape=shape_in(entry, entry.choice("shape", _SHAPES, default="box")),
+            shape=_part_shape(entry),
             mass=entry.number("mass_kg", lower=1e-6, upper=_MAX_MASS),
             friction=_friction(entry),
             pose=read_pose(entry, "at"),
@@ -114,6 +116,19 @@ def read_parts(parts: Table) -> dict[str, Part]:
         )
         entry.refuse_unknown_keys()
     return result
+
+
+def _part_shape(entry: Table) -> Shape:
+    """Read the shape of a part, which must enclose the volume that its mass fills."""
+    shape = shape_in(entry, entry.choice("shape", _SHAPES, default="mesh" if "mesh" in entry else "box"))
+    if isinstance(shape, Mesh) and not is_closed(shape):
+        edges = counted(open_edges(shape), "edge")
+        raise entry.error(
+            "mesh",
+            f"{shape.name} is not closed ({edges} without one triangle on either side); expected a mesh that encloses "
+            "the mass of the part",
+        )
+    return shape
 
 
 def _marker(entry: Table) -> Marker:

@@ -9,6 +9,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.hardware import DeviceError, PeakContact
 from armwright.cell.model import Cell
+from armwright.cell.observations import Observations
+from armwright.cell.part_poses import PartPoses
 from armwright.errors import closest, counted
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
@@ -75,20 +77,37 @@ class Simulator:
         self._motions = {name: _Motion(t0=0.0, trajectory=hold(arm.start, 0.0)) for name, arm in cell.arms.items()}
         self._active: set[str] = set()
         self._answers = {name: list(answers) for name, answers in cell.visions.items()}
+        self._parts = PartPoses(cell)
 
     def copy(self) -> "Simulator":
         """Return a simulator in the same state; later commands to one do not change the other."""
         other = Simulator(self._cell)
         other._motions, other._active = dict(self._motions), set(self._active)
         other._answers = {name: list(answers) for name, answers in self._answers.items()}
+        other._parts = self._parts.copy()
         return other
+
+    def advance(self, now: float) -> None:
+        """Let time go by: in this cell nothing goes wrong."""
 
     def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) of an arm."""
         motion = self._motions[arm]
         return motion.trajectory(motion.trajectory_time(now))
 
-    def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
+    def sent_configuration(self, arm: str, now: float) -> Array:
+        """Return the joint positions (n,) of an arm: it is where it is sent to."""
+        return self.configuration(arm, now)
+
+    def start_motion(
+        self,
+        arm: str,
+        trajectory: Trajectory,
+        now: float,
+        tip: Array,
+        *,
+        guarded: bool = False,  # noqa: ARG002 - the plane is the same for all
+    ) -> None:
         """Let an arm follow a trajectory that begins at its configuration."""
         gap = np.abs(trajectory(0.0) - self.configuration(arm, now)).max()
         assert gap <= _SAME_CONFIGURATION, f"{arm} is {gap:.3g} away from the start of its trajectory"  # noqa: S101
@@ -199,12 +218,23 @@ class Simulator:
         blocks = (arm_in_cell.base @ forward(arm_in_cell.arm, trajectory(block)) @ tip for block in _split_blocks(t))
         return np.concatenate([poses[:, 2, 3] for poses in blocks])
 
-    def move_fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:  # noqa: ARG002 - see below
+    def move_fingers(
+        self,
+        arm: str,
+        now: float,
+        *,
+        closed: bool,
+        width: float | None = None,
+        frame: str | None = None,  # noqa: ARG002 - in this cell they close on what is there
+    ) -> float:
         """Close or open the fingers of an arm; return the time it takes [s].
 
-        The fingers of this simulator take the same time for every width, that of the file. What they release does not
-        press on the plane any more.
+        The fingers of this simulator take the same time for every width, that of the file. A part that they close on
+        moves with the hand from now on, see ``PartPoses``; what they release stays where it is, and does not press on
+        the plane any more.
         """
+        if self._cell.parts:
+            (self._parts.close if closed else self._parts.open)(arm, self._hands(now), now, width)
         if not closed:
             motion = self._motions[arm]
             is_gripper = [np.allclose(point.pose, np.eye(4), rtol=0, atol=_DEPTH_TOLERANCE) for point in motion.points]
@@ -225,11 +255,26 @@ class Simulator:
         (self._active.add if on else self._active.discard)(device)
         return 0.0
 
-    def locate(self, frame: str) -> tuple[Array, float]:
+    def part_poses(self) -> PartPoses:
+        """Return where the parts are, and on whose hands. It is not to be changed."""
+        return self._parts
+
+    def observations(self) -> Observations:
+        """Return where the parts were."""
+        return Observations(parts=self._parts.tracks)
+
+    def _hands(self, now: float) -> dict[str, Array]:
+        """Return the pose (4, 4) of each hand in the world."""
+        return {
+            name: arm.base @ forward(arm.arm, self.configuration(name, now)) for name, arm in self._cell.arms.items()
+        }
+
+    def locate(self, frame: str, now: float) -> tuple[Array, float]:
         """Return the next answer of the camera for a frame, in the world, and the time it takes.
 
-        A marker of the scene is where it is. The answers of the cell file come one after the other; where it states so,
-        the last one is repeated.
+        Of a frame that stands for a part it is the grasp pose of this part, where it is now; a marker of the scene is
+        where it is. The answers of the cell file come one after the other; where it states so, the last one is
+        repeated.
 
         Raises:
             DeviceError: the cell file has no answer for this frame, or no more.
@@ -237,6 +282,9 @@ class Simulator:
         sight = self._cell.sights.get(frame)
         if sight is not None and sight.kind == "marker":
             return self._cell.markers[sight.name].pose @ sight.relation, self._cell.vision_time
+        if sight is not None:
+            X_WP = self._parts.in_world(sight.name, self._hands(now))
+            return X_WP @ self._cell.parts[sight.name].grasp, self._cell.vision_time
         answers = self._answers.get(frame)
         if not answers:
             if count := len(self._cell.visions.get(frame, ())):

@@ -30,6 +30,7 @@ COMMANDS = {
     "move": "Plan a motion of an arm through the poses of a file.",
     "iso9283": "Print the performance characteristics of ISO 9283 from measured poses and paths.",
     "calibrate": "Identify the geometric errors of an arm from measured points of its tool, and write the corrected arm.",
+    "calibrate-camera": "Calibrate a camera from pictures of a board: its lens, and its pose on an arm or beside it.",
     "plan-poses": "Propose measurement configurations at which the errors of an arm are most observable.",
     "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
     "kernel": "Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.",

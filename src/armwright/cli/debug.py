@@ -7,7 +7,16 @@ import typer
 from typer import Argument
 
 from armwright.cli.options import usage_error
-from armwright.cli.programs import CellFile, Std, Strict, print_diagnostics, read_cell_option
+from armwright.cli.programs import (
+    CellFile,
+    Physics,
+    Seed,
+    Std,
+    Strict,
+    hardware_factory,
+    print_diagnostics,
+    read_cell_option,
+)
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
@@ -16,11 +25,13 @@ if TYPE_CHECKING:
     from armwright.program.vm.recording import Recording
 
 
-def debug(
+def debug(  # noqa: PLR0917 - Typer reads one parameter per option
     program: Annotated[
         Path | None, Argument(help="The program; without it, an editor is served over standard input and output.")
     ] = None,
     cell: CellFile = None,
+    physics: Physics = False,
+    seed: Seed = 0,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
 ) -> None:
@@ -28,7 +39,7 @@ def debug(
 
     With a program, the debugger runs on the terminal; `help` lists its commands. Without a program, it serves an editor
     by the Debug Adapter Protocol over standard input and output; the editor's launch configuration has the keys
-    program, cell, std, strict, stopOnEntry and output.
+    program, cell, physics, seed, std, strict, stopOnEntry and output.
 
     **Example:** `armwright debug examples/stacking.rlo --cell examples/stanford_cell.toml`
     """
@@ -42,7 +53,15 @@ def debug(
     from armwright.program.debugger.dap_session import LaunchRequest, MissingCellError
 
     launch = LaunchRequest(
-        program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False, strict=strict
+        program=program,
+        cell=cell,
+        std=std,
+        output=None,
+        stop_on_entry=True,
+        no_debug=False,
+        strict=strict,
+        physics=physics,
+        seed=seed,
     )
     try:
         loaded = load(launch)
@@ -78,6 +97,8 @@ def load(launch: "LaunchRequest") -> "LoadedProgram":
         MissingCellError: the program has no cell to run in.
         FileFormatError: a file cannot be read.
     """
+    import attrs
+
     from armwright.files.inputs import read_program
     from armwright.program import api
     from armwright.program.debugger.dap_session import MissingCellError
@@ -92,7 +113,7 @@ def load(launch: "LaunchRequest") -> "LoadedProgram":
     if loaded.cell is None:
         reason = "" if is_code_file else ": it IMPORTs none, and its folder does not have exactly one"
         raise MissingCellError(f"{path.name} needs a cell to run in{reason}")
-    return loaded
+    return attrs.evolve(loaded, hardware=hardware_factory(physics=launch.physics, seed=launch.seed))
 
 
 def save(launch: "LaunchRequest", loaded: "LoadedProgram", recording: "Recording") -> str:

@@ -53,7 +53,7 @@ class Terminal(cmd.Cmd):
         super().__init__(stdin=None if self.use_rawinput else cast("Any", Script()))
         assert loaded.cell is not None  # noqa: S101 - a program without a cell is not loaded
         self._source = loaded.code.source
-        self._debugger = Debugger(loaded.code, loaded.cell)
+        self._debugger = Debugger(loaded.code, loaded.cell, hardware=loaded.hardware)
         self._path: ProcessPath = ()
 
     def run(self) -> ExitStatus:

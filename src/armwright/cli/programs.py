@@ -11,6 +11,7 @@ from armwright.errors import ExitStatus
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
+    from armwright.cell.hardware import HardwareFactory
     from armwright.cell.model import Cell
     from armwright.program import Compilation, Source
     from armwright.program.api import LoadedProgram
@@ -29,7 +30,26 @@ CheckedCell: TypeAlias = Annotated[
     Option("--cell", help="Cell in which the programs will run; frames, arms and devices are then checked too."),
 ]
 Std: TypeAlias = Annotated[Standard, Option(help="Version of the language: RLO-2, or only the RLO-83 of the report.")]
+Physics: TypeAlias = Annotated[
+    bool, Option("--physics", help="Simulate the cell with servos, contact, grippers and falling parts.")
+]
+Seed: TypeAlias = Annotated[
+    int, Option(min=0, max=2**63 - 1, help="Seed of what is random in a cell with physics: parts, sensors, cameras.")
+]
 Strict: TypeAlias = Annotated[bool, Option("--strict", help="Treat an implied AFFIX (W201) as an error.")]
+
+
+def hardware_factory(*, physics: bool, seed: int) -> "HardwareFactory":
+    """Return how cells are set up to run programs: with physics, or as their files state."""
+    from functools import partial
+
+    from armwright.cell.simulator import Simulator
+
+    if not physics:
+        return Simulator
+    from armwright.physics.world import PhysicsCell
+
+    return partial(PhysicsCell, seed=seed)
 
 
 def read_cell_option(path: Path | None) -> "Cell | None":

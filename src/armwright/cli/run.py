@@ -10,13 +10,24 @@ from typer import Option
 from armwright.cli.numbers import within
 from armwright.cli.options import Json, OutputFolder, QuietButWarnings, usage_error
 from armwright.cli.output import command_line, print_json, print_result, print_result_table
-from armwright.cli.programs import CellFile, ProgramFile, Std, Strict, load_program, print_diagnostics
+from armwright.cli.programs import (
+    CellFile,
+    Physics,
+    ProgramFile,
+    Seed,
+    Std,
+    Strict,
+    hardware_factory,
+    load_program,
+    print_diagnostics,
+)
 from armwright.cli.progress import waiting
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from armwright.cell.hardware import HardwareFactory
     from armwright.cell.model import Cell
     from armwright.program.bytecode.instructions import Code
     from armwright.program.language.diagnostic import Diagnostic
@@ -44,6 +55,15 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         Around | None,
         Option(help="Replace an infeasible straight line: via, by a detour; damped, by damped least squares; none."),
     ] = None,
+    plan: Annotated[
+        bool | None,
+        Option(
+            "--plan/--no-plan",
+            help="Plan a path past other bodies where a point-to-point motion would run into one (extra planning).",
+        ),
+    ] = None,
+    physics: Physics = False,
+    seed: Seed = 0,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     max_steps: Annotated[
@@ -64,7 +84,8 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     With -o the command writes motion.csv (every servo tick, SI), events.jsonl (every effect with its source line),
     frames.json (the final frame tree), run.json (inputs, versions, summary) and report.html, a page that opens from the
     disk and shows the arm moving. With --around, the tool detours where a straight line meets a singularity or a limit;
-    a warning has the location, the cause, and the cost in mm, mrad and s.
+    a warning has the location, the cause, and the cost in mm, mrad and s. With --physics, servos move the arms, fingers
+    hold by friction, and parts fall; measured.csv has what the servos measured.
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
@@ -77,11 +98,13 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     if loaded.cell is None:
         needs = "needs a cell to run in, and IMPORTs none; try examples/stanford_cell.toml"
         raise usage_error("--cell", f"missing: {program} {needs}")
-    used_cell = _adjust_cell(loaded.cell, servo_ms, deviation_mm, around)
+    used_cell = _adjust_cell(loaded.cell, servo_ms, deviation_mm, around, plan=plan)
     limits = Limits(steps=max_steps, time=max_time)
     error: RunError | None = None
     try:
-        recording = _interpret(loaded.code, used_cell, limits, watched=not (quiet or as_json))
+        recording = _interpret(
+            loaded.code, hardware_factory(physics=physics, seed=seed), used_cell, limits, watched=not (quiet or as_json)
+        )
     except RunError as stopped:
         if stopped.recording is None:
             raise
@@ -91,8 +114,10 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         "deviation_mm": used_cell.deviation * 1e3,
         "corner_mm": used_cell.corner_deviation * 1e3,
         "around": used_cell.around or "none",
+        "plan": used_cell.plan,
         "std": std.value,
         "strict": strict,
+        **({"physics": True, "seed": seed} if physics else {}),
     }
     inputs = RunInputs(
         program=program,
@@ -147,7 +172,9 @@ def _finish(
         raise typer.Exit(error.exit_status)
 
 
-def _adjust_cell(cell: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
+def _adjust_cell(
+    cell: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None, *, plan: bool | None
+) -> "Cell":
     import attrs
 
     from armwright.cell.reader import DETOURS, DEVIATION_MM, SERVO_MS
@@ -157,15 +184,18 @@ def _adjust_cell(cell: "Cell", servo_ms: float | None, deviation_mm: float | Non
     if deviation_mm is not None:
         deviation = within(deviation_mm, DEVIATION_MM, "--deviation-mm") * 1e-3
     detour = cell.around if around is None else DETOURS[around]
-    return attrs.evolve(cell, period=period, deviation=deviation, around=detour)
+    return attrs.evolve(
+        cell, period=period, deviation=deviation, around=detour, plan=cell.plan if plan is None else plan
+    )
 
 
-def _interpret(code: "Code", cell: "Cell", limits: "Limits", *, watched: bool) -> "Recording":
-    """Run a program in the simulator, with a status line of the current statement on a terminal."""
-    from armwright.cell.simulator import Simulator
+def _interpret(
+    code: "Code", hardware: "HardwareFactory", cell: "Cell", limits: "Limits", *, watched: bool
+) -> "Recording":
+    """Run a program in a simulated cell, with a status line of the current statement on a terminal."""
     from armwright.program.vm.interpreter import interpret
 
-    simulator = Simulator(cell)
+    simulator = hardware(cell)
     with waiting("", quiet=not watched) as update:
         if update is None:
             return interpret(code, cell, simulator, limits=limits)

@@ -1,16 +1,30 @@
 """``armwright show``: the tables of an arm."""
 
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Option
+
 from armwright.cli.options import ArmName, Json
-from armwright.cli.output import print_json
+from armwright.cli.output import print_json, print_result_table
+
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm
 
 # Width at which tables are measured [characters]; none is wider.
 _WIDEST = 200
 
 
-def show(arm: ArmName, as_json: Json = False) -> None:
+def show(
+    arm: ArmName,
+    collisions: Annotated[
+        bool, Option("--collisions", help="Print the solids of the arm and the pairs that are checked for collisions.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
     """Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.
 
-    The tables are in degrees and millimetres; --json prints SI units and radians.
+    The tables are in degrees and millimetres; --json prints SI units and radians. With --collisions, print instead
+    what its links look like, which pairs of them are checked for collisions, and why others are not.
 
     **Example:** `armwright show puma560`
     """
@@ -22,6 +36,9 @@ def show(arm: ArmName, as_json: Json = False) -> None:
     from armwright.cli.terminal import console as clean_console
 
     model = load_arm(arm)
+    if collisions:
+        _show_collisions(model, as_json)
+        return
     if as_json:
         print_json(as_data(model))
         return
@@ -46,3 +63,20 @@ def show(arm: ArmName, as_json: Json = False) -> None:
     for fact in facts(model):
         grid.add_row(*fact)
     console.print(grid)
+
+
+def _show_collisions(model: "Arm", as_json: bool) -> None:
+    """Print the solids of an arm, and the pairs of its bodies that are checked for collisions."""
+    from armwright.cli.terminal import console
+    from armwright.physics.collision_bodies import collision_bodies
+
+    bodies = collision_bodies(model)
+    if as_json:
+        print_json(bodies.as_data())
+        return
+    terminal = console(emoji=False)
+    for result in bodies.tables():
+        if result.rows:
+            print_result_table(terminal, result)
+    for note in bodies.notes:
+        terminal.print(note)

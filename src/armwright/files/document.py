@@ -45,6 +45,15 @@ class Document:
         path = file_path(path)
         text = read_text(path)
         is_json = path.suffix.lower() == ".json" or (path.suffix.lower() != ".toml" and text.lstrip().startswith("{"))
+        return cls.parse(path, text, is_json=is_json)
+
+    @classmethod
+    def parse(cls, path: Path, text: str, *, is_json: bool) -> "Document":
+        """Parse a text that was read from a file.
+
+        Raises:
+            FileFormatError: it has a slip of syntax, is beyond a limit, or is no table.
+        """
         data = _parse(path, text, is_json=is_json)
         if not isinstance(data, dict):
             raise FileFormatError(path, 1, "", f"expected keys and values in braces, got {_value_text(data)}")
@@ -70,6 +79,11 @@ class Table:
         """Take the table at ``keys`` of a document."""
         self._document, self.keys, self._data = document, keys, data
         self._read: set[str] = set()
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._document.path
 
     def __contains__(self, key: str) -> bool:
         """Whether the table has the key."""
@@ -112,6 +126,28 @@ class Table:
             raise self.error(key, f"expected a number above 0, got {value:g}")
         return value
 
+    def whole(self, key: str, lower: int, upper: int, default: Any = _MISSING) -> int:
+        """Return a whole number from ``lower`` to ``upper``.
+
+        Raises:
+            FileFormatError: it is missing without a default, no whole number, or out of range.
+        """
+        value = self.number(key, default, lower=lower, upper=upper)
+        if value != round(value):
+            raise self.error(key, f"expected a whole number, got {value:g}")
+        return round(value)
+
+    def flag(self, key: str, *, default: bool = False) -> bool:
+        """Return ``true`` or ``false``.
+
+        Raises:
+            FileFormatError: it is neither of them.
+        """
+        value = self._value(key, default, "true or false")
+        if not isinstance(value, bool):
+            raise self.error(key, f"expected true or false, got {_value_text(value)}")
+        return value
+
     def vector(self, key: str, length: int | Collection[int], default: Any = _MISSING) -> Array:
         """Return an array of that many finite numbers; several lengths may be allowed.
 
@@ -120,6 +156,15 @@ class Table:
         """
         value = self._value(key, default, f"a list of {_numbers_text(length)}")
         return np.asarray(default, dtype=np.float64) if value is default else self._numbers((key,), value, length)
+
+    def numbers(self, key: str) -> Array:
+        """Return an array of finite numbers, of any length.
+
+        Raises:
+            FileFormatError: it is missing, or not such an array.
+        """
+        value = self._value(key, _MISSING, "a list of numbers")
+        return self._numbers((key,), value, len(value) if isinstance(value, list) else 0)
 
     def vectors(self, key: str, length: int) -> list[Array]:
         """Return a list of arrays of that many finite numbers each.
@@ -153,6 +198,23 @@ class Table:
         value = self._value(key, _MISSING, "a list of texts in quotes")
         if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
             raise self.error(key, f"expected a list of texts in quotes, got {_value_text(value)}")
+        return value
+
+    def text_rows(self, key: str, length: int) -> list[list[str]]:
+        """Return a list of rows of that many strings each; an empty one when it is missing.
+
+        Raises:
+            FileFormatError: it is no such list, or longer than the limit of entries.
+        """
+        expected = f"a list of lists of {length} texts in quotes"
+        value = self._value(key, [], expected)
+        if not isinstance(value, list):
+            raise self.error(key, f"expected {expected}, got {_value_text(value)}")
+        if len(value) > limit("entries"):
+            raise self.error(key, f"too many: {limit_message('entries', len(value))}")
+        for i, row in enumerate(value):
+            if not isinstance(row, list) or len(row) != length or not all(isinstance(text, str) for text in row):
+                raise self.error(key, f"expected {length} texts in quotes, got {_value_text(row)}", i)
         return value
 
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
@@ -205,6 +267,10 @@ class Table:
     def is_table(self, key: str) -> bool:
         """Whether the value of a key is a table."""
         return isinstance(self._data.get(key), dict)
+
+    def is_empty(self, key: str) -> bool:
+        """Whether the value of a key is an empty list."""
+        return self._data.get(key) == []
 
     def is_text(self, key: str) -> bool:
         """Whether the value of a key is a text."""

@@ -54,6 +54,22 @@ def regular_file(path: Path) -> Path:
     return path
 
 
+def file_below(folder: Path, name: str) -> Path:
+    """Return the path of a file that data name beside themselves: it must lie below their folder, links followed.
+
+    Raises:
+        FileFormatError: it lies elsewhere, or is no regular file.
+    """
+    path = folder / name
+    try:
+        below = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # a name that no file can have, or links in a circle
+        below = False
+    if not below or Path(name).is_absolute():
+        raise FileFormatError(folder, None, "", f"expected the name of a file below this folder, got {shown(name)}")
+    return regular_file(path)
+
+
 def read_pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
     """Give what a file holds, piece by piece, not more than a limit.
 

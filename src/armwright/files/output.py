@@ -32,9 +32,10 @@ RECORD = "run.json"
 FORMAT = "armwright results 1"
 # What results are called: a record is data, and only what has such a name is ever removed because a record names it.
 _RESULT_NAMES = re.compile(
-    r"(motion|samples|path|dh_\w+)\.csv|events\.jsonl|(frames|move|errors|measures|tables|summary)\.json|report\.html|"
-    r"arm\.(toml|urdf)|move\.(gif|mp4)|(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|"
-    r"verification|bearings|error|spectrum|forces|energy)\.svg"
+    r"(motion|measured|samples|path|corners|dh_\w+)\.csv|events\.jsonl|(frames|move|errors|measures|tables|summary)\.json|"
+    r"report\.html|arm\.(toml|urdf)|camera\.toml|move\.(gif|mp4)|"
+    r"(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|verification|bearings|error|"
+    r"spectrum|forces|energy)\.svg|seen-\d+\.png"
 )
 # A record that is larger is none of ours [bytes], and hashes are worked out in pieces [bytes].
 _LARGEST_RECORD, _PIECE = 200_000_000, 1 << 20

@@ -207,6 +207,21 @@ class Trajectory:
         segments = int(np.searchsorted(self.times, t, side="right"))
         return Trajectory(times=np.append(self.times[:segments], t), coefficients=self.coefficients[:segments])
 
+    def after(self, t: float) -> Trajectory:
+        """Return the rest of the motion from a time [s] on; of one that is over, that it stands at its end.
+
+        Raises:
+            KindError: the time is no number.
+            InvalidValueError: it is below 0.
+        """
+        t = not_negative(t, "t", "s")
+        if t >= self.duration:
+            return hold(self(self.duration), 0.0)
+        first = int(np.searchsorted(self.times, t, side="right")) - 1
+        begun = shifted(self.coefficients[first : first + 1], np.array([t - self.times[first]]))
+        coefficients = np.concatenate([begun, self.coefficients[first + 1 :]])
+        return Trajectory(times=np.append(0.0, self.times[first + 1 :] - t), coefficients=coefficients)
+
     def sampled(self, period: float) -> Samples:
         """Return the motion at every tick of a servo, from the start on, and at its very end.
 

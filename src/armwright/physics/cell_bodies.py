@@ -1,49 +1,38 @@
-"""The bodies of a cell, and which pairs of them may not meet."""
+"""The bodies of an arm in a cell."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from itertools import combinations
-
 from armwright.arm.guessed_solids import guessed_solids
 from armwright.arm.model import Arm
-from armwright.arrays import Array
-from armwright.cell.model import Cell
+from armwright.cell.scene import Gripper
 from armwright.physics.clearance import Body
+from armwright.physics.hand_solids import before_hand, gripper_length
 from armwright.spatial.poses import inverse
-from armwright.spatial.shapes import Solid
+from armwright.spatial.shapes import convex_solids
 
 
-def arm_bodies(name: str, arm: Arm) -> list[Body]:
-    """Return the bodies of an arm: its own solids, or guessed ones where it has none."""
-    known = any(link.solids for link in arm.links)
-    links = [link.solids for link in arm.links] if known else guessed_solids(arm)
-    # Frame 0 of the table may be elsewhere than the base frame.
-    X_0B = inverse(arm.base)
-    bodies = [Body(f"{name} base", solid.moved(X_0B), name) for solid in arm.base_solids]
-    for number, (link, solids) in enumerate(zip(arm.links, links, strict=True), 1):
-        label = f"{name} {link.name or f'link {number}'}"
-        bodies += [Body(label, solid, name, number) for solid in solids]
-    return bodies
+def has_solids(arm: Arm) -> bool:
+    """Whether the file of an arm states solids of its links; otherwise they are guessed."""
+    return any(link.solids for link in arm.links)
 
 
-def cell_bodies(cell: Cell, parts: Mapping[str, Array]) -> list[Body]:
-    """Return the bodies of a cell.
+def arm_bodies(name: str, arm: Arm, gripper: Gripper | None = None) -> list[Body]:
+    """Return the bodies of an arm: its own solids, or guessed ones where it has none.
 
     Args:
-        cell: the cell.
-        parts: (4, 4) poses in the world of the parts that no arm holds, by name.
+        name: of the arm.
+        arm: the arm.
+        gripper: what it holds parts with; guessed solids end behind it. It is not among the bodies.
     """
-    bodies = [body for name, arm in cell.arms.items() for body in arm_bodies(name, arm.arm)]
-    bodies += [Body(name, Solid(shape=it.shape, pose=it.pose)) for name, it in cell.fixtures.items()]
-    bodies += [Body(name, Solid(shape=cell.parts[name].shape, pose=X)) for name, X in parts.items()]
+    links = [link.solids for link in arm.links]
+    if not has_solids(arm):
+        links = list(guessed_solids(arm))
+        ends = (before_hand(solid, arm, gripper_length(gripper)) for solid in links[-1])
+        links[-1] = tuple(solid for solid in ends if solid is not None)
+    # Frame 0 of the table may be elsewhere than the base frame.
+    X_0B = inverse(arm.base)
+    bodies = [Body(f"{name} base", solid.moved(X_0B), name) for solid in convex_solids(arm.base_solids)]
+    for number, (link, solids) in enumerate(zip(arm.links, links, strict=True), 1):
+        label = f"{name} {link.name or f'link {number}'}"
+        bodies += [Body(label, solid, name, number) for solid in convex_solids(solids)]
     return bodies
-
-
-def pairs_apart(bodies: Iterable[Body]) -> list[tuple[int, int]]:
-    """Return the pairs of bodies that may not meet: of two arms, or of an arm and what stands.
-
-    Bodies of one arm are no such pairs here.
-    """
-    numbered = list(enumerate(bodies))
-    return [(i, j) for (i, a), (j, b) in combinations(numbered, 2) if a.arm != b.arm]

@@ -12,18 +12,20 @@ Source:
 
 from __future__ import annotations
 
+import copy
+import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from itertools import pairwise
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
-from armwright.compiled.arm import CompiledArm
+from armwright.arrays import Array, ArrayLike
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.distances import TOLERANCE, Distances
-from armwright.spatial.shapes import Solid, farthest
+from armwright.spatial.shapes import Solid, box_about, farthest
 
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
@@ -31,6 +33,12 @@ Numbers: TypeAlias = npt.NDArray[np.intp]
 RESOLUTION = 0.5e-3
 # Intervals that a motion is cut into at first, and that are looked at together.
 _FIRST, _BATCH = 16, 512
+# Intervals that are looked at together where those with the smallest distances come first.
+_CLOSEST_FIRST = 64
+# Least distances are found to this part of them, allowed overlaps are followed to this part.
+_PART_OF_DISTANCE, _PART_OF_OVERLAP = 0.1, 0.1
+# Farther apart no two bodies of a cell are [m].
+_FAR = 1e4
 
 
 class Body(NamedTuple):
@@ -49,6 +57,17 @@ class Body(NamedTuple):
     link: int = 0
 
 
+class LinkPoses(Protocol):
+    """An arm, compiled or not."""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm."""
+
+    def link_poses(self, q: ArrayLike) -> Array:
+        """Return the poses (k, n + 2, 4, 4) of all frames in the base frame, for positions (k, n)."""
+
+
 class PlacedArm(NamedTuple):
     """An arm in a cell.
 
@@ -57,7 +76,7 @@ class PlacedArm(NamedTuple):
         base: (4, 4) pose of its base frame in the world.
     """
 
-    arm: CompiledArm
+    arm: LinkPoses
     base: Array
 
 
@@ -75,12 +94,71 @@ class Closest(NamedTuple):
     time: float
 
 
-class _Interval(NamedTuple):
-    """An interval of time, and the pairs of bodies that may meet on it."""
+class Meeting(NamedTuple):
+    """Two bodies that are too near at a configuration.
+
+    Attributes:
+        number: of the configuration, from 0.
+        bodies: their numbers.
+        distance: between them [m]; below 0 where they overlap.
+    """
+
+    number: int
+    bodies: tuple[int, int]
+    distance: float
+
+
+class Least(NamedTuple):
+    """The least distance on motions.
+
+    Attributes:
+        closest: the least that was found; None where no two bodies come within the distance that was looked at.
+        bound: no two bodies are closer than this anywhere [m].
+    """
+
+    closest: Closest | None
+    bound: float
+
+
+class Window(NamedTuple):
+    """An interval of time, and the pairs of bodies that are looked at on it.
+
+    Attributes:
+        start: [s].
+        end: [s].
+        pairs: (k,) numbers of the pairs.
+        margins: (k,) the distance that each has to keep [m]; below 0 where so deep an overlap is allowed.
+    """
 
     start: float
     end: float
     pairs: Numbers
+    margins: Array
+
+    def halves(self, places: Numbers) -> list[Window]:
+        """Return both halves of the interval, with the pairs at some places."""
+        middle = (self.start + self.end) / 2
+        ends = (self.start, middle), (middle, self.end)
+        return [Window(start, end, self.pairs[places], self.margins[places]) for start, end in ends]
+
+    def cut(self) -> list[Window]:
+        """Return the intervals that this one is cut into at first."""
+        times = np.linspace(self.start, self.end, (_FIRST if self.end > self.start else 1) + 1).tolist()
+        return [self._replace(start=start, end=end) for start, end in pairwise(times)]
+
+
+class _Near(NamedTuple):
+    """The pairs of a window that are too near each other to be clear on all of it.
+
+    Attributes:
+        places: (k,) where they are in the window.
+        distances: (k,) between them in the middle [m].
+        moved: (k,) the most that their distances may change by until the start or the end [m].
+    """
+
+    places: Numbers
+    distances: Array
+    moved: Array
 
 
 class ClearanceChecker:
@@ -94,79 +172,225 @@ class ClearanceChecker:
             bodies: with their arms among those.
             pairs: the numbers of bodies that may not meet.
         """
-        self._arms, self._bodies = arms, bodies
-        self._pairs = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        self.arms = arms
         self._distances = Distances([body.solid.shape for body in bodies])
         self._radii = np.array([farthest(body.solid.shape) for body in bodies])
+        boxes = [box_about(body.solid.shape) for body in bodies]
+        self._boxes = np.array([box for box, _ in boxes]).reshape(-1, 3)
+        self._around = np.array([around for _, around in boxes])
+        self._arrange(bodies, pairs)
 
-    def first_contact(self, motions: Mapping[str, Trajectory], margin: float = 0.0) -> Closest | None:
+    def _arrange(self, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> None:
+        self._bodies = bodies
+        self._pairs = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        a, b = self._pairs.T
+        arms = np.array([body.arm or "" for body in bodies])
+        links = np.array([body.link for body in bodies], dtype=np.intp)
+        # Two bodies of one arm are moved past each other by the joints between them only.
+        self._of_one = (arms[a] == arms[b]) & (arms[a] != "")
+        self._from = np.where(self._of_one, np.minimum(links[a], links[b]), 0)
+        self._outer = np.where(self._of_one & (links[a] > links[b]), a, b)
+
+    @property
+    def bodies(self) -> Sequence[Body]:
+        """The bodies."""
+        return self._bodies
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """The numbers of bodies that may not meet."""
+        return [(a, b) for a, b in self._pairs.tolist()]
+
+    def rearranged(self, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> ClearanceChecker:
+        """Return a checker of the same solids, which other links carry or which are at other poses.
+
+        Args:
+            bodies: in the same order, each with its shape.
+            pairs: the numbers of bodies that may not meet.
+        """
+        other = copy.copy(self)
+        ClearanceChecker._arrange(other, bodies, pairs)
+        return other
+
+    def first_contact(
+        self, motions: Mapping[str, Trajectory], margin: float = 0.0, windows: Sequence[Window] | None = None
+    ) -> Closest | None:
         """Return where bodies come closer than a margin for the first time while arms move; None where none do.
 
         Args:
             motions: of all arms, from the same time on; an arm whose motion ends stands.
             margin: of distance that is kept [m].
+            windows: what is looked at, one after the other; all pairs all the time when left out.
         """
-        duration = max(motion.duration for motion in motions.values())
-        times = np.linspace(0.0, duration, _FIRST + 1)
-        every = np.arange(len(self._pairs))
-        # Intervals with the pairs that are left, the earliest last.
-        left = [_Interval(times[i], times[i + 1], every) for i in reversed(range(_FIRST))]
+        if windows is None:
+            end, count = max(motion.duration for motion in motions.values()), len(self._pairs)
+            windows = [Window(0.0, end, np.arange(count), np.full(count, margin))]
+        # What is left, the earliest last.
+        left = [piece for window in reversed(windows) for piece in reversed(window.cut())]
         while left:
             batch = [left.pop() for _ in range(min(_BATCH, len(left)))]
-            halves: list[_Interval] = []
-            for interval, (near, contact) in zip(batch, self._decide(motions, batch, margin), strict=True):
-                if contact is not None and not halves:
-                    return contact
+            halves: list[Window] = []
+            for window, near in zip(batch, self._near(motions, batch, [it.margins for it in batch]), strict=True):
+                if not len(near.places):
+                    continue
+                margins = window.margins[near.places]
+                met = np.flatnonzero(near.moved <= resolution(margins))
+                if len(met) and not halves:
+                    return self._closest(window, near, met[near.distances[met].argmin()])
                 # Something may be earlier than a contact: it is looked at again when that is decided.
-                pairs = near if contact is None else np.append(near, self._number_of(contact.bodies))
-                if len(pairs):
-                    middle = (interval.start + interval.end) / 2
-                    halves += [_Interval(interval.start, middle, pairs), _Interval(middle, interval.end, pairs)]
+                halves += window.halves(near.places)
             left += reversed(halves)
         return None
 
-    def _number_of(self, bodies: tuple[int, int]) -> int:
-        return int(np.flatnonzero((self._pairs == bodies).all(axis=1))[0])
+    def least(
+        self,
+        motions: Mapping[str, Trajectory],
+        windows: Sequence[Window],
+        within: float,
+        looks: int = 20_000,
+    ) -> Least:
+        """Return the least distance between bodies while arms move, to 0.5 mm or a tenth of it.
 
-    def _decide(
-        self, motions: Mapping[str, Trajectory], batch: Sequence[_Interval], margin: float
-    ) -> list[tuple[Numbers, Closest | None]]:
-        """Return for intervals the pairs that are left, and the closest of those that meet."""
+        Args:
+            motions: of all arms, from the same time on; an arm whose motion ends stands.
+            windows: what is looked at; the margins of their pairs do not count.
+            within: larger distances are not looked for [m].
+            looks: distances that are computed, a few more or less; where they do not suffice the bound is worse.
+        """
+        best: Closest | None = None
+        enough = within
+        # What may be closer than the best that is known, with a lower bound of its distances.
+        left = [(-math.inf, piece) for window in windows for piece in window.cut()]
+        while left and looks > 0:
+            left.sort(key=lambda entry: entry[0])
+            batch, left = [window for _, window in left[:_CLOSEST_FIRST]], left[_CLOSEST_FIRST:]
+            for window, near in zip(batch, self._near(motions, batch, [enough] * len(batch)), strict=True):
+                looks -= len(near.places)
+                if not len(near.places):
+                    continue
+                if near.distances.min() < (within if best is None else best.distance):
+                    best = self._closest(window, near, int(near.distances.argmin()))
+                    enough = best.distance - max(RESOLUTION, _PART_OF_DISTANCE * best.distance)
+                bounds = near.distances - near.moved
+                wanted = np.flatnonzero(bounds < enough)
+                if len(wanted):
+                    bound = float(bounds[wanted].min())
+                    left += [(bound, half) for half in window.halves(near.places[wanted])]
+            left = [entry for entry in left if entry[0] < enough]
+        return Least(best, min([enough, *(bound for bound, _ in left)]))
+
+    def distances_at(self, motions: Mapping[str, Trajectory], times: Array, pairs: Numbers, within: float) -> Array:
+        """Return the distances (t, k) of some pairs at times (t,) [m]; ``within`` where they are more."""
+        windows = [Window(time, time, pairs, np.zeros(len(pairs))) for time in times.tolist()]
+        result = np.full((len(times), len(pairs)), within)
+        for row, near in zip(result, self._near(motions, windows, [within] * len(windows)), strict=True):
+            row[near.places] = near.distances
+        return result
+
+    def first_meeting(self, configurations: Mapping[str, Array], margins: Array) -> Meeting | None:
+        """Return the first of several configurations at which bodies are closer than they may be; None for none.
+
+        Args:
+            configurations: (k, n) of each arm; (n,) of one that stands.
+            margins: (p,) the distance that each pair has to keep [m].
+        """
+        poses = self._poses_at(configurations)
+        nearest = self._least_distances(poses)
+        standing: set[int] = set()
+        for i in np.flatnonzero((nearest < margins).any(axis=1)).tolist():
+            near = np.flatnonzero(nearest[i] < margins)
+            moving = set(self._pairs[near].ravel().tolist()) - standing
+            for body in moving:
+                self._distances.place(body, poses[i, body])
+            standing |= {body for body in moving if self._bodies[body].arm is None}
+            for (a, b), margin in zip(self._pairs[near].tolist(), margins[near].tolist(), strict=True):
+                distance = self._distances.between(a, b, max(margin, TOLERANCE))
+                if distance < margin:
+                    return Meeting(i, (a, b), distance)
+        return None
+
+    def distances_of(self, configurations: Mapping[str, Array], within: float) -> Array:
+        """Return the distances (p,) of all pairs at one configuration (n,) of each arm [m]; ``within`` where more."""
+        poses = self._poses_at(configurations)
+        result = np.full(len(self._pairs), within)
+        for body, pose in enumerate(poses[0]):
+            self._distances.place(body, pose)
+        for k in np.flatnonzero(self._least_distances(poses)[0] < within).tolist():
+            a, b = self._pairs[k].tolist()
+            result[k] = self._distances.between(a, b, within)
+        return result
+
+    def _poses_at(self, configurations: Mapping[str, Array]) -> Array:
+        """Return the poses (k, b, 4, 4) of all bodies at configurations."""
+        frames = {}
+        for name, q in configurations.items():
+            frames[name] = self.arms[name].base @ self.arms[name].arm.link_poses(np.atleast_2d(q))
+        poses = np.empty((max(map(len, frames.values())), len(self._bodies), 4, 4))
+        for number, body in enumerate(self._bodies):
+            carrier = np.eye(4) if body.arm is None else frames[body.arm][:, body.link]
+            poses[:, number] = carrier @ body.solid.pose
+        return poses
+
+    def _least_distances(self, poses: Array) -> Array:
+        """Return lower bounds (k, p) of the distances of pairs: from a ball about one body to a box about the other."""
+        bounds = np.full((len(poses), len(self._pairs)), -np.inf)
+        positions, R = poses[:, :, :3, 3], poses[:, :, :3, :3]
+        for ball, box in (self._pairs.T, self._pairs.T[::-1]):
+            away = positions[:, ball] - positions[:, box]
+            inside = np.einsum("kpi,kpij->kpj", away, R[:, box])
+            beyond = np.maximum(np.abs(inside) - self._boxes[box], 0.0)
+            np.maximum(bounds, np.linalg.norm(beyond, axis=2) - self._around[box] - self._radii[ball], out=bounds)
+        return bounds
+
+    def nearest_points(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:
+        """Return the points (2, 3) of two bodies that are nearest to each other, or deepest in each other [m]."""
+        poses, _ = self._placed(motions, np.array([time]), np.array([time]))
+        for body in bodies:
+            self._distances.place(body, poses[0, body])
+        return self._distances.nearest(*bodies, within=_FAR).points
+
+    def _closest(self, window: Window, near: _Near, place: int) -> Closest:
+        a, b = self._pairs[window.pairs[near.places[place]]].tolist()
+        return Closest(float(near.distances[place]), (a, b), (window.start + window.end) / 2)
+
+    def _near(
+        self, motions: Mapping[str, Trajectory], batch: Sequence[Window], margins: Sequence[Array | float]
+    ) -> list[_Near]:
+        """Return for windows the pairs that may come closer than their margins on them."""
         starts, ends = np.array([x.start for x in batch]), np.array([x.end for x in batch])
         poses, moved = self._placed(motions, starts, ends)
         centres = poses[:, :, :3, 3]
-        results: list[tuple[Numbers, Closest | None]] = []
-        for i, (start, end, pairs) in enumerate(batch):
+        results: list[_Near] = []
+        for i, window in enumerate(batch):
+            pairs = window.pairs
             a, b = self._pairs[pairs].T
-            closer = moved[i, a] + moved[i, b] + margin + TOLERANCE
+            both = np.where(self._of_one[pairs], 0.0, moved[i, a, 0])
+            change = moved[i, self._outer[pairs], self._from[pairs]] + both
+            closer = change + margins[i] + TOLERANCE
             apart = np.linalg.norm(centres[i, a] - centres[i, b], axis=1) - self._radii[a] - self._radii[b]
             near = np.flatnonzero(apart < closer)
-            left, contact = [], None
             for body in {*a[near].tolist(), *b[near].tolist()}:
                 self._distances.place(body, poses[i, body])
-            for k in near.tolist():
-                bodies = int(a[k]), int(b[k])
-                distance = self._distances.between(*bodies, within=closer[k])
-                if distance >= closer[k]:
-                    continue
-                if closer[k] - margin - TOLERANCE <= RESOLUTION:
-                    if contact is None or distance < contact.distance:
-                        contact = Closest(distance, bodies, float(start + end) / 2)
-                else:
-                    left.append(pairs[k])
-            results.append((np.array(left, dtype=np.intp), contact))
+            looked_at = zip(
+                a[near].tolist(), b[near].tolist(), np.maximum(closer[near], TOLERANCE).tolist(), strict=True
+            )
+            distances = np.array([self._distances.between(one, other, within) for one, other, within in looked_at])
+            kept = distances < closer[near]
+            places = near[kept]
+            results.append(_Near(places, distances[kept], change[places]))
         return results
 
     def _placed(self, motions: Mapping[str, Trajectory], starts: Array, ends: Array) -> tuple[Array, Array]:
         """Return the poses (k, b, 4, 4) of all bodies in the middle of intervals, and how far they may be from there.
 
-        The second are upper bounds (k, b) of the distance that a point of a body moves from the middle to any time of
-        the interval.
+        The second are upper bounds (k, b, l + 1) of the distance that a point of a body moves from the middle to any
+        time of the interval, as seen from the base of its arm and from each of its links.
         """
         middles = (starts + ends) / 2
         poses = np.empty((len(starts), len(self._bodies), 4, 4))
-        moved = np.zeros((len(starts), len(self._bodies)))
-        for name, placed in self._arms.items():
+        links = max((placed.arm.arm.n for placed in self.arms.values()), default=0)
+        moved = np.zeros((len(starts), len(self._bodies), links + 1))
+        for name, placed in self.arms.items():
             motion = motions[name]
             frames = placed.base @ placed.arm.link_poses(motion(middles))
             changes = _largest_changes(motion, starts, ends)
@@ -174,7 +398,7 @@ class ClearanceChecker:
                 if body.arm == name:
                     poses[:, number] = frames[:, body.link] @ body.solid.pose
                     carried = frames[:, : body.link + 1]
-                    moved[:, number] = _movement(
+                    moved[:, number, : body.link + 1] = _movement(
                         placed.arm.arm, carried, poses[:, number], self._radii[number], changes
                     )
         for number, body in enumerate(self._bodies):
@@ -183,8 +407,16 @@ class ClearanceChecker:
         return poses, moved
 
 
+def resolution(margins: Array) -> Array:
+    """Return by how much nearer than their margins pairs (k,) count as too near [m].
+
+    An allowed overlap is followed more closely.
+    """
+    return np.where(margins < 0, np.minimum(-_PART_OF_OVERLAP * margins, RESOLUTION), RESOLUTION)
+
+
 def _movement(arm: Arm, frames: Array, pose: Array, radius: float, changes: Array) -> Array:
-    """Return upper bounds (k,) of how far a point of a body moves while joints move.
+    """Return upper bounds (k, l + 1) of how far a point of a body moves while joints move, seen from frames 0 to l.
 
     The joints may be moved one after the other, the outermost first: then each axis is where it was, and the body is as
     much farther from it as it has been moved before.
@@ -196,15 +428,15 @@ def _movement(arm: Arm, frames: Array, pose: Array, radius: float, changes: Arra
         radius: of the body about its origin [m].
         changes: (k, n) how far each joint moves [rad] or [m].
     """
-    total = np.zeros(len(frames))
+    totals = np.zeros(frames.shape[:2])
     for i in reversed(range(frames.shape[1] - 1)):
         lever: Array = np.ones(len(frames))
         if arm.joints[i].revolute:
             axis, away = frames[:, i, :3, 2], pose[:, :3, 3] - frames[:, i, :3, 3]
             across = away - (away * axis).sum(axis=1)[:, None] * axis
-            lever = np.linalg.norm(across, axis=1) + radius + total
-        total = total + changes[:, i] * lever
-    return total
+            lever = np.linalg.norm(across, axis=1) + radius + totals[:, i + 1]
+        totals[:, i] = totals[:, i + 1] + changes[:, i] * lever
+    return totals
 
 
 def _largest_changes(motion: Trajectory, starts: Array, ends: Array) -> Array:

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
+from armwright.physics.geoms import add_geom
+from armwright.spatial.shapes import Shape, Solid
 
 # Distances between convex solids are found by iteration, to this [m].
 TOLERANCE = 1e-6
@@ -44,7 +45,7 @@ class Distances:
         spec = mujoco.MjSpec()
         spec.option.ccd_tolerance = TOLERANCE
         for i, shape in enumerate(shapes):
-            _add(mujoco, spec, f"solid{i}", shape)
+            add_geom(spec, spec.worldbody, f"solid{i}", Solid(shape=shape))
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
@@ -68,23 +69,6 @@ class Distances:
         ends = np.zeros(6)
         distance = float(self._mujoco.mj_geomDistance(self._model, self._data, a, b, within, ends))
         return Nearest(distance, ends.reshape(2, 3))
-
-
-def _add(mujoco: Any, spec: Any, name: str, shape: Shape) -> None:
-    """Add a solid to the world of a specification."""
-    kinds, add = mujoco.mjtGeom, spec.worldbody.add_geom
-    match shape:
-        case Box(size=size):
-            add(name=name, type=kinds.mjGEOM_BOX, size=size / 2)
-        case Cylinder(radius=radius, length=length):
-            add(name=name, type=kinds.mjGEOM_CYLINDER, size=(radius, length / 2, 0.0))
-        case Capsule(radius=radius, length=length):
-            add(name=name, type=kinds.mjGEOM_CAPSULE, size=(radius, length / 2, 0.0))
-        case Sphere(radius=radius):
-            add(name=name, type=kinds.mjGEOM_SPHERE, size=(radius, 0.0, 0.0))
-        case Mesh(vertices=vertices, faces=faces):
-            spec.add_mesh(name=name, uservert=vertices.ravel(), userface=faces.ravel())
-            add(name=name, type=kinds.mjGEOM_MESH, meshname=name)
 
 
 def _inner_pose(model: Any, number: int) -> Array | None:

@@ -15,7 +15,7 @@ from armwright.physics.pictures import Picture
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import homogeneous, inverse_pose
 from armwright.spatial.rotations import elementary_rotation, rotation_vector
-from armwright.spatial.shapes import reach
+from armwright.spatial.shapes import support
 
 # Edges are measured so far to either side, in pixels and in cells of the pattern, at so many points across it.
 _ACROSS, _ACROSS_CELLS, _POINTS = 1.5, 0.5, 17
@@ -67,7 +67,7 @@ def target_of(cell: Cell, sight: Sight) -> Target:
     if part.marker is None:
         raise InvalidValueError(f"a camera cannot find {part.name}: it has no marker; expected one in its part table")
     # The part stands on its lowest point.
-    height = None if sight.height is None else sight.height + reach(part.shape, -part.pose[2, :3])
+    height = None if sight.height is None else sight.height + support(part.shape, -part.pose[2, :3])
     return Target(name=part.name, marker=part.marker, start=part.pose, height=height, symmetry=part.symmetry)
 
 

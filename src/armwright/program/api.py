@@ -8,7 +8,8 @@ from pathlib import Path
 
 import attrs
 
-from armwright.cell.hardware import Hardware
+from armwright.cell.assembly import assembly_cell, is_assembly
+from armwright.cell.hardware import Hardware, HardwareFactory
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
@@ -22,7 +23,7 @@ from armwright.program.flow_analysis import analysis
 from armwright.program.flow_analysis.analysis import Flow
 from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
-from armwright.program.language.words import Standard
+from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.semantics import check
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport, known_cell
 from armwright.program.semantics.symbols import Symbols
@@ -83,6 +84,7 @@ class LoadedProgram:
         cell: what it runs in; None where none was specified and none is imported.
         diagnostics: warnings of the compiler.
         imports: the files that the program imports.
+        hardware: how the cell is set up to run it.
         is_code_file: whether the file holds intermediate code, and not the text of the program.
     """
 
@@ -90,6 +92,7 @@ class LoadedProgram:
     cell: Cell | None
     diagnostics: tuple[Diagnostic, ...] = ()
     imports: tuple[Path, ...] = ()
+    hardware: HardwareFactory = Simulator
     is_code_file: bool = False
 
 
@@ -162,7 +165,7 @@ def run(
     *,
     strict: bool = False,
     std: Standard = Standard.RLO_2,
-    hardware: Hardware | None = None,
+    hardware: Hardware | HardwareFactory | None = None,
     limits: Limits | None = None,
     progress: Progress | None = None,
 ) -> Recording:
@@ -173,7 +176,8 @@ def run(
         cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
         strict: whether an AFFIX that is only implied is an error.
         std: the language it is written in.
-        hardware: the cell at work; simulated unless something else is given.
+        hardware: the cell at work, or what makes it of the cell, such as ``armwright.physics.PhysicsCell``; the
+            kinematic simulator unless something else is given.
         limits: when the program is taken to run for ever.
         progress: told before each statement: the time on the cell's clock [s] and the line.
 
@@ -202,8 +206,10 @@ def run(
         raise ProgramError(compiled)
     if compiled.cell is None:
         raise InvalidValueError(f"{compiled.source.name} needs a cell to run in, and IMPORTs none")
-    hardware = hardware or Simulator(compiled.cell)
-    return interpret(compiled.code, compiled.cell, hardware, progress=progress, limits=limits)
+    at_work = Simulator(compiled.cell) if hardware is None else hardware
+    if callable(at_work):
+        at_work = at_work(compiled.cell)
+    return interpret(compiled.code, compiled.cell, at_work, progress=progress, limits=limits)
 
 
 def load(
@@ -237,11 +243,24 @@ def imported_files(program: Path, compiled: Compilation) -> tuple[Path, ...]:
     return tuple(program.parent / node.path.value for node in imports)
 
 
+def read_imported_cell(path: Path) -> Cell:
+    """Return what a file that a program IMPORTs has: a cell, or the frames of an assembly.
+
+    Raises:
+        MissingExtraError: it is STEP, and cascadio is not installed.
+        FileFormatError: the file cannot be read.
+    """
+    # A program names the file, and it may not name what never ends.
+    if is_assembly(path):
+        return assembly_cell(regular_file(path), VOCABULARIES[Standard.RLO_2].reserved)
+    return read_cell(regular_file(path), arms_needed=False)
+
+
 def import_reader(folder: Path) -> ReadImport:
     """Return what reads the files that a program of this folder IMPORTs."""
 
     def read(name: str) -> ImportedFrames:
-        cell = read_cell(regular_file(folder / name), arms_needed=False)
+        cell = read_imported_cell(folder / name)
         return ImportedFrames(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     return read

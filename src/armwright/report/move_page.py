@@ -5,12 +5,15 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.forward_kinematics import forward, link_poses
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.moves import Move
 from armwright.motion.poses_file import PosesFile
 from armwright.motion.trajectory import Samples
-from armwright.report.page import Animation, Effect, FrameTrack, Message, RunPage, StageRow
-from armwright.report.stick_figure import arm_record, stick_figure
+from armwright.report.animation import Animation, FrameTrack
+from armwright.report.arm_figure import Placed, arm_figure
+from armwright.report.page import Effect, Message, RunPage, StageRow
+from armwright.report.shape_table import ShapeTable
+from armwright.report.stick_figure import arm_record
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -97,9 +100,10 @@ def _animation(move: Move, file: PosesFile) -> Animation:
     duration = move.trajectory.duration
     fps = min(max(_INSTANTS / duration, _FPS[0]), _FPS[1], _MAX_FRAMES / duration)
     t = np.append(np.arange(int(np.ceil(duration * fps))) / fps, duration)
-    poses = link_poses(move.arm, move.trajectory(t))
+    shapes = ShapeTable()
+    figure = arm_figure(_ARM, Placed(move.arm), move.trajectory(t), np.ones(len(t)), shapes)
     tracks = [
         FrameTrack(name=name, poses=to_noap(np.tile(X, (len(t), 1, 1))))
         for name, X in zip(file.names, move.poses, strict=True)
     ]
-    return Animation(fps=fps, t=t, arms={_ARM: stick_figure(move.arm, poses, np.ones(len(t)))}, frames=tracks)
+    return Animation(fps=fps, t=t, arms={_ARM: figure}, frames=tracks, shapes=shapes.as_data())

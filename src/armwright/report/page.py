@@ -5,20 +5,32 @@ its scripts and its data, and uses no network.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import attrs
 
 from armwright.arm.model import JointKind
 from armwright.arrays import Array
+from armwright.report.animation import Animation
+from armwright.report.collision_text import NOT_CHECKED
 from armwright.report.elements import badge, facts
 from armwright.report.markup import asset, page_html
 
-# The text on collisions wherever a motion is reported, until they are checked.
-COLLISIONS = "not checked"
-
-_SCRIPTS = ("scene.js", "camera.js", "solids.js", "view.js", "charts.js", "joint_charts.js", "lists.js", "run.js")
+_SCRIPTS = (
+    "scene.js",
+    "poses.js",
+    "camera.js",
+    "meshes.js",
+    "surface.js",
+    "labels.js",
+    "view.js",
+    "charts.js",
+    "joint_charts.js",
+    "lists.js",
+    "pictures.js",
+    "run.js",
+)
 
 
 @attrs.frozen(kw_only=True)
@@ -58,6 +70,23 @@ class Effect:
 
 
 @attrs.frozen(kw_only=True)
+class LeastDistance:
+    """The least distance between two bodies on a stage.
+
+    Attributes:
+        distance: [m]; None where nothing comes near.
+        bound: it is no less than this anywhere [m].
+        bodies: the names of both; empty where nothing comes near.
+        t: when they are so near [s].
+    """
+
+    distance: float | None
+    bound: float
+    bodies: Sequence[str]
+    t: float
+
+
+@attrs.frozen(kw_only=True)
 class StageRow:
     """A stage of a motion.
 
@@ -74,6 +103,7 @@ class StageRow:
         hand_length: length of the path of the tool [m].
         deviation: largest distance from the straight line [m]; None without a line.
         note: a remark, such as ``slowed by joint 2 speed``.
+        clearance: the least distance to other bodies; None where there is nothing to meet.
     """
 
     t0: float
@@ -88,6 +118,7 @@ class StageRow:
     hand_length: float
     deviation: float | None = None
     note: str = ""
+    clearance: LeastDistance | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -114,6 +145,29 @@ class JointInfo:
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class MeasuredMotion:
+    """What was measured of an arm at K instants.
+
+    Attributes:
+        t: (K,) instants [s].
+        q: (K, n) positions [rad] or [m].
+        qd: (K, n) speeds.
+        tau: (K, n) torques [N m] or forces [N].
+        error: (K, n) the tracking error, measured less planned, that is largest until the next instant [rad] or [m].
+        worst: (n,) the largest tracking error of each joint in the whole run, without its sign.
+        worst_t: (n,) when it occurred [s].
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    tau: Array
+    error: Array
+    worst: Array
+    worst_t: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class ArmRecord:
     """The motion of an arm at N instants (some 2000 suffice for a screen).
 
@@ -127,6 +181,7 @@ class ArmRecord:
         qdd: (N, n) accelerations.
         tau: (N, n) torques [N m] or forces [N]; None where no dynamics was computed.
         hand: (N, 3) positions of the tool in the world [m].
+        measured: what was measured; None where nothing was.
     """
 
     name: str
@@ -138,76 +193,28 @@ class ArmRecord:
     qdd: Array
     tau: Array | None = None
     hand: Array
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class ArmFigure:
-    """The stick figure of an arm at the M instants of the animation.
-
-    Attributes:
-        points: (M, K, 3) the skeleton from the base to the tool, in the world [m]. It may have corners between joint
-            origins, and points may coincide.
-        hand_axes: (M, 9) columns n, o, a of the tool in the world; the fingers point along a and open along o.
-        grip: (M,) 0 closed to 1 open.
-        joint_axes: (M, n, 6) a point on the axis of each joint [m] and its direction, drawn as cylinders; None draws
-            spheres at the points instead.
-        radii: (K-1,) radius of each segment of the skeleton [m]; None lets the page choose.
-    """
-
-    points: Array
-    hand_axes: Array
-    grip: Array
-    joint_axes: Array | None = None
-    radii: Array | None = None
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class FrameTrack:
-    """The poses of a frame at the M instants of the animation.
-
-    Attributes:
-        name: its name as the program spells it.
-        poses: (M, 12) columns n, o, a, p in the world; rows before ``visible_from`` are finite but not shown.
-        visible_from: first row at which the frame has a value.
-    """
-
-    name: str
-    poses: Array
-    visible_from: int = 0
+    measured: MeasuredMotion | None = None
 
 
 @attrs.frozen(kw_only=True)
-class TreeChange:
-    """A frame gets another parent; its first parent has t = 0.
+class SeenPicture:
+    """A picture that a camera took.
 
     Attributes:
-        t: time [s].
-        child: the frame.
-        parent: its new parent: ``WORLD``, an arm, or a frame.
+        t: when [s].
+        camera: its name.
+        frame: that it was to find.
+        found: whether it was found.
+        text: what was found, or why nothing was.
+        png: the file as base64.
     """
 
     t: float
-    child: str
-    parent: str
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Animation:
-    """The data of the three-dimensional view.
-
-    Attributes:
-        fps: instants per second.
-        t: (M,) instants [s], at least one.
-        arms: figures of the arms by name.
-        frames: frames in the order in which they are drawn.
-        tree: changes of the frame tree in order of time.
-    """
-
-    fps: float
-    t: Array
-    arms: Mapping[str, ArmFigure] = attrs.field(factory=dict)
-    frames: Sequence[FrameTrack] = ()
-    tree: Sequence[TreeChange] = ()
+    camera: str
+    frame: str
+    found: bool
+    text: str
+    png: str
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -228,7 +235,10 @@ class RunPage:
         stages: stages of the motion, in order.
         arms: records of the arms.
         animation: the data of the view; None without a view.
+        pictures: that cameras took, in order.
+        clearance: smaller distances of stages are marked [m].
         text_kind: kind of the text, ``Program`` or ``Poses``.
+        collisions: whether they were checked, and how near the arms came to other bodies.
     """
 
     title: str
@@ -244,7 +254,10 @@ class RunPage:
     stages: Sequence[StageRow] = ()
     arms: Sequence[ArmRecord] = ()
     animation: Animation | None = None
+    pictures: Sequence[SeenPicture] = ()
+    clearance: float = 0.0
     text_kind: Literal["Program", "Poses"] = "Program"
+    collisions: str = NOT_CHECKED
 
 
 def run_page(data: RunPage) -> str:
@@ -275,5 +288,5 @@ def _facts(data: RunPage) -> Iterator[tuple[str, str]]:
     if data.cell_name:
         yield "Cell", data.cell_name
     yield data.text_kind, data.program_name
-    yield "Collisions", COLLISIONS
+    yield "Collisions", data.collisions
     yield "Command", data.command

@@ -10,13 +10,19 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import base_name
-from armwright.kinematics.forward_kinematics import link_poses
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt, omission_text, shorten_line
 from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
-from armwright.report.page import Animation, Effect, FrameTrack, Message, RunPage, StageRow, TreeChange
-from armwright.report.stick_figure import arm_record, stick_figure
+from armwright.report.animation import Animation, FrameTrack, TreeChange
+from armwright.report.arm_figure import arm_figure, opening_of
+from armwright.report.collision_text import collision_text
+from armwright.report.page import ArmRecord, Effect, LeastDistance, Message, RunPage, StageRow
+from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, moved_parts, placed_arms
+from armwright.report.shape_table import ShapeTable
+from armwright.report.stick_figure import arm_record
+from armwright.report.tracking import measured_motion, seen_pictures
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -46,7 +52,8 @@ def run_page_data(
     reasons = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
     errors_first = sorted(diagnostics, key=lambda diagnostic: not diagnostic.is_error)
     listed, fewer = _limit_items(errors_first, MAX_LIST_ITEMS, "messages", "all in run.json")
-    notes = (*reasons, *left_out, *fewer, *fewer_stages, *fewer_frames)
+    pictures, fewer_pictures = seen_pictures(recording.pictures)
+    notes = (*reasons, *left_out, *fewer, *fewer_stages, *fewer_frames, *fewer_pictures)
     return RunPage(
         title=f"{source.name} in {cell.name}" + ("" if failure is None else ": failed"),
         status=status,
@@ -65,12 +72,23 @@ def run_page_data(
         ],
         effects=_effects(recording),
         stages=[_stage_row(run, source.line(run.span.start)) for run in stages],
-        arms=[
-            arm_record(s.arm, cell.arms[s.arm].arm, (s.t, s.q, s.qd, s.qdd, s.tau), cell.arms[s.arm].base)
-            for s in recording.streams
-        ],
+        arms=_arm_records(recording),
         animation=animation,
+        collisions=collision_text(recording),
+        pictures=pictures,
     )
+
+
+def _arm_records(recording: Recording) -> list[ArmRecord]:
+    measured = {stream.arm: stream for stream in recording.measured}
+    records = []
+    for s in recording.streams:
+        arm = recording.cell.arms[s.arm]
+        record = arm_record(s.arm, arm.arm, (s.t, s.q, s.qd, s.qdd, s.tau), arm.base)
+        if s.arm in measured:
+            record = attrs.evolve(record, measured=measured_motion(s, measured[s.arm]))
+        records.append(record)
+    return records
 
 
 def _limit_items(items: Sequence[_T], most: int, name: str, hint: str = EVENT_LOG_HINT) -> tuple[list[_T], list[str]]:
@@ -107,7 +125,15 @@ def _stage_row(run: RunStage, line: int) -> StageRow:
         hand_length=run.length,
         deviation=run.stage.deviation,
         note=stage_note(run),
+        clearance=_least_distance(run),
     )
+
+
+def _least_distance(run: RunStage) -> LeastDistance | None:
+    it = run.clearance
+    if it is None:
+        return None
+    return LeastDistance(distance=it.distance, bound=it.bound, bodies=it.bodies, t=run.t0 + it.time)
 
 
 def _animation(recording: Recording) -> tuple[Animation, list[str]]:
@@ -115,38 +141,41 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     fps = min(_FRAMES_PER_SECOND, _MAX_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
     arms, tree = recording.cell.arms, recording.tree
-    links = {s.arm: arms[s.arm].base @ link_poses(arms[s.arm].arm, _configurations_at(s, t)) for s in recording.streams}
-    tool_poses = {name: poses[:, -1] for name, poses in links.items()}
+    q = {s.arm: _configurations_at(s, t) for s in recording.streams}
+    tool_poses = {name: arms[name].base @ forward(arms[name].arm, rows) for name, rows in q.items()}
     hidden = {WORLD, *arms, *map(base_name, arms)}
     visible = [name for name in tree if name not in hidden and tree.has_value(name)]
     names, fewer_frames = _limit_items(visible, _MAX_FRAMES, "frames", "all in frames.json")
     changes, fewer_changes = _limit_items([*_tree_changes(recording, t)], MAX_LIST_ITEMS, "changes of the frame tree")
+    shapes = ShapeTable()
+    placed = placed_arms(recording.cell)
+    figures = {
+        name: arm_figure(name, placed[name], rows, finger_opening(recording, name, t, opening_of(placed[name])), shapes)
+        for name, rows in q.items()
+    }
+    fixtures, parts = fixture_bodies(recording.cell, shapes), moved_parts(recording, shapes)
     animation = Animation(
         fps=fps,
         t=t,
-        arms={
-            name: stick_figure(arms[name].arm, poses, _finger_opening(recording.effects, name, t))
-            for name, poses in links.items()
-        },
+        arms=figures,
         frames=list(_frame_tracks(recording, t, tool_poses, names)),
         tree=changes,
+        fixtures=fixtures,
+        parts=parts,
+        shapes=shapes.as_data(),
     )
-    return animation, [*fewer_frames, *fewer_changes]
+    all_bodies = {"bodies of the scene": recording.cell.fixtures, "parts": recording.cell.parts}
+    fewer = [
+        f"this page shows the first {MAX_BODIES} of {len(bodies):,} {name}; all in run.json"
+        for name, bodies in all_bodies.items()
+        if len(bodies) > MAX_BODIES
+    ]
+    return animation, [*fewer_frames, *fewer_changes, *fewer]
 
 
 def _configurations_at(stream: Stream, t: Array) -> Array:
     period = stream.t[1] - stream.t[0] if len(stream.t) > 1 else 1.0
     return np.asarray(stream.q[np.clip(np.round(t / period).astype(int), 0, len(stream.t) - 1)])
-
-
-def _finger_opening(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
-    """Return the opening of the fingers at each instant, 0 to 1; they are closed at the start."""
-    times, values = [0.0], [0.0]
-    for effect in effects:
-        if effect.arm == arm and effect.kind in ("OPEN", "GRASP"):
-            times += [effect.t0, effect.t1]
-            values += [values[-1], 1.0 if effect.kind == "OPEN" else 0.0]
-    return np.interp(t, times, values)
 
 
 def _frame_tracks(

@@ -14,14 +14,16 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.errors import ExitStatus
 from armwright.files.inputs import hash_of_read_file
-from armwright.files.output import sha256, write_folder
+from armwright.files.output import Content, sha256, write_folder
 from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
 from armwright.program.vm.machine import RunError
-from armwright.program.vm.recording import Effect, Recording, RunStage, motion_csv_lines
-from armwright.report.page import COLLISIONS, run_page
+from armwright.program.vm.recording import Effect, Recording, RunStage, measured_csv_lines, motion_csv_lines
+from armwright.report.collision_text import clearance_data, collision_text
+from armwright.report.page import run_page
 from armwright.report.run_data import run_page_data
+from armwright.report.run_scene import part_data, scene_data
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -29,6 +31,8 @@ from armwright.version import __version__
 _DIGITS = 12
 # Rows of motion.csv by default: some 220 MB, or an arm for a quarter of an hour at 1 ms.
 MOTION_ROWS = 1_000_000
+# Pictures that are written at most.
+MAX_PICTURES = 2_000
 
 
 @attrs.frozen(kw_only=True)
@@ -71,9 +75,7 @@ def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnost
     write_folder(folder, files, run_record(recording, diagnostics, origin))
 
 
-def run_files(
-    recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs
-) -> dict[str, str | Iterable[str]]:
+def run_files(recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs) -> dict[str, Content]:
     """Return the files of a run by name, identical for identical runs; those of a failed run end at the failure.
 
     Args:
@@ -83,12 +85,24 @@ def run_files(
     """
     return {
         "motion.csv": motion_csv_lines(recording.streams, _written_ticks(recording, origin.motion_rows)),
+        **_measured_file(recording, origin.motion_rows),
         "events.jsonl": _event_lines(recording),
         "frames.json": _json(frame_data(recording)),
         "report.html": run_page(
             run_page_data(recording, diagnostics, origin.command, omission_notes(recording, origin.motion_rows))
         ),
+        **{_picture_file(i): picture.png for i, picture in enumerate(recording.pictures[:MAX_PICTURES], 1)},
     }
+
+
+def _measured_file(recording: Recording, most_rows: int) -> dict[str, Iterable[str]]:
+    """Return what the servos measured, in a cell with physics."""
+    streams, ticks = recording.measured, _written_ticks(recording, most_rows)
+    return {"measured.csv": measured_csv_lines(streams, ticks)} if streams else {}
+
+
+def _picture_file(number: int) -> str:
+    return f"seen-{number:04}.png"
 
 
 def frame_data(recording: Recording) -> dict[str, Any]:
@@ -141,10 +155,12 @@ def summary_data(recording: Recording, diagnostics: Sequence[Diagnostic], hint: 
             {"line": source.line(e.span.start), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
             for e in _contacts(recording).join()
         ],
-        "collisions": COLLISIONS,
+        "collisions": collision_text(recording),
         "stages": [_stage_data(stage, recording) for stage in recording.stages],
         "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics],
     }
+    if recording.observations.facts:
+        data["physics"] = recording.observations.facts
     return {name: round_numbers(value) for name, value in data.items()}
 
 
@@ -170,6 +186,8 @@ def _stage_data(run: RunStage, recording: Recording) -> dict[str, Any]:
         "certificate": None if run.stage.certificate is None else run.stage.certificate.as_data(),
         "slowed": run.stage.slowed,
         "detour": _detour_data(run.stage),
+        "clearance": clearance_data(run.clearance),
+        "planned_path": None if run.path is None else run.path.as_data(),
         "peak_speed": _rounded_list(motion.peaks(1)),
         "peak_acceleration": _rounded_list(motion.peaks(2)),
         "peak_effort": _rounded_list(run.peak_effort),
@@ -246,6 +264,8 @@ def omission_notes(recording: Recording, most_rows: int) -> tuple[str, ...]:
         )
     if contacts:
         notes.append(f"run.json lists the first and the last contacts: {omission_text(contacts)}")
+    if len(recording.pictures) > MAX_PICTURES:
+        notes.append(f"the first {MAX_PICTURES:,} of {len(recording.pictures):,} pictures are written")
     return tuple(notes)
 
 
@@ -280,6 +300,19 @@ def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: 
         "left_out": list(omission_notes(recording, origin.motion_rows)),
         "versions": {"armwright": __version__, "python": platform.python_version(), "numpy": np.__version__},
         **summary_data(recording, diagnostics),
+        "scene": scene_data(recording.cell),
+        "parts": part_data(recording),
+        "pictures": [
+            {
+                "file": _picture_file(i),
+                "time": picture.time,
+                "camera": picture.camera,
+                "frame": picture.frame,
+                "found": picture.found,
+                "text": picture.text,
+            }
+            for i, picture in enumerate(recording.pictures[:MAX_PICTURES], 1)
+        ],
     }
 
 

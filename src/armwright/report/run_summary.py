@@ -1,6 +1,6 @@
 """The summary of a run: its trace, its stages, and where the frames were when it failed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -12,7 +12,9 @@ from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, Excerpt, excerpt, omission_text, shorten_line, shorten_list
 from armwright.program.vm.machine import RunError
+from armwright.program.vm.move_diagnostics import path_text
 from armwright.program.vm.recording import Effect, Recording, RunStage
+from armwright.report.collision_text import collision_text
 from armwright.report.run_files import ending_data, summary_data
 
 
@@ -42,13 +44,27 @@ class RunSummary:
             for run in recording.stages
             if run.stage.slowed
         ]
+        planned = [
+            f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.goal_names[-1]}: "
+            f"{path_text(run.path)}"
+            for run in recording.stages
+            if run.path is not None
+        ]
         moves = sum(effect.kind == "MOVE" for effect in recording.effects)
         ticks = len(recording.streams[0].t) if recording.streams else 0
         numbers = (
             f"{recording.code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, "
             f"{counted(moves, 'move')}, {counted(len(recording.stages), 'stage')}, {counted(ticks, 'servo tick')}"
         )
-        return (*shorten_list(slowed, MAX_TERMINAL_LINES, self.hint), numbers, "Collisions are not checked.")
+        collisions = (
+            "Collisions are not checked." if recording.checked is None else f"Collisions: {collision_text(recording)}."
+        )
+        return (
+            *shorten_list([*slowed, *planned], MAX_TERMINAL_LINES, self.hint),
+            numbers,
+            *physics_note(recording),
+            collisions,
+        )
 
     def as_data(self) -> dict[str, Any]:
         """Return the summary as plain data in SI units."""
@@ -121,3 +137,16 @@ def frame_table(error: RunError, code: Code) -> ResultTable:
         rows=frames.map(row).join(omitted),
         numbers=(2,),
     )
+
+
+def physics_note(recording: Recording) -> tuple[str, ...]:
+    """Return how well arms and hands did in a cell with physics; nothing of one without."""
+    facts = recording.observations.facts
+    if not facts:
+        return ()
+    tips, slips = facts["tip"], facts["slip"]
+    assert isinstance(tips, Mapping)  # noqa: S101 - of a cell with physics
+    assert isinstance(slips, Mapping)  # noqa: S101
+    arms = [f"{arm}: tip within {tip * 1e3:.2g} mm of where it was sent" for arm, tip in tips.items()]
+    held = [f", parts within {slip * 1e3:.2g} mm in the hand" if slip else "" for slip in slips.values()]
+    return ("; ".join(arm + hand for arm, hand in zip(arms, held, strict=True)),)

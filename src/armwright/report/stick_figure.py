@@ -9,12 +9,10 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
-from armwright.report.page import ArmFigure, ArmRecord, JointInfo
+from armwright.report.page import ArmRecord, JointInfo
 
 # Rows of the charts at most, which suffice for a screen.
 _CHART_ROWS = 1500
-# Radius of the figure relative to the reach of the arm, at the base and at the tool.
-_THICK, _THIN = 0.045, 0.016
 
 
 def arm_record(
@@ -37,28 +35,16 @@ def arm_record(
     return ArmRecord(name=name, model=arm.name, joints=joints, t=t, q=q, qd=qd, qdd=qdd, tau=tau, hand=poses[:, :3, 3])
 
 
-def stick_figure(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
+def skeleton_points(arm: Arm, poses: Array) -> Array:
     """Draw an arm along its Denavit-Hartenberg transforms: first along z, then along x, so that offsets are visible.
 
     Args:
         arm: the arm, with n joints.
         poses: (M, n + 2, 4, 4) poses of its frames in the world, by ``link_poses``.
-        grip: (M,) opening of the fingers, 0 to 1.
+
+    Returns:
+        (M, K, 3) the corners of the figure, from the floor to the tool [m].
     """
-    points = skeleton_points(arm, poses)
-    origins, z_axes = poses[:, : arm.n, :3, 3], poses[:, : arm.n, :3, 2]
-    reach = arm.reach if math.isfinite(arm.reach) else float(np.ptp(poses[..., :3, 3], axis=(0, 1)).max())
-    return ArmFigure(
-        points=points,
-        hand_axes=np.swapaxes(poses[:, -1, :3, :3], -1, -2).reshape(len(poses), 9),
-        grip=grip,
-        joint_axes=np.concatenate([origins, z_axes], axis=-1),
-        radii=np.linspace(_THICK, _THIN, points.shape[1] - 1) * reach,
-    )
-
-
-def skeleton_points(arm: Arm, poses: Array) -> Array:
-    """Return the corners (M, K, 3) of the figure, from the floor to the tool; arguments as of ``stick_figure``."""
     origins, z_axes = poses[:, :, :3, 3], poses[:, :, :3, 2]
     points = [_floor_points(origins[:, 0]), origins[:, 0]]
     for i in range(1, arm.n + 1):

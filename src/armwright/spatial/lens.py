@@ -87,6 +87,32 @@ class Lens:
             back = np.abs(self.project(rays) - pixels).max() if np.isfinite(rays).all() else np.inf
             return bool(back < _SAME_PIXEL and (np.linalg.det(self._derivative(rays[..., :2])) > 0).all())
 
+    def derivatives(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Return the derivatives of the pixels of points (..., 3) in the frame of the camera.
+
+        Returns:
+            By the coordinates of the point, (..., 2, 3) [px/m]; by the numbers of the lens, which are focal lengths,
+            centre and distortion, (..., 2, 9).
+        """
+        points = floats(points, "points")
+        flat, depth = points[..., :2] / points[..., 2:], points[..., 2:, None]
+        slope = self.focal[:, None] * self._derivative(flat)
+        by_point = np.concatenate([slope, -np.einsum("...ij,...j->...i", slope, flat)[..., None]], axis=-1) / depth
+        x, y = flat[..., 0], flat[..., 1]
+        r2 = x * x + y * y
+        xy2, x2, y2 = 2 * x * y, r2 + 2 * x * x, r2 + 2 * y * y
+        shape = np.stack(
+            [
+                np.stack([x * r2, x * r2**2, xy2, x2, x * r2**3], -1),
+                np.stack([y * r2, y * r2**2, y2, xy2, y * r2**3], -1),
+            ],
+            axis=-2,
+        )
+        seen = self._distorted(flat)
+        by_focal = seen[..., None] * np.eye(2)
+        by_centre = np.broadcast_to(np.eye(2), by_focal.shape)
+        return by_point, np.concatenate([by_focal, by_centre, self.focal[:, None] * shape], axis=-1)
+
     def _distorted(self, flat: Array) -> Array:
         """Return where points of the plane z = 1 (..., 2) are seen, in that plane."""
         k1, k2, p1, p2, k3 = self.distortion

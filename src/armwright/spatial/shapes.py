@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import attrs
@@ -107,6 +108,13 @@ def _faces(value: npt.ArrayLike) -> npt.NDArray[np.int32]:
     return faces
 
 
+def _pieces(value: Iterable[Mesh]) -> tuple[Mesh, ...]:
+    pieces = tuple(value)
+    if not all(isinstance(piece, Mesh) for piece in pieces):
+        raise KindError("pieces: expected meshes")
+    return pieces
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Mesh:
     """A solid between triangles, each of which is seen counterclockwise from outside.
@@ -115,11 +123,13 @@ class Mesh:
         vertices: (k, 3) [m].
         faces: (m, 3) the numbers of the vertices of each triangle, from 0.
         name: of its file; empty where it has none.
+        pieces: convex meshes that together fill it, which count in collisions; none where its convex hull counts.
     """
 
     vertices: Array = attrs.field(converter=_vertices)
     faces: npt.NDArray[np.int32] = attrs.field(converter=_faces)
     name: str = ""
+    pieces: tuple[Mesh, ...] = attrs.field(default=(), converter=_pieces)
 
     __reduce__ = reduce_by_fields
 
@@ -140,10 +150,12 @@ class Solid:
     Attributes:
         shape: its form.
         pose: (4, 4) of the shape in the frame.
+        guessed: whether the shape is a guess, made where no drawing is at hand.
     """
 
     shape: Shape
     pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+    guessed: bool = False
 
     __reduce__ = reduce_by_fields
 
@@ -154,10 +166,26 @@ class Solid:
 
 def is_closed(mesh: Mesh) -> bool:
     """Whether the triangles of a mesh enclose a solid: every edge belongs to two of them, once in either direction."""
+    return open_edges(mesh) == 0
+
+
+def open_edges(mesh: Mesh) -> int:
+    """Return how many edges of a mesh do not belong to two triangles, once in either direction."""
     edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-    there = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
-    back = edges[:, 1] * len(mesh.vertices) + edges[:, 0]
-    return len(np.unique(there)) == len(there) and bool(np.isin(back, there).all())
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    _, numbers = np.unique(low * len(mesh.vertices) + high, return_inverse=True)
+    there = np.bincount(numbers, edges[:, 0] == low)
+    return int(((there != 1) | (np.bincount(numbers) != 2)).sum())
+
+
+def collision_shapes(shape: Shape) -> tuple[Shape, ...]:
+    """Return the convex solids that count in collisions: a shape itself, whose hull counts, or the pieces of a mesh."""
+    return shape.pieces if isinstance(shape, Mesh) and shape.pieces else (shape,)
+
+
+def convex_solids(solids: Iterable[Solid]) -> list[Solid]:
+    """Return solids with the pieces of meshes in place of those that have some; see ``collision_shapes``."""
+    return [attrs.evolve(solid, shape=shape) for solid in solids for shape in collision_shapes(solid.shape)]
 
 
 def farthest(shape: Shape) -> float:
@@ -175,16 +203,30 @@ def farthest(shape: Shape) -> float:
             return float(np.linalg.norm(vertices, axis=1).max())
 
 
-def reach(shape: Shape, direction: Array) -> float:
-    """Return how far a solid extends from its origin in a direction (3,) of length 1 [m]."""
-    along = abs(float(direction[2]))
+def box_about(shape: Shape) -> tuple[Array, float]:
+    """Return a box (3,) about the origin, as half its lengths, and a radius: all of a solid is that near to it [m]."""
+    match shape:
+        case Box(size=size):
+            return size / 2, 0.0
+        case Cylinder(radius=radius, length=length):
+            return np.array((radius, radius, length / 2)), 0.0
+        case Capsule(radius=radius, length=length):
+            return np.array((0.0, 0.0, length / 2)), radius
+        case Sphere(radius=radius):
+            return np.zeros(3), radius
+        case Mesh(vertices=vertices):
+            return np.abs(vertices).max(axis=0), 0.0
+
+
+def support(shape: Shape, direction: Array) -> float:
+    """Return how far a solid reaches from its origin in a direction (3,) of length 1 [m]."""
     match shape:
         case Box(size=size):
             return float(np.abs(direction) @ size) / 2
         case Cylinder(radius=radius, length=length):
-            return radius * math.hypot(direction[0], direction[1]) + along * length / 2
+            return float(radius * math.hypot(direction[0], direction[1]) + length / 2 * abs(direction[2]))
         case Capsule(radius=radius, length=length):
-            return radius + along * length / 2
+            return float(radius + length / 2 * abs(direction[2]))
         case Sphere(radius=radius):
             return radius
         case Mesh(vertices=vertices):

@@ -9,10 +9,12 @@ import numpy as np
 
 from armwright.arm.dh import carry
 from armwright.arm.model import Link
+from armwright.arm.urdf.geometry import has_unread_shapes, solids_of
 from armwright.arm.urdf.robot import Robot, UrdfJoint, axis_of, body_of
 from armwright.arrays import Array
 from armwright.errors import one_of
 from armwright.files.limits import limit, limit_message
+from armwright.spatial.shapes import LARGEST_SIZE, Solid
 
 # Of links and joints, a message lists this many.
 _MAX_LISTED = 50
@@ -45,6 +47,7 @@ class Chain:
         moving: the joints that move, from the base to the tip.
         X_BT: (4, 4) the tip seen from the base.
         X_RB: (4, 4) the base seen from the root of the tree.
+        base_solids: of all links that are fixed to the base, in its frame.
         notes: sentences on what was chosen.
     """
 
@@ -53,6 +56,7 @@ class Chain:
     moving: tuple[MovingJoint, ...]
     X_BT: Array
     X_RB: Array
+    base_solids: tuple[Solid, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -84,10 +88,13 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
         raise robot.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(movable))}")
     X, moving = np.eye(4), []
     branches: list[UrdfJoint] = []
+    unread: list[str] = []
+    # What moves beside the chain and hangs on the base is no load of the arm.
+    standing = list(_rigid_bodies(robot, base, X, [], unread))
     for joint in path:
         X = X @ joint.origin
         if not joint.fixed:
-            bodies = tuple(_rigid_bodies(robot, joint.child, X, branches))
+            bodies = tuple(_rigid_bodies(robot, joint.child, X, branches, unread))
             moving.append(MovingJoint(joint=joint, X_BJ=X, axis=X[:3, :3] @ axis_of(joint), bodies=bodies))
     _refuse_loads(robot, [joint for joint in branches if joint not in movable])
     X_RB, root = np.eye(4), base
@@ -95,7 +102,12 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
         root = robot.parent_joints[root].parent
     for joint in _joint_path(robot, root, base):
         X_RB = X_RB @ joint.origin
-    return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, notes=notes)
+    if unread:
+        kinds = f"boxes, cylinders, spheres and capsules up to {LARGEST_SIZE:g} m"
+        notes += (f"of shapes, {kinds} are read; links with others: {_listed(unread)}",)
+    notes += tuple(robot.meshes.notes())
+    solids = tuple(solid for body in standing for solid in body.solids)
+    return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, base_solids=solids, notes=notes)
 
 
 def _root(robot: Robot) -> str:
@@ -151,15 +163,18 @@ def _joint_path(robot: Robot, base: str, tip: str) -> list[UrdfJoint]:
     return path[::-1]
 
 
-def _rigid_bodies(robot: Robot, link: str, X_BL: Array, branches: list[UrdfJoint]) -> Iterator[Link]:
+def _rigid_bodies(robot: Robot, link: str, X_BL: Array, branches: list[UrdfJoint], unread: list[str]) -> Iterator[Link]:
     """Walk through the bodies that are fixed to a link and to one another, in the frame of the base.
 
-    Joints that move and hang on one of them are put into ``branches``.
+    Joints that move and hang on one of them are put into ``branches``, links with shapes that are not read into
+    ``unread``.
     """
     pending = [(link, X_BL)]
     while pending:
         name, X = pending.pop()
-        yield carry(body_of(robot.links[name]), X)
+        element = robot.links[name]
+        unread += [name] if has_unread_shapes(element, robot.meshes) else []
+        yield carry(attrs.evolve(body_of(element), solids=solids_of(element, robot.meshes)), X)
         for joint in robot.child_joints[name]:
             if joint.fixed:
                 pending.append((joint.child, X @ joint.origin))

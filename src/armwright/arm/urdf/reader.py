@@ -20,6 +20,7 @@ from armwright.arrays import Array, number
 from armwright.errors import KindError, shown
 from armwright.files.inputs import file_path
 from armwright.spatial.poses import inverse
+from armwright.spatial.shapes import Solid
 
 # Axes that are this near to parallel were meant to be [rad]: a half turn typed as 3.1416 is 0.7e-5 rad off.
 _MEANT_PARALLEL = 1e-4
@@ -42,7 +43,14 @@ class Reading:
     notes: tuple[str, ...]
 
 
-def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Arm:
+def load_urdf(
+    path: Path | str,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    lock: Lock = (),
+    packages: Mapping[str, Path | str] | None = None,
+) -> Arm:
     """Return the serial arm between two links of a URDF file.
 
     Positions of the arm are those of the joints in the file; the base is the frame of the base link, the tool that of
@@ -55,18 +63,27 @@ def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
             that carries all of them.
         lock: names of joints that are held at 0, as if they were fixed, such as those of a gripper; or where joints
             are held by their names [rad] or [m].
+        packages: folders of packages, by name, in which the meshes are that the file names as ``package://NAME/...``;
+            others are looked for below the folder of the file.
 
     Raises:
-        KindError: ``path`` is no path, ``lock`` one text, or a position no number.
+        KindError: ``path`` is no path, ``packages`` no mapping, ``lock`` one text, or a position no number.
         InvalidValueError: a joint is to be held where its limits do not let it.
         MissingExtraError: lxml is not installed.
         UnknownNameError: there is no link, or no joint, of that name.
         FileFormatError: the file is missing, broken, or has no such arm; the text has file, line and key.
     """
-    return read_urdf(path, base=base, tip=tip, lock=lock).arm
+    return read_urdf(path, base=base, tip=tip, lock=lock, packages=packages).arm
 
 
-def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Reading:
+def read_urdf(
+    path: Path | str,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    lock: Lock = (),
+    packages: Mapping[str, Path | str] | None = None,
+) -> Reading:
     """Return the serial arm between two links of a URDF file, and what was not taken as it stands.
 
     Arguments and errors are those of ``load_urdf``.
@@ -75,9 +92,11 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
         raise KindError(f"path: expected the path of a URDF file, got {shown(path)}")
     if isinstance(lock, str):
         raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
+    if packages is not None and not isinstance(packages, Mapping):
+        raise KindError(f"packages: expected folders by the names of packages, got {shown(packages)}")
     path = file_path(path)
     locked = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
-    robot = read_robot(path, {name: number(q, f"lock, '{name}'") for name, q in locked.items()})
+    robot = read_robot(path, {name: number(q, f"lock, '{name}'") for name, q in locked.items()}, packages)
     chain = chain_of(robot, base, tip)
     # The distance of the joints and the tip from the base, or 1 m where all are at one point.
     origins = np.array([*(each.X_BJ[:3, 3] for each in chain.moving), chain.X_BT[:3, 3]])
@@ -100,6 +119,7 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
         tool=cleared_pose(inverse(frames.poses[-1]) @ chain.X_BT, size),
         gravity=felt_gravity(chain.X_RB, UPRIGHT_GRAVITY),
         gravity_from="root",
+        base_solids=chain.base_solids,
         base_link=chain.base,
         tool_link=chain.tip,
         source=f"{path.name}, link '{chain.base}' to link '{chain.tip}'",
@@ -113,16 +133,21 @@ def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
 def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:
     """Weld bodies that are given in the frame of the base, and see them from the frame of a link."""
     unknown = [body for body in bodies if body.unknown]
+    X_LB = inverse(X_BL)
+    solids = [_cleared(solid.moved(X_LB), size) for body in bodies for solid in body.solids]
     if unknown:
-        return unknown[0]
+        return attrs.evolve(unknown[0], solids=solids)
     whole = _welded([body for body in bodies if body.mass or body.inertia.any()])
-    solids = [solid for body in bodies for solid in body.solids]
-    seen = carry(attrs.evolve(whole, solids=solids), inverse(X_BL))
+    seen = carry(whole, X_LB)
     # What has no mass has no centre of mass either; it is put at the origin.
     com = cleared(seen.com, size) if seen.mass else np.zeros(3)
     inertia = cleared(seen.inertia, float(np.abs(seen.inertia).max()))
     known = impossible_moments(seen.mass, com, inertia) is None
-    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known, solids=seen.solids)
+    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known, solids=solids)
+
+
+def _cleared(solid: Solid, size: float) -> Solid:
+    return attrs.evolve(solid, pose=cleared_pose(solid.pose, size))
 
 
 def _welded(bodies: Sequence[Link]) -> Link:

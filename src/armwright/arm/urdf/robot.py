@@ -13,6 +13,7 @@ import numpy as np
 from armwright.arm.model import Limits, Link, Motor
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.urdf.elements import Element, read_elements
+from armwright.arm.urdf.meshes import MeshFiles
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
 from armwright.files.limits import limit, limit_message
@@ -88,6 +89,7 @@ class Robot:
         links: by name, in the order of the file.
         parent_joints: by the name of a link: the joint that carries it.
         child_joints: by the name of a link: the joints that hang on it.
+        meshes: where the meshes of links are.
     """
 
     path: Path
@@ -95,18 +97,22 @@ class Robot:
     links: dict[str, Element]
     parent_joints: dict[str, UrdfJoint]
     child_joints: dict[str, list[UrdfJoint]]
+    meshes: MeshFiles
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the whole file."""
         return FileFormatError(self.path, None, "", message)
 
 
-def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
+def read_robot(
+    path: Path, lock: Mapping[str, float] | None = None, packages: Mapping[str, Path | str] | None = None
+) -> Robot:
     """Read a URDF file.
 
     Args:
         path: the file.
         lock: where joints are held by their names [rad] or [m], as if they were fixed.
+        packages: folders of packages, by name, in which meshes are.
 
     Raises:
         MissingExtraError: the library that parses it is not installed.
@@ -137,7 +143,10 @@ def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
     if not links:
         raise root.error("", "expected at least one <link> in <robot>")
     name = root.attributes.get("name") or path.stem
-    robot = Robot(path=path, name=name, links=links, parent_joints=parent_joints, child_joints=child_joints)
+    meshes = MeshFiles(folder=path.parent, packages=packages or {})
+    robot = Robot(
+        path=path, name=name, links=links, parent_joints=parent_joints, child_joints=child_joints, meshes=meshes
+    )
     _refuse_cycles(robot)
     return robot
 

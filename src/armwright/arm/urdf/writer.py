@@ -12,14 +12,17 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
+from armwright.arm.collision_pairs import CollisionPairs
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Limits, Link, Motor
 from armwright.arm.positions import known_arm
+from armwright.arm.urdf.geometry import primitives
 from armwright.arm.urdf.robot import NO_LIMIT
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.spatial.euler import to_rpy
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import elementary_rotation
+from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 
 
 def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
@@ -57,6 +60,9 @@ def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
 def lost_in_urdf(arm: Arm) -> list[str]:
     """Say what of an arm URDF cannot hold, in sentences; none where nothing is lost."""
     lost = [sentence for i in range(arm.n) for sentence in _lost_of_joint(arm, i)]
+    lost += _lost_solids("base", arm.base_solids)
+    if arm.collisions != CollisionPairs():
+        lost.append("the pairs of bodies that are checked for collisions, or not, are not in the file")
     if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         x, y, z = arm.gravity
         lost.append(f"gravity of ({x:g}, {y:g}, {z:g}) m/s² is not in the file: in URDF it points downwards along z")
@@ -86,8 +92,20 @@ def _lost_of_joint(arm: Arm, index: int) -> Iterator[str]:
     if math.isfinite(joint.limits.acceleration):
         largest = f"{joint.limits.acceleration:g} {units.position}/s²"
         yield f"{label}: the maximum acceleration, {largest}, is not in the file"
+    yield from _lost_solids(f"link {index + 1}", link.solids)
     if link.unknown:
         yield f"link {index + 1}: its mass and inertia are unknown and not in the file: {link.unknown}"
+
+
+def _lost_solids(body: str, solids: Sequence[Solid]) -> Iterator[str]:
+    """Say what of the solids of a body is lost."""
+    kinds = [type(solid.shape) for solid in solids]
+    if Capsule in kinds:
+        yield f"{body}: its capsules are cylinders with two spheres in the file"
+    if Mesh in kinds:
+        yield f"{body}: its meshes are not in the file"
+    if any(solid.guessed for solid in solids):
+        yield f"{body}: that its solids are guesses is not in the file"
 
 
 def _robot(arm: Arm, tilts: Sequence[float]) -> Element:
@@ -97,7 +115,7 @@ def _robot(arm: Arm, tilts: Sequence[float]) -> Element:
     first, last = "base_to_link_0", f"link_{arm.n}_to_tool"
     own = ["", *(joint.name for joint in arm.joints), ""]
     _, *joints, _ = _distinct_names(own, [first, *(f"joint_{i}" for i in range(1, arm.n + 1)), last])
-    SubElement(root, "link", name=base)
+    _shapes(SubElement(root, "link", name=base), arm.base_solids, np.eye(4))
     SubElement(root, "link", name=moving[0])
     _joint(root, (first, "fixed", base, moving[0]), to_rpy(arm.base[:3, :3]), arm.base[:3, 3])
     X, rpy = np.eye(4), np.zeros(3)
@@ -109,7 +127,9 @@ def _robot(arm: Arm, tilts: Sequence[float]) -> Element:
         X = homogeneous(elementary_rotation(2, joint.theta), (0.0, 0.0, joint.d)) @ joint.behind
         # Where the row is four numbers the angles are those of the table.
         rpy = np.array((joint.alpha, 0.0, joint.theta)) if joint.fixed is None else to_rpy(X[:3, :3])
-        _body(SubElement(root, "link", name=moving[i + 1]), link, rpy, X)
+        body = SubElement(root, "link", name=moving[i + 1])
+        _body(body, link, rpy, X)
+        _shapes(body, link.solids, X)
         if tilt:
             X = X @ homogeneous(elementary_rotation(1, tilt), np.zeros(3))
             rpy = to_rpy(X[:3, :3])
@@ -159,6 +179,22 @@ def _body(element: Element, link: Link, rpy: Array, X: Array) -> None:
     _origin(inertial, rpy, X[:3, :3] @ link.com + X[:3, 3])
     _numbers(inertial, "mass", value=link.mass)
     _numbers(inertial, "inertia", ixx=I[0, 0], iyy=I[1, 1], izz=I[2, 2], ixy=I[0, 1], ixz=I[0, 2], iyz=I[1, 2])
+
+
+def _shapes(element: Element, solids: Sequence[Solid], X: Array) -> None:
+    """Write the solids of a link, whose frame in the table is at X in that of the file: they are seen, and collide."""
+    for tag in ("visual", "collision"):
+        for solid in (primitive for each in solids for primitive in primitives(each)):
+            shape, pose = SubElement(element, tag), X @ solid.pose
+            _origin(shape, to_rpy(pose[:3, :3]), pose[:3, 3])
+            geometry = SubElement(shape, "geometry")
+            match solid.shape:
+                case Box(size=size):
+                    SubElement(geometry, "box", size=" ".join(map(_number, size)))
+                case Cylinder(radius=radius, length=length):
+                    _numbers(geometry, "cylinder", radius=radius, length=length)
+                case Sphere(radius=radius):
+                    _numbers(geometry, "sphere", radius=radius)
 
 
 def _origin(element: Element, rpy: Array, xyz: Array) -> None:

@@ -95,6 +95,8 @@ def _launch_request(arguments: Arguments) -> LaunchRequest:
         stop_on_entry=arguments.get(bool, "stopOnEntry", default=False),
         no_debug=arguments.get(bool, "noDebug", default=False),
         strict=arguments.get(bool, "strict", default=False),
+        physics=arguments.get(bool, "physics", default=False),
+        seed=arguments.get(int, "seed", default=0),
     )
 
 

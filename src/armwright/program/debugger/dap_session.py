@@ -39,6 +39,8 @@ class LaunchRequest:
         cell: path of the cell; None where the program imports it, or the only cell file beside it is meant.
         std: the language.
         strict: whether an AFFIX that is only implied is an error.
+        physics: whether the cell is simulated with physics.
+        seed: of what is random there.
         output: a folder for what a run leaves; None for none.
         stop_on_entry: whether to stop in front of the first statement.
         no_debug: whether to run without stops.
@@ -51,6 +53,8 @@ class LaunchRequest:
     stop_on_entry: bool
     no_debug: bool
     strict: bool = False
+    physics: bool = False
+    seed: int = 0
 
 
 class MissingCellError(ArmwrightError, ValueError):
@@ -131,7 +135,7 @@ class EditorSession:
         assert loaded.cell is not None  # noqa: S101 - a program without a cell is not loaded
         self.launch, self.loaded = launch, loaded
         self.codec = PositionCodec(loaded.code.source.text, UTF_16)
-        self.debugger = Debugger(loaded.code, loaded.cell)
+        self.debugger = Debugger(loaded.code, loaded.cell, hardware=loaded.hardware)
         self.has_begun = self.has_ended = False
         self.forget_references()
         self.debugger.execution.exception_filters = self.exception_filters

@@ -8,7 +8,9 @@ from typing import Literal, TypeAlias
 import attrs
 import numpy as np
 
+from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
+from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger import expressions, variables
@@ -45,17 +47,20 @@ class Debugger:
         execution: the run itself, with its breakpoints, watches and statements.
     """
 
-    def __init__(self, code: Code, cell: Cell, limits: Limits | None = None) -> None:
+    def __init__(
+        self, code: Code, cell: Cell, limits: Limits | None = None, hardware: HardwareFactory = Simulator
+    ) -> None:
         """Load a program.
 
         Args:
             code: translated without errors against this cell.
             cell: arms, frames, servo period and deviation.
             limits: when the program is taken to run for ever.
+            hardware: how the cell is set up.
         """
         self.code = code
         self.stop: Stop | None = None
-        self.execution = Execution(code, cell, limits)
+        self.execution = Execution(code, cell, limits, hardware)
         self._active: RunToStop | None = None
         # Where a run backwards was begun, to return to when it is given up.
         self._origin: RunPosition | None = None

@@ -6,6 +6,7 @@ from typing import TypeAlias
 
 import attrs
 
+from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.breakpoints import Breakpoint, Watch, matches_hit_count
@@ -40,9 +41,9 @@ class Execution:
         log_messages: of breakpoints that log instead of stopping.
     """
 
-    def __init__(self, code: Code, cell: Cell, limits: Limits | None) -> None:
+    def __init__(self, code: Code, cell: Cell, limits: Limits | None, hardware: HardwareFactory) -> None:
         """Stand in front of the first statement."""
-        self.timeline = Timeline(code, cell, limits)
+        self.timeline = Timeline(code, cell, limits, hardware)
         self.statements = Statements(code)
         self.tick = 0
         self.breakpoints: list[Breakpoint] = []

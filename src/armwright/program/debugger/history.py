@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import attrs
 
+from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
 from armwright.program.bytecode.instructions import Code, Op
@@ -63,9 +64,11 @@ class Timeline:
         step_count: steps done so far.
     """
 
-    def __init__(self, code: Code, cell: Cell, limits: Limits | None = None) -> None:
+    def __init__(
+        self, code: Code, cell: Cell, limits: Limits | None = None, hardware: HardwareFactory = Simulator
+    ) -> None:
         """Stand in front of the first instruction."""
-        self.machine = Machine(code, cell, Simulator(cell), limits)
+        self.machine = Machine(code, cell, hardware(cell), limits)
         self.progress = Progress()
         self.step_count = 0
         self._changes: list[tuple[int, Change]] = []

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import attrs
 
+from armwright.cell.assembly import is_assembly
 from armwright.cell.model import Cell
-from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.document import Document
-from armwright.files.inputs import regular_file
+from armwright.program.api import read_imported_cell
 from armwright.program.semantics.cell_symbols import ImportedFrames
 
 _IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)
@@ -120,9 +120,8 @@ def _file_stamp(path: Path) -> tuple[int, int]:
 
 def _read_cell_file(path: Path) -> CellFile | FileFormatError:
     try:
-        # A program or a setting names it, and neither may name what never ends.
-        cell = read_cell(regular_file(path), arms_needed=False)
-        return CellFile(path=path, cell=cell, lines=_declaration_lines(path))
+        cell = read_imported_cell(path)
+        return CellFile(path=path, cell=cell, lines={} if is_assembly(path) else _declaration_lines(path))
     except FileFormatError as error:
         return error
     except (ArmwrightError, ArithmeticError) as error:

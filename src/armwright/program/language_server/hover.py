@@ -148,6 +148,8 @@ def _describe_frame(analysis: Analysis, key: str) -> list[str]:
             lines.append(f"in the world: {pose_text(frames.world(key), units)}")
     if count := len(cell.visions.get(key, ())):
         lines.append(f"the camera of {cell.name} has {count} answer{'s' * (count > 1)} for it")
+    if (part := cell.seen_parts.get(key)) is not None:
+        lines.append(f"the camera of {cell.name} finds the part {part} there")
     return lines
 
 

@@ -55,7 +55,7 @@ def _cell_source(analysis: Analysis, key: str) -> str | None:
     cell = analysis.cell
     if cell is not None and key in cell.frames:
         return f"gets its pose from {cell.name}"
-    return f"is found by the camera of {cell.name}" if cell is not None and key in cell.visions else None
+    return f"is found by the camera of {cell.name}" if cell is not None and key in cell.seen_frames else None
 
 
 def rename(analysis: Analysis, offset: int, new: str) -> tuple[TextEdit, ...]:
@@ -117,7 +117,7 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
         raise InvalidValueError(f"the program already has a name '{new}'")
     if key in FUNCTIONS:
         raise InvalidValueError(f"'{new}' is a function of the language")
-    if cell is not None and occurrence.kind is NameKind.VARIABLE and (key in cell.frames or key in cell.visions):
+    if cell is not None and occurrence.kind is NameKind.VARIABLE and (key in cell.frames or key in cell.seen_frames):
         raise InvalidValueError(f"{cell.name} has a frame '{new}', which this would become")
     if any(other.key == key and other.owner is None for other in _referring_occurrences(analysis)):
         raise InvalidValueError(f"the program uses '{new}' already, though it is not declared")

@@ -273,7 +273,7 @@ class Session:
             What can be done, None if something is wrong; and what there is to say.
         """
         before = self.state
-        fixed = {*before.machine.cell.frames, *before.cell.visions, "STATION"}
+        fixed = {*before.machine.cell.frames, *before.cell.seen_frames, "STATION"}
         heading = merge_headers(
             before.headers, before.statements, entry, self.std, cell_names=fixed, import_path=import_path
         )

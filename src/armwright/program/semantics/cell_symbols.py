@@ -53,7 +53,7 @@ def known_cell(cell: Cell) -> KnownCell:
         arms=frozenset(cell.arms),
         frames={name: node.parent for name, node in cell.frames.items()},
         devices=cell.devices,
-        visions=frozenset(cell.visions),
+        visions=cell.seen_frames,
         reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
     )
 

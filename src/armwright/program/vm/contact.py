@@ -13,6 +13,7 @@ from armwright.motion.controlled_stop import brake
 from armwright.motion.plan import tool_path_length
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.program.language.source import Span
+from armwright.program.vm.collisions import check_others
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Motion, Process
 from armwright.program.vm.recording import ToolWrenches, TrajectorySegment, peak_efforts, trajectory_efforts
@@ -39,8 +40,9 @@ def stop_arm(machine: Machine, process: Process, span: Span) -> int:
         motion.rest_tick = machine.state.ticks
         if runs and local < runs[-1].duration - _ROUNDING:
             motion.rest_tick += _stop_during_stage(machine, motion, local)
+            check_others(machine, motion.arm)
         else:
-            _send_and_watch(machine, motion, hold(machine.hardware.configuration(motion.arm, machine.now), period))
+            _send_and_watch(machine, motion, hold(machine.hardware.sent_configuration(motion.arm, machine.now), period))
     end = max(motion.rest_tick, machine.state.ticks)
     machine.update_hand_pose(motion.arm, span, tick=end)
     return end
@@ -73,7 +75,9 @@ def _send_and_watch(machine: Machine, motion: Motion, trajectory: Trajectory) ->
 
 def send_trajectory(machine: Machine, motion: Motion, trajectory: Trajectory) -> ToolWrenches:
     """Let the arm of a motion follow a trajectory instead of what it does now; return what will push on its hand."""
-    machine.hardware.start_motion(motion.arm, trajectory, machine.now, motion.X_HM)
+    machine.hardware.start_motion(
+        motion.arm, trajectory, machine.now, motion.X_HM, guarded=any(guard.reads_force for guard in motion.guards)
+    )
     return _record_wrenches(machine, motion.arm)
 
 

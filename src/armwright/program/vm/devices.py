@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from armwright.cell.hardware import DeviceError
 from armwright.program.bytecode.instructions import Instruction, Op
+from armwright.program.vm.collisions import held_parts, note_released
 from armwright.program.vm.contact import recompute_efforts, record_contact, update_depth_alarm
 from armwright.program.vm.machine import Handler, Machine, pose_data
 from armwright.program.vm.process import PendingEffect, Process
@@ -29,7 +30,9 @@ def _move_fingers(machine: Machine, process: Process, step: Instruction) -> None
     motion = None if mover is None else mover.motion
     if motion is not None:
         record_contact(machine, motion)
-    time = machine.hardware.move_fingers(arm, closed=closed, width=metres)
+    held = held_parts(machine)
+    time = machine.hardware.move_fingers(arm, machine.now, closed=closed, width=metres, frame=hand.held_frame)
+    note_released(machine, held)
     recompute_efforts(machine, arm, None if motion is None or motion.stage_index < 0 else motion.stage_index)
     if motion is not None:
         # What is released does not press any more.
@@ -54,7 +57,7 @@ def _operate(machine: Machine, process: Process, step: Instruction) -> None:
 def _read_visions(machine: Machine, process: Process, step: Instruction) -> None:
     name = machine.resolve_name(process, step.operands[0])
     try:
-        X_WF, time = machine.hardware.locate(name)
+        X_WF, time = machine.hardware.locate(name, machine.now)
     except DeviceError as error:
         raise machine.error(process, "R601", str(error), step.span, "the camera is asked here") from None
     text = f"READ VISIONS {machine.spelling(name)}"

@@ -12,17 +12,18 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.cell.hardware import Hardware
+from armwright.cell.hardware import Hardware, Mishap
 from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.bytecode.verify import verify
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm import control_flow, devices, expressions, frames, move, output
+from armwright.program.vm.collisions import threatened_error
 from armwright.program.vm.contact import stop_too_deep
 from armwright.program.vm.control_flow import recover, shut_down, switched_off_text
 from armwright.program.vm.machine import Handler, Limits, Machine, RunError
 from armwright.program.vm.move import advance_motion
-from armwright.program.vm.move_diagnostics import obstacle_warning
+from armwright.program.vm.move_diagnostics import clearance_warning, obstacle_warning
 from armwright.program.vm.process import Process
 from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, sort_effects
 from armwright.program.vm.synchronization import deadlock_error
@@ -110,25 +111,63 @@ def advance(machine: Machine, process: Process) -> None:
         RunError: something went wrong that no TRY is around.
     """
     try:
+        mishap = _let_time_pass(machine, process)
+        if mishap is not None:
+            process = _affected_process(machine, mishap) or process
+            raise _mishap_error(machine, process, mishap)
         _advance(machine, process)
     except RunError as error:
         if error.diagnostic.code in _UNRECOVERABLE or not recover(machine, process, error):
             raise _stopped_error(machine, error, process, process.last_arm) from None
 
 
+def _let_time_pass(machine: Machine, process: Process) -> Mishap | None:
+    """Let time go by until a process is served; return what goes wrong in the cell before that.
+
+    Raises:
+        RunError: the program has run for too long.
+    """
+    state, period = machine.state, machine.cell.period
+    if process.due_tick is None or process.due_tick <= state.ticks:
+        return None
+    last = max(0, math.floor(machine.limits.time / period + _TICK_TOLERANCE))
+    mishap = machine.hardware.advance(min(process.due_tick, last) * period)
+    if mishap is not None:
+        state.ticks, state.idle_steps = round(mishap.time / period), 0
+        return mishap
+    state.ticks, state.idle_steps = min(process.due_tick, last), 0
+    if process.due_tick > last:
+        # The clock stops there, and moving arms have come as far as that.
+        under_way = process.pending_effect or process.motion or machine.code.instructions[process.pc]
+        text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
+        raise machine.error(process, "E506", text, under_way.span, "it has reached this statement")
+    return None
+
+
+def _affected_process(machine: Machine, mishap: Mishap) -> Process | None:
+    """Return the process that moves an arm to which something has happened, or that has used it last."""
+    if mishap.arm is None:
+        return None
+    mover = machine.moving_process(mishap.arm)
+    if mover is not None:
+        return mover
+    users = [process for process in machine.state.processes if process.last_arm == mishap.arm]
+    return max(users, key=lambda process: len(process.path), default=None)
+
+
+def _mishap_error(machine: Machine, process: Process, mishap: Mishap) -> RunError:
+    """Return the error that tells a process what has gone wrong in the cell, at what it is doing."""
+    under_way = process.motion or process.pending_effect or machine.code.instructions[process.pc]
+    helps = mishap.helps
+    return machine.error(process, mishap.code, mishap.message, under_way.span, mishap.label, helps=helps)
+
+
 def _advance(machine: Machine, process: Process) -> None:
-    if process.due_tick is not None and process.due_tick > machine.state.ticks:
-        last = machine.limits.time / machine.cell.period + _TICK_TOLERANCE
-        machine.state.ticks, machine.state.idle_steps = process.due_tick, 0
-        if machine.state.ticks > last:
-            # The clock stops there, and moving arms have come as far as that.
-            machine.state.ticks = max(0, math.floor(last))
-            under_way = process.pending_effect or process.motion or machine.code.instructions[process.pc]
-            text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
-            raise machine.error(process, "E506", text, under_way.span, "it has reached this statement")
     motion = process.motion
     if motion is not None and motion.alarm_tick is not None and motion.alarm_tick <= machine.state.ticks:
         stop_too_deep(machine, process, motion)
+    if motion is not None and motion.threat is not None:
+        raise threatened_error(machine, process, motion)
     if (pending := process.pending_effect) is not None:
         process.pending_effect = None
         if pending.frame_pose is not None:
@@ -180,12 +219,14 @@ def _failure_recording(machine: Machine, failure: Failure, switched_off: Sequenc
 def motion_warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic, ...]:
     """Return the warnings about stages that were run in a cell.
 
-    For every straight line that was gone round, every VIA with stops because corners cannot be rounded, and every
-    joint asked for too much effort.
+    For every straight line that was gone round, every VIA with stops because corners cannot be rounded, every stage
+    that comes too near to other bodies, and every joint asked for too much effort.
     """
     diagnostics = []
     for stage in stages:
         if (warning := obstacle_warning(stage)) is not None:
+            diagnostics.append(warning)
+        if (warning := clearance_warning(stage, cell.clearance)) is not None:
             diagnostics.append(warning)
         arm = cell.arms[stage.arm].arm
         excessive = np.flatnonzero(stage.peak_effort / arm.limits.effort > 1)

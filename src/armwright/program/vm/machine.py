@@ -10,11 +10,11 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree
-from armwright.cell.hardware import Hardware
+from armwright.cell.hardware import Hardware, SimulatedHardware
 from armwright.cell.model import Cell, base_name
-from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.physics.collisions import CellCollisions
 from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand
 from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
@@ -75,6 +75,14 @@ class Machine:
         self.code, self.cell, self.hardware, self.limits = code, cell, hardware, limits or Limits()
         self.state = MachineState.initial(code, cell)
         self.constants = constant_values(code.constants)
+        self._collisions: CellCollisions | None = None
+
+    @property
+    def collisions(self) -> CellCollisions | None:
+        """What arms may run into; None where there is nothing of the kind in the cell."""
+        if self._collisions is None and self.cell.collisions_matter:
+            self._collisions = CellCollisions(self.cell)
+        return self._collisions
 
     def copy(self) -> "Machine":
         """Return a machine in the same state; what one of them does changes nothing in the other.
@@ -82,7 +90,7 @@ class Machine:
         Raises:
             TypeError: the hardware is a real cell, which cannot be copied.
         """
-        if not isinstance(self.hardware, Simulator):
+        if not isinstance(self.hardware, SimulatedHardware):
             raise TypeError(f"only a simulated cell can be copied, not a {type(self.hardware).__name__}")
         copied = copy.copy(self)
         copied.hardware, copied.state = self.hardware.copy(), self.state.copy()
@@ -102,6 +110,9 @@ class Machine:
     def recording(self) -> Recording:
         """Return all that happened so far."""
         cell, state = self.cell, self.state
+        # What goes wrong while the arms come to rest is of no program any more.
+        while self.hardware.advance(self.now) is not None:
+            pass
         streams = tuple(
             sample_stream(
                 name, arm, state.segments[name], state.tool_wrenches[name], end_tick=state.ticks, period=cell.period
@@ -117,6 +128,8 @@ class Machine:
             streams=streams,
             trees=tuple(state.trees),
             configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
+            observations=self.hardware.observations(),
+            checked=None if self.collisions is None else self.collisions.checked,
         )
 
     # ---- names and values ------------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
+from armwright.program.vm.collisions import check_late_stage, checked_stages
 from armwright.program.vm.contact import (
     contact_report,
     record_contact,
@@ -52,7 +53,8 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     machine.claim_arm(process, arm, step.span, moved)
     _require_idle_arm(machine, process, arm, step.span)
     machine.state.idle_steps += _STEPS_PER_MOVE
-    stages = _plan_stages(machine, process, request, arm, moved)
+    planned = _plan_stages(machine, process, request, arm, moved)
+    stages = checked_stages(machine, process, request, arm, planned)
     spelled = machine.spelling(moved)
     subject = arm if moved == arm else f"{arm} [{spelled}]"
     speed_text = f"@{request.speed:g}" if request.duration is None else f"in {request.duration:g} s"
@@ -65,6 +67,7 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
         goal=machine.variable_name(process, request.begin.operands[1]) or request.form.goal,
         implied_affix=implied,
         stages=stages,
+        paths=tuple(stage.path for stage in stages if stage.path is not None),
         speed=request.speed,
         stack_depth=len(process.stack),
         start=machine.next_start(),
@@ -194,7 +197,7 @@ def _plan_stages(
     ]
     manner = Manner(speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
     try:
-        stages = plan(planning_arm(cell_arm.arm), machine.hardware.configuration(arm, machine.now), goals, manner)
+        stages = plan(planning_arm(cell_arm.arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except IncapableArmError as error:
@@ -270,7 +273,8 @@ def _unit_advice(machine: Machine, process: Process, goal: Goal, arm: str) -> tu
 
 def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     """Begin the next stage of a motion."""
-    (stage, goal_names), period = motion.stages.pop(0), machine.cell.period
+    check_late_stage(machine, process, motion)
+    (stage, goal_names, _, clearance, path), period = motion.stages.pop(0), machine.cell.period
     arm, trajectory = machine.cell.arms[motion.arm].arm, stage.trajectory
     ticks = round(trajectory.duration / period)
     # A run that lasts longer comes to its end before.
@@ -300,6 +304,8 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
             length=stage.length,
             peak_effort=peak,
             peak_time=when,
+            clearance=clearance,
+            path=path,
         )
     )
     run = TrajectorySegment(t0=machine.now, trajectory=trajectory, duration=trajectory.duration, tau=tau)

@@ -2,10 +2,16 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.errors import counted
 from armwright.motion.detour import Detour
 from armwright.motion.plan import Obstacle
+from armwright.physics.clearance import RESOLUTION
+from armwright.physics.collisions import LOOKED_FOR, Collision, StageClearance
+from armwright.physics.planner import PlannedPath
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm.recording import RunStage
 
@@ -71,6 +77,75 @@ def detour_advice(obstacle: Obstacle, kind: str, around: str | None) -> tuple[st
     return (f"no detour {_METHODS[around]} was found on which the whole MOVE is feasible; {other}",)
 
 
+def collision_message(collision: Collision, goal: str, arm: str) -> str:
+    """Return the message of an error: what an arm would run into on its path to a frame."""
+    own, other = collision.bodies
+    deep = f"{collision.depth * 1e3:.2g} mm deep"
+    if collision.at_start:
+        return f"`{goal}` cannot be reached by {arm}: {own} touches {other} before it moves, {deep}"
+    where = "after it has arrived" if collision.at_rest else f"{collision.fraction * 100:.0f} % of the way there"
+    meets = f"{other} would hit {own}" if collision.at_rest else f"{own} would hit {other}"
+    if collision.depth <= 0:
+        near = f"nearer than {RESOLUTION * 1e3:g} mm, which counts as a hit"
+        return f"`{goal}` cannot be reached by {arm} on this path: {own} would come to {other} {where}, {near}"
+    return f"`{goal}` cannot be reached by {arm} on this path: {meets} {where}, {deep}"
+
+
+def collision_location(collision: Collision) -> list[str]:
+    """Return where in the world and when an arm would run into something, and what is known of the solids."""
+    own, other = collision.bodies
+    when = "" if collision.at_start else f", {collision.time:.3f} s after this MOVE begins"
+    notes = [f"at {_position(collision.place)} mm in the world{when}"]
+    if collision.guessed:
+        notes.append(f"the shape of {own} or {other} is a guess: the arm file has no exact solid of it")
+    return notes
+
+
+def collision_advice(collision: Collision, arm: str) -> list[str]:
+    """Return what may help against a collision."""
+    own, other = collision.bodies
+    if collision.at_start:
+        return [f"start {arm} where {own} and {other} are apart, or correct their poses and sizes in the cell"]
+    if collision.other_arm is not None:
+        return [f"let the arms take turns: WAIT for an EVENT that tells that {collision.other_arm} is out of the way"]
+    come, leave = "come from above `WITH APPROACH`", "leave `WITH DEPARTURE`"
+    return [f"{come}, {leave}, or go another way by `VIA`; another configuration at the start may help too"]
+
+
+def clearance_text(clearance: StageClearance) -> str:
+    """Return how near a stage comes to other bodies."""
+    if clearance.distance is None:
+        return f"no other body within {LOOKED_FOR * 1e3:g} mm"
+    own, other = clearance.bodies
+    return f"least distance {clearance.distance * 1e3:.1f} mm, {own} and {other} after {clearance.time:.3f} s"
+
+
+def clearance_warning(run: RunStage, wanted: float) -> Diagnostic | None:
+    """Return the warning about a stage that comes nearer to other bodies than is wanted [m]; None where it does not."""
+    clearance = run.clearance
+    if clearance is None or clearance.distance is None or clearance.distance >= wanted:
+        return None
+    own, other = clearance.bodies
+    place = np.array(clearance.place)
+    return Diagnostic(
+        code="W404",
+        severity=Severity.WARNING,
+        message=f"{own} of {run.arm} comes within {clearance.distance * 1e3:.1f} mm of {other} on the way to "
+        f"`{run.goal_names[-1]}`",
+        span=run.span,
+        label=f"at {run.t0 + clearance.time:.3f} s; the cell wants {wanted * 1e3:g} mm",
+        notes=(f"at {_position(place)} mm in the world",),
+        helps=("a path farther away, by VIA, or a smaller `clearance_mm` under [motion] of the cell",),
+    )
+
+
+def path_text(path: PlannedPath) -> str:
+    """Return how a path past other bodies was planned."""
+    corners = len(path.waypoints) - 2
+    by = f"by {counted(corners, 'rounded corner')}" if corners else "straight to another configuration"
+    return f"a path past other bodies was planned {by}, with {counted(path.checked, 'checked configuration')}"
+
+
 def _detour_course(detour: Detour, arm: str) -> str:
     """Return the course of a detour."""
     if detour.via is None:
@@ -82,6 +157,8 @@ def stage_note(run: RunStage) -> str:
     """Return what a report has to say beside a stage: where it was stopped, its detour, why it is slow."""
     stage, where = run.stage, _stage_obstacle(run)
     notes = [stage.slowed] if stage.slowed else []
+    if run.path is not None:
+        notes.append(path_text(run.path))
     if run.stopped:
         notes.append(
             f"stopped on its path, after {run.duration:.3f} s and {run.length * 1e3:.1f} mm "
@@ -94,6 +171,8 @@ def stage_note(run: RunStage) -> str:
         notes.append(f"without stops the path is infeasible at {where}")
     if stage.certificate is not None:
         notes.append(stage.certificate.summary)
+    if run.clearance is not None:
+        notes.append(clearance_text(run.clearance))
     return "; ".join(notes)
 
 

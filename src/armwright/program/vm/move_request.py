@@ -112,6 +112,11 @@ def _clause_value(machine: Machine, process: Process, part: Instruction) -> floa
 
 def _guard(machine: Machine, part: Instruction) -> Guard:
     condition, action = jump_target(part, 0), jump_target(part, 2)
-    steps = takewhile(lambda step: step.op is not Op.RET, machine.code.instructions[condition:])
-    reads_pose = any(step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV) for step in steps)
-    return Guard(condition=condition, result=str(part.operands[1]), action=action, reads_pose=reads_pose)
+    ops = {step.op for step in takewhile(lambda step: step.op is not Op.RET, machine.code.instructions[condition:])}
+    return Guard(
+        condition=condition,
+        result=str(part.operands[1]),
+        action=action,
+        reads_pose=not ops.isdisjoint((Op.DIST, Op.COPY, Op.MUL, Op.INV)),
+        reads_force=Op.FORCE in ops,
+    )

@@ -1,7 +1,7 @@
 """What a running program consists of: processes, the procedures they are in, the motions they make."""
 
 import enum
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import attrs
 import numpy as np
@@ -10,6 +10,8 @@ from armwright.arrays import Array
 from armwright.cell.hardware import PeakContact
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
+from armwright.physics.collisions import Collision, StageClearance
+from armwright.physics.planner import PlannedPath
 from armwright.program.language.source import Span
 from armwright.program.vm.recording import TimedKind
 
@@ -98,6 +100,7 @@ class Guard:
         result: the value in passing that it leaves.
         action: first instruction of the action.
         reads_pose: whether the condition checks poses, and not only at forces and numbers.
+        reads_force: whether it checks forces.
         triggered: whether the action has been begun.
     """
 
@@ -105,7 +108,40 @@ class Guard:
     result: str
     action: int
     reads_pose: bool
+    reads_force: bool = False
     triggered: bool = False
+
+
+class PendingStage(NamedTuple):
+    """A stage of a MOVE that has not begun.
+
+    Attributes:
+        planned: the stage.
+        goal_names: the frames it goes to, as the program spells them.
+        start_tick: when it is to begin [ticks].
+        clearance: how near it comes to other bodies; None where that is not looked at.
+        path: that was planned past other bodies; None where the straight one of the joints was free.
+    """
+
+    planned: PlannedStage
+    goal_names: tuple[str, ...]
+    start_tick: int
+    clearance: StageClearance | None = None
+    path: PlannedPath | None = None
+
+
+class Threat(NamedTuple):
+    """What a MOVE under way would run into, because another arm was stopped.
+
+    Attributes:
+        tick: when that was [ticks].
+        collision: what would happen.
+        stopped: the other arm.
+    """
+
+    tick: int
+    collision: Collision
+    stopped: str
 
 
 class EarlyEnd(enum.StrEnum):
@@ -127,7 +163,7 @@ class Motion:
         goal: the frame to come to, or the expression of it.
         implied_affix: whether what is moved hangs on the arm only since this MOVE.
         text: what the trace says of it.
-        stages: what is still to do after the present stage, with the names of where they lead.
+        stages: what is still to do after the present stage.
         speed: as asked for.
         stack_depth: how many activations its process had when it began; those after them belong to its actions.
         start: when the MOVE began.
@@ -138,8 +174,10 @@ class Motion:
         stage_index: number of the present stage among those recorded.
         rest_tick: when the arm is at rest [ticks], once it is being stopped; None before.
         alarm_tick: when the arm presses deeper than the cell allows [ticks] if it continues; None if it never does.
+        threat: what it would run into, because another arm was stopped; None where that is not so.
         first_contact: the trajectory of a stage that comes into contact, and when on it [s]; None before.
         deepest_contact: the deepest contact so far.
+        paths: the paths past other bodies that were planned for its stages.
         early_end: what ended it before its goal; None where nothing did.
     """
 
@@ -150,7 +188,7 @@ class Motion:
     goal: str
     implied_affix: bool
     text: str
-    stages: list[tuple[PlannedStage, tuple[str, ...]]]
+    stages: list[PendingStage]
     speed: float
     stack_depth: int
     start: StartTime
@@ -161,8 +199,10 @@ class Motion:
     stage_index: int = -1
     rest_tick: int | None = None
     alarm_tick: int | None = None
+    threat: Threat | None = None
     first_contact: tuple[Trajectory, float] | None = None
     deepest_contact: PeakContact = attrs.field(factory=lambda: PeakContact(0.0, 0.0))
+    paths: tuple[PlannedPath, ...] = ()
     early_end: "EarlyEnd | None" = None
 
     @property
@@ -173,7 +213,14 @@ class Motion:
     @property
     def event_data(self) -> dict[str, object]:
         """Further facts for the events."""
-        data = {"moved": self.moved, "goal": self.goal, "speed": self.speed, "implied_affix": self.implied_affix}
+        data: dict[str, object] = {
+            "moved": self.moved,
+            "goal": self.goal,
+            "speed": self.speed,
+            "implied_affix": self.implied_affix,
+        }
+        if self.paths:
+            data["planned_paths"] = [path.as_data() for path in self.paths]
         return data if self.early_end is None else {**data, self.early_end.value: True}
 
 
@@ -261,9 +308,10 @@ class Process:
     @property
     def due_tick(self) -> int | None:
         """When it is served next [ticks], or its arm has to be stopped; None where it waits for others."""
-        alarm = None if self.motion is None else self.motion.alarm_tick
-        wake = None if self.waiting is not None else self.wake_tick
-        return min((tick for tick in (alarm, wake) if tick is not None), default=None)
+        motion, wake = self.motion, None if self.waiting is not None else self.wake_tick
+        alarm = None if motion is None else motion.alarm_tick
+        threat = None if motion is None or motion.threat is None else motion.threat.tick
+        return min((tick for tick in (alarm, threat, wake) if tick is not None), default=None)
 
     @property
     def title(self) -> str:

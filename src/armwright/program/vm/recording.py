@@ -11,11 +11,15 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell, CellArm
+from armwright.cell.observations import MeasuredStream, Observations, Picture
+from armwright.cell.part_poses import PartTrack
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.motion.efforts import without_rounding
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
+from armwright.physics.collisions import CheckedBodies, StageClearance
+from armwright.physics.planner import PlannedPath
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Span
@@ -78,6 +82,8 @@ class RunStage:
             [N].
         peak_time: (n,) when, since it began [s].
         stopped: whether it was stopped on its path.
+        clearance: how near it was to come to other bodies; None where that is not looked at.
+        path: that was planned past other bodies; None where the straight one of the joints was free.
     """
 
     t0: float
@@ -91,6 +97,8 @@ class RunStage:
     peak_effort: Array
     peak_time: Array
     stopped: bool = False
+    clearance: StageClearance | None = None
+    path: PlannedPath | None = None
 
     @property
     def duration(self) -> float:
@@ -189,6 +197,8 @@ class Recording:
         trees: the frame tree at the start and after each change, with the time of the change [s]; of very many
             changes the last in every two-thousandth of the run.
         configurations: by arm, the configuration (n,) at the end.
+        observations: what the cell left beside: where its parts were, measurements and pictures.
+        checked: what was looked at for collisions; None where nothing was, because the cell has nothing to run into.
         failure: why it did not come to its end; None where it did.
     """
 
@@ -200,7 +210,24 @@ class Recording:
     streams: tuple[Stream, ...]
     trees: tuple[tuple[float, FrameTree], ...]
     configurations: Mapping[str, Array]
+    observations: Observations = attrs.field(factory=Observations)
+    checked: CheckedBodies | None = None
     failure: Failure | None = None
+
+    @property
+    def parts(self) -> Mapping[str, PartTrack]:
+        """Where each part of the cell was, by name."""
+        return self.observations.parts
+
+    @property
+    def measured(self) -> tuple[MeasuredStream, ...]:
+        """What the servos measured, one stream per arm; none of a cell without physics."""
+        return self.observations.measured
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """The pictures that cameras took, in order."""
+        return self.observations.pictures
 
     @property
     def processes(self) -> tuple[str, ...]:
@@ -324,20 +351,41 @@ def motion_csv_lines(streams: Iterable[Stream], sampled: slice = slice(None)) ->
         streams: one per arm.
         sampled: which ticks of each.
     """
-    streams = tuple(streams)
-    joints = max((s.q.shape[1] for s in streams), default=0)
-    columns = [f"{quantity}{i + 1}" for quantity in ("q", "qd", "qdd", "tau") for i in range(joints)]
-    yield ",".join(["t", "arm", *columns]) + "\n"
-    for s in streams:
-        n = s.q.shape[1]
+    tables = [(s.arm, s.t, {"q": s.q, "qd": s.qd, "qdd": s.qdd, "tau": s.tau}) for s in streams]
+    return _csv_lines(tables, sampled)
+
+
+def measured_csv_lines(streams: Iterable[MeasuredStream], sampled: slice = slice(None)) -> Iterable[str]:
+    """Give the lines of measured.csv: time, arm, per joint position, speed, effort and where it was sent, the opening.
+
+    Args:
+        streams: one per arm.
+        sampled: which ticks of each.
+    """
+    tables = [(s.arm, s.t, {"q": s.q, "qd": s.qd, "tau": s.tau, "sent": s.sent}, s.opening) for s in streams]
+    return _csv_lines(tables, sampled)
+
+
+def _csv_lines(
+    streams: Sequence[tuple[str, Array, Mapping[str, Array]] | tuple[str, Array, Mapping[str, Array], Array]],
+    sampled: slice,
+) -> Iterator[str]:
+    """Give the lines of a table of arms: their names, times (k,), tables (k, n) by quantity, and openings (k,)."""
+    joints = max((table.shape[1] for stream in streams for table in stream[2].values()), default=0)
+    quantities = list(streams[0][2]) if streams else []
+    openings = ["opening"] if streams and len(streams[0]) > 3 else []
+    columns = [f"{quantity}{i + 1}" for quantity in quantities for i in range(joints)]
+    yield ",".join(["t", "arm", *columns, *openings]) + "\n"
+    for arm, t, tables, *opening in streams:
+        n = tables[quantities[0]].shape[1]
         # Twelve digits hold a position to 1e-12, so that differences over a tick still show the speed.
-        blank = "," * (joints - n)
-        cell = ",".join(["%.12g"] * n) + blank
-        line = f"%.12g,{s.arm},{cell},{cell},{cell},{cell}\n"
-        first, end, _ = sampled.indices(len(s.t))
+        cell = ",".join(["%.12g"] * n) + "," * (joints - n)
+        line = ",".join(["%.12g", arm, *[cell] * len(tables), *["%.12g"] * len(opening)]) + "\n"
+        first, end, _ = sampled.indices(len(t))
         for part in _chunks(end - first):
             rows = slice(first + part.start, min(first + part.stop, end))
-            block = np.concatenate([s.t[rows, None], s.q[rows], s.qd[rows], s.qdd[rows], s.tau[rows]], axis=1)
+            singles = [column[rows, None] for column in opening]
+            block = np.concatenate([t[rows, None], *(table[rows] for table in tables.values()), *singles], axis=1)
             # Adding 0 turns -0 into 0, which reads better.
             yield from (line % tuple(row) for row in (block + 0.0).tolist())
 

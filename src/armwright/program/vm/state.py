@@ -17,10 +17,19 @@ from armwright.program.vm.recording import Effect, RunStage, ToolWrenches, Traje
 
 @attrs.define
 class Hand:
-    """The fingers of an arm: at which frame the gripper arrived last, and what they closed on."""
+    """The fingers of an arm: at which frame the gripper arrived last, and what they closed on.
+
+    Attributes:
+        reached_frame: where it arrived.
+        held_frame: what they closed on.
+        beside: the parts that they may touch: those that they went to, or let go.
+        pressed: whether a force ends, or ended, its latest MOVE, so that it may press on something.
+    """
 
     reached_frame: str | None = None
     held_frame: str | None = None
+    beside: frozenset[str] = frozenset()
+    pressed: bool = False
 
     def forget_frame(self, name: str) -> None:
         """Know nothing any more of a frame that there is no more."""

@@ -81,6 +81,7 @@ function readColours() {
     "green",
     "blue",
     "metal",
+    "fixture",
   ];
   colours = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   colours.arms = [0, 1, 2, 3].map((i) => style.getPropertyValue(`--arm${i}`).trim());

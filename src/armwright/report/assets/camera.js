@@ -63,25 +63,65 @@ function zoom(factor) {
   camera.distance = Math.min(Math.max(camera.distance * factor, 0.25 * scenery.size), 12 * scenery.size);
 }
 
-// Everything the hand, the arms and the frames ever touch, in points; and the size of it all.
+// How far a shape reaches from its origin.
+function reachOf(shape) {
+  if (shape.kind === "box") return length(shape.size) / 2;
+  if (shape.kind === "mesh") return Math.max(...triples(shape.vertices).map(length));
+  return Math.hypot(shape.radius, (shape.length ?? 0) / 2);
+}
+
+function extent(points) {
+  const low = [0, 1, 2].map((k) => points.reduce((least, p) => Math.min(least, p[k]), Infinity));
+  const high = [0, 1, 2].map((k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity));
+  return { low, high, size: Math.max(length(plus(high, low, -1)), 0.05) };
+}
+
+// The corners of the box about a body that stands.
+function boundsOf(shape, X) {
+  const half = shape.kind === "box" ? shape.size.map((v) => v / 2) : [0, 0, 0].fill(reachOf(shape));
+  const turn = shape.kind === "box" ? X : [1, 0, 0, 0, 1, 0, 0, 0, 1];
+  const signs = [-1, 1];
+  return signs.flatMap((x) =>
+    signs.flatMap((y) =>
+      signs.map((z) =>
+        plus(
+          plus(plus(X.slice(9), turn.slice(0, 3), x * half[0]), turn.slice(3, 6), y * half[1]),
+          turn.slice(6, 9),
+          z * half[2],
+        ),
+      ),
+    ),
+  );
+}
+
+// Everything the arms, the parts and the frames ever touch, in points; and the size of it all. Of what stands, no more
+// than is near: a hall would make the arms small.
 function surveyed() {
   const points = [[0, 0, 0]];
-  const animation = data.animation ?? { arms: {}, frames: [], t: [] };
+  const animation = data.animation ?? { arms: {}, frames: [], parts: [], fixtures: [], shapes: [], t: [] };
   const skip = Math.max(1, Math.floor(animation.t.length / 60));
-  for (const figure of Object.values(animation.arms)) {
-    figure.points.forEach((row, i) => {
-      if (i % skip === 0) points.push(...triples(row));
-    });
-  }
+  for (let i = 0; i < animation.t.length; i += skip)
+    for (const figure of Object.values(animation.arms))
+      for (const X of framesOf(figure, [i, i, 0])) points.push(X.slice(9));
   for (const frame of animation.frames) {
     frame.poses.forEach((row, i) => {
       if (i >= frame.visible_from && i % skip === 0) points.push(row.slice(9));
     });
   }
-  const low = [0, 1, 2].map((k) => Math.min(...points.map((p) => p[k])));
-  const high = [0, 1, 2].map((k) => Math.max(...points.map((p) => p[k])));
-  const size = Math.max(length(plus(high, low, -1)), 0.05);
-  return { points, low, high, size, middle: plus(low, plus(high, low, -1), 0.5) };
+  for (const part of animation.parts)
+    part.poses.forEach((X, i) => {
+      if (part.arms[i] === null) points.push(...boundsOf(animation.shapes[part.shape], X));
+    });
+  const near = extent(points);
+  const [least, most] = [near.low.map((v) => v - 0.4 * near.size), near.high.map((v) => v + 0.4 * near.size)];
+  let floor = 0;
+  for (const { shape, pose } of animation.fixtures)
+    for (const p of boundsOf(animation.shapes[shape], pose)) {
+      points.push(p.map((v, k) => Math.min(Math.max(v, least[k]), most[k])));
+      floor = Math.min(floor, p[2]);
+    }
+  const all = extent(points);
+  return { points, ...all, middle: plus(all.low, plus(all.high, all.low, -1), 0.5), floor };
 }
 
 const scenery = surveyed();

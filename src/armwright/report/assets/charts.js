@@ -3,7 +3,7 @@
 //   label, heading: for those who hear the page, and what stands above the chart
 //   span(), powers: lowest and highest value, and whether they are on a scale of powers of ten
 //   unitOfTime: SECONDS or MILLISECONDS
-//   lines(): the curves: times, values, colour and dash of each
+//   lines(): the curves: times, values, colour and dash of each, and its width and how opaque it is
 //   paint(ink, axes), below: what lies under the curves, and the room it takes below them [pixels]
 //   tipAt(t): what is said of an instant; nothing where there is nothing to say
 
@@ -83,11 +83,12 @@ function drawScales(ink, axes, unit) {
 
 // A line with gaps where there is nothing; on a scale of powers it comes from the foot and goes back there, so that a
 // single value is seen.
-function drawLine(ink, axes, { times, values, colour, dash = [] }) {
+function drawLine(ink, axes, { times, values, colour, dash = [], width = axes.powers ? 1.2 : 1.5, alpha = 1 }) {
   const foot = axes.y0 + axes.h;
   ink.setLineDash(dash);
   ink.strokeStyle = colour;
-  ink.lineWidth = axes.powers ? 1.2 : 1.5;
+  ink.lineWidth = width;
+  ink.globalAlpha = alpha;
   ink.lineJoin = "round";
   ink.beginPath();
   let last = null;
@@ -104,6 +105,7 @@ function drawLine(ink, axes, { times, values, colour, dash = [] }) {
     last = x;
   });
   ink.stroke();
+  ink.globalAlpha = 1;
   ink.setLineDash([]);
 }
 

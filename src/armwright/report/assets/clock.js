@@ -60,7 +60,8 @@ function startClock({ paces, pace, step, leap, redraw, watched }) {
     now.rate = Number(event.target.value);
   });
   document.addEventListener("keydown", (event) => onKey(event, step, leap));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  // Paper is white, whatever the screen is.
+  for (const medium of ["(prefers-color-scheme: dark)", "print"]) matchMedia(medium).addEventListener("change", redraw);
   const watcher = new ResizeObserver(redraw);
   for (const element of watched) watcher.observe(element);
 }

@@ -9,13 +9,23 @@ function largest(rows, j) {
   return rows.reduce((most, row) => Math.max(most, Math.abs(row[j])), 0);
 }
 
-// What is drawn of one joint: its curve and its limits in the scale of the chart.
-function curveOf(quantity, arm, j) {
-  const [joint, rows] = [arm.joints[j], arm[quantity.key]];
-  if (scale !== "all") {
+// Rows over time: planned ones, or measured ones where they are asked for or nothing else is known.
+function rowsOf(quantity, arm, measured = quantity === TRACKING) {
+  const source = measured ? arm.measured : arm;
+  return { times: source?.t, rows: source?.[quantity.key] };
+}
+
+// What is drawn of one joint: its curve and its limits in the scale of the chart, measured values in that of planned.
+function curveOf(quantity, arm, j, measured) {
+  const joint = arm.joints[j];
+  const { times, rows } = rowsOf(quantity, arm, measured);
+  return { j, times, measured, ...scaledValues(quantity, arm, joint, j, rows) };
+}
+
+function scaledValues(quantity, arm, joint, j, rows) {
+  if (scale !== "all" || quantity === TRACKING) {
     const factor = unitFactor(quantity, joint);
     return {
-      j,
       values: rows.map((row) => row[j] * factor),
       limits: limitsOf(quantity, joint)
         .filter((v) => v !== null)
@@ -23,15 +33,15 @@ function curveOf(quantity, arm, j) {
     };
   }
   if (share(quantity, joint, 0) !== null)
-    return { j, values: rows.map((row) => 100 * share(quantity, joint, row[j])), limits: [-100, 100] };
-  const most = largest(rows, j) || 1;
-  return { j, values: rows.map((row) => (100 * row[j]) / most), limits: [], free: true };
+    return { values: rows.map((row) => 100 * share(quantity, joint, row[j])), limits: [-100, 100] };
+  const most = largest(rowsOf(quantity, arm).rows, j) || 1;
+  return { values: rows.map((row) => (100 * row[j]) / most), limits: [], free: true };
 }
 
-function spanOf(curves) {
+function spanOf(quantity, curves) {
   const values = curves.flatMap((curve) => curve.values);
   let [low, high] = values.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [0, 0]);
-  if (scale === "all") return [Math.min(low, -100) * 1.08, Math.max(high, 100) * 1.22];
+  if (scale === "all" && quantity !== TRACKING) return [Math.min(low, -100) * 1.08, Math.max(high, 100) * 1.22];
   // A limit far away would press the curve flat; it is named above the chart instead.
   const reach = Math.max(-low, high) || 1;
   for (const limit of curves.flatMap((curve) => curve.limits)) {
@@ -43,11 +53,10 @@ function spanOf(curves) {
 
 function curvesOf(quantity) {
   const arm = chosenArm();
-  if (!arm[quantity.key]) return [];
-  return arm.joints
-    .map((_, j) => j)
-    .filter((j) => (scale === "all" ? !hidden.has(j) : j === scale))
-    .map((j) => curveOf(quantity, arm, j));
+  const chosen = arm.joints.map((_, j) => j).filter((j) => (scale === "all" ? !hidden.has(j) : j === scale));
+  return [false, true].flatMap((measured) =>
+    rowsOf(quantity, arm, measured).rows ? chosen.map((j) => curveOf(quantity, arm, j, measured)) : [],
+  );
 }
 
 function drawBorders(ink, axes) {
@@ -71,7 +80,18 @@ function drawLimits(ink, axes, curves) {
   }
 }
 
+function worstText(arm, j) {
+  const { worst, worst_t } = arm.measured;
+  return `${quantityText(TRACKING, arm.joints[j], worst[j])} at ${number(worst_t[j], 2)} s`;
+}
+
 function headOf(quantity) {
+  if (quantity === TRACKING) {
+    const arm = chosenArm();
+    const units = [...new Set(arm.joints.map((joint) => TRACKING.units[joint.kind]))].join(", ");
+    if (!arm.measured) return "";
+    return scale === "all" ? units : `${TRACKING.units[arm.joints[scale].kind]} · largest ${worstText(arm, scale)}`;
+  }
   if (scale === "all") return "% of limit";
   const joint = chosenArm().joints[scale];
   const limits = limitsOf(quantity, joint).map((limit) =>
@@ -81,17 +101,20 @@ function headOf(quantity) {
   return `${quantity.units[joint.kind]} · limit ${said}`;
 }
 
-function tipLine(quantity, j, place) {
+function tipLine(quantity, j, t) {
   const [arm, joint] = [chosenArm(), chosenArm().joints[j]];
-  const value = blend(arm[quantity.key], place)[j];
+  const valueAt = ({ times, rows }) => (rows ? blend(rows, locate(times, t))[j] : null);
+  const [value, measured] = [valueAt(rowsOf(quantity, arm)), valueAt(rowsOf(quantity, arm, true))];
   const part = share(quantity, joint, value);
+  const texts = [value, ...(measured === null || quantity === TRACKING ? [] : [measured])];
+  const said = quantity === TRACKING ? "" : part === null ? "no limit" : `${number(100 * part, 0)} %`;
   return make(
     "div",
     {},
     swatch(j),
     joint.name,
-    make("em", { textContent: quantityText(quantity, joint, value) }),
-    make("small", { textContent: part === null ? "no limit" : `${number(100 * part, 0)} %` }),
+    make("em", { textContent: texts.map((one) => quantityText(quantity, joint, one)).join(" · ") }),
+    make("small", { textContent: said }),
   );
 }
 
@@ -107,22 +130,28 @@ function jointChart(quantity) {
       curves = curvesOf(quantity);
       head.textContent = headOf(quantity);
     },
-    span: () => spanOf(curves),
+    span: () => spanOf(quantity, curves),
     paint: (ink, axes) => {
       drawBorders(ink, axes);
       drawLimits(ink, axes, curves);
     },
     lines: () =>
-      curves.map(({ j, values, free }) => ({
-        times: chosenArm().t,
+      curves.map(({ j, times, values, free, measured }) => ({
+        times,
         values,
         colour: colours.hues[j % HUES],
-        dash: free ? [2, 3] : [],
+        dash: free && !measured ? [2, 3] : [],
+        // Beside a measured curve the planned one is broad and pale, so that both are seen where they are one.
+        ...(chosenArm().measured?.[quantity.key] && !measured ? { width: 4.5, alpha: 0.35 } : {}),
       })),
     tipAt: (t) => {
       if (!chosenArm().t.length) return [];
-      const place = locate(chosenArm().t, t);
-      return [make("b", { textContent: `${number(t, 2)} s` }), ...curves.map(({ j }) => tipLine(quantity, j, place))];
+      const both = quantity !== TRACKING && rowsOf(quantity, chosenArm(), true).rows;
+      const drawn = [...new Set(curves.map(({ j }) => j))];
+      return [
+        make("b", { textContent: `${number(t, 2)} s${both ? ", planned · measured" : ""}` }),
+        ...drawn.map((j) => tipLine(quantity, j, t)),
+      ];
     },
   };
 }
@@ -131,7 +160,7 @@ function jointChart(quantity) {
 function chooseCurves() {
   for (const chart of charts) {
     chart.choose();
-    chart.card.hidden = !chosenArm()[chart.quantity.key];
+    chart.card.hidden = !rowsOf(chart.quantity, chosenArm()).rows;
   }
   drawCharts();
 }
@@ -165,7 +194,9 @@ function chooseArmInCharts() {
 function startJointCharts() {
   byId("charts-card").hidden = !data.arms.length;
   if (!data.arms.length) return;
-  startCharts(QUANTITIES.map(jointChart));
+  const measured = data.arms.some((arm) => arm.measured);
+  byId("planned-and-measured").hidden = !measured;
+  startCharts([...QUANTITIES, ...(measured ? [TRACKING] : [])].map(jointChart));
   byId("scale").addEventListener("change", (event) => {
     scale = event.target.value === "all" ? "all" : Number(event.target.value);
     makeLegend();

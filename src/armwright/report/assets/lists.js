@@ -132,6 +132,20 @@ function peakCell(stage, peaks, quantity) {
   );
 }
 
+// How near other bodies came: the distance, both names, and when; a click goes there.
+function clearanceCell({ clearance }) {
+  if (!clearance) return make("td", { textContent: "–", className: "quiet" });
+  const { distance, bound, bodies, t } = clearance;
+  if (distance === null) return make("td", { textContent: `above ${number(bound * MILLIMETRES, 0)} mm` });
+  const link = make("button", { type: "button", textContent: `${number(distance * MILLIMETRES, 1)} mm` });
+  link.addEventListener("click", (event) => {
+    event.stopPropagation();
+    seek(t);
+  });
+  const said = make("span", { className: "quiet", textContent: `${bodies.join(" – ")}, ${number(t, 2)} s` });
+  return make("td", { className: distance < data.clearance || distance <= 0 ? "over near" : "near" }, link, said);
+}
+
 function stageRow(stage, i) {
   const swatch = make("span", { className: "swatch" });
   swatch.style.setProperty("--hue", `var(${hue(i)})`);
@@ -151,6 +165,7 @@ function stageRow(stage, i) {
     numeric(millimetres(stage.deviation)),
     peakCell(stage, stage.peak_speed, QUANTITIES[1]),
     peakCell(stage, stage.peak_effort, QUANTITIES[3]),
+    ...(hasClearances ? [clearanceCell(stage)] : []),
     make("td", { textContent: stage.note }),
   );
   row.addEventListener("click", () => {
@@ -174,7 +189,10 @@ function stripMark(stage, i) {
   return mark;
 }
 
+const hasClearances = data.stages.some((stage) => stage.clearance);
+
 function fillStages() {
+  byId("clearance-head").hidden = !hasClearances;
   byId("stages-card").hidden = !data.stages.length;
   byId("stages").append(...data.stages.map(stageRow));
   if (data.duration > 0) byId("strip").append(...data.stages.map(stripMark));
@@ -225,6 +243,6 @@ function showTree() {
   }
   for (const [name, figure] of Object.entries(data.animation.arms)) {
     const place = tree.places.get(name);
-    if (place) place.textContent = placeText(blend(figure.points, at).slice(-3));
+    if (place) place.textContent = placeText(framesOf(figure, at).at(-1).slice(9));
   }
 }

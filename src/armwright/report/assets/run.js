@@ -58,7 +58,7 @@ function showReadout() {
   });
   const figure = data.animation?.arms[arm.name];
   const parts = [["hand", `${placeText(blend(arm.hand, place))} mm`]];
-  if (figure) parts.push(["gripper", gripText(figure.grip[locate(data.animation.t, now.t)[0]])]);
+  if (figure) parts.push(["gripper", gripText(gripOf(figure, locate(data.animation.t, now.t)))]);
   byId("hand").replaceChildren(
     ...parts.map(([name, text]) => make("div", {}, make("span", { textContent: name }), text)),
   );
@@ -121,10 +121,11 @@ function start() {
   fillProgram();
   fillTrace();
   fillStages();
+  fillPictures();
   byId("tree-card").hidden = !tree.changes.length;
   startView();
   startJointCharts();
-  listeners.push(showClock, showProgram, showStages, showReadout, drawView);
+  listeners.push(showClock, showProgram, showStages, showPictures, showReadout, drawView);
   if (tree.changes.length) listeners.push(showTree);
   fillArms();
   startClock({
@@ -141,6 +142,8 @@ function start() {
 // What a test, or a curious reader at the console, may ask.
 window.armwright = {
   seek,
+  bodies: () => bodiesAt(now.t).bodies,
+  labels: () => labelBoxes.map(({ x, y, wide }) => ({ x, y, wide, high: LABEL_HEIGHT })),
   state: () => {
     const arm = chosenArm();
     const place = arm && presentRow(arm);

@@ -3,11 +3,10 @@
 function unpack() {
   for (const arm of data.arms) {
     for (const key of ["q", "qd", "qdd", "tau", "hand"]) arm[key] = expand(arm[key]);
+    for (const key of ["q", "qd", "tau", "error"]) if (arm.measured) arm.measured[key] = expand(arm.measured[key]);
   }
   if (!data.animation) return;
-  for (const figure of Object.values(data.animation.arms)) {
-    for (const key of ["points", "hand_axes", "joint_axes"]) figure[key] = expand(figure[key]);
-  }
+  for (const figure of Object.values(data.animation.arms)) figure.q = expand(figure.q);
   for (const frame of data.animation.frames) frame.poses = expand(frame.poses);
 }
 unpack();
@@ -42,14 +41,18 @@ const QUANTITIES = [
   { key: "qdd", title: "Acceleration", limit: "acceleration", units: { revolute: "°/s²", prismatic: "mm/s²" } },
   { key: "tau", title: "Effort", limit: "effort", units: { revolute: "N m", prismatic: "N" } },
 ];
+// Measured less planned; it has no limit.
+const TRACKING = { key: "error", title: "Tracking error", units: { revolute: "mrad", prismatic: "mm" } };
 
 function unitFactor(quantity, joint) {
+  if (quantity === TRACKING) return 1000;
   if (quantity.key === "tau") return 1;
   return joint.kind === "revolute" ? DEGREES : MILLIMETRES;
 }
 
 // Lowest and highest value allowed, null where there is no limit.
 function limitsOf(quantity, joint) {
+  if (quantity === TRACKING) return [null, null];
   if (quantity.key === "q") return [joint.lower, joint.upper];
   const most = joint[quantity.limit];
   return [most === null ? null : -most, most];

@@ -1,6 +1,6 @@
-// The three-dimensional view: floor, frames, paths and arms, painted from the farthest to the nearest.
+// The three-dimensional view: floor, bodies with their shadows, frames, paths and names.
 
-let labels = [];
+let pen = null;
 
 // The way of a hand in pieces that know their stage; standing still leaves no piece.
 function coloredPath(arm) {
@@ -24,167 +24,154 @@ function armColour(i) {
   return colours.arms[i % colours.arms.length];
 }
 
-function shadow(points, radius) {
-  if (lens.eye[2] <= 0) return;
-  pen.lineCap = pen.lineJoin = "round";
-  pen.strokeStyle = colours.shadow;
-  pen.lineWidth = 2 * radius * project(points[0]).scale;
+function tintOf({ name, tint, whose }) {
+  if (tint === "part") return mixed(colours.hues[whose % HUES], colours.metal, 0.15);
+  if (tint === "fixture") return mixed(colours.fixture, colours.quiet, name === "TABLE" ? 0 : 0.22);
+  if (tint === "joint") return armColour(whose);
+  if (tint === "base") return mixed(colours.metal, colours.quiet, 0.3);
+  return mixed(colours.metal, armColour(whose), data.arms.length > 1 ? 0.18 : 0);
+}
+
+// Shadows fall on the floor and on the largest boxes that stand upright.
+const MOST_TOPS = 6;
+
+function topsOfBoxes() {
+  const { shapes, fixtures } = data.animation;
+  const areaOf = ({ shape }) => shapes[shape].size[0] * shapes[shape].size[1];
+  const tops = fixtures
+    .filter(({ shape, pose }) => shapes[shape].kind === "box" && Math.abs(pose[8]) > 0.9999)
+    .sort((a, b) => areaOf(b) - areaOf(a))
+    .slice(0, MOST_TOPS)
+    .map(({ name, shape, pose }) => ({ name, height: pose[11] + shapes[shape].size[2] / 2 }));
+  return [...tops, { name: null, height: scenery.floor }];
+}
+
+function paintBodies(bodies, tops) {
+  const ownerOf = ({ name, tint }) => (tint === "fixture" ? tops.findIndex((top) => top.name === name) + 1 : 0);
+  const corners = bodies.map(({ shape, pose }) => cornersOf(meshes[shape], pose));
+  bodies.forEach((body, i) => {
+    paintMesh(meshes[body.shape], corners[i], body.pose, tintOf(body), ownerOf(body));
+  });
+  tops.forEach(({ name, height }, k) => {
+    if (lens.eye[2] <= height) return;
+    bodies.forEach(({ shape }, i) => {
+      paintShadow(meshes[shape], corners[i], height, name === null ? FLOOR : k + 1);
+    });
+  });
+}
+
+function paintSolids(bodies, width, height) {
+  const tops = topsOfBoxes();
+  const stands = ({ tint }) => tint === "fixture";
+  sizeSurface(width, height);
+  const key = JSON.stringify([camera, surface.wide, surface.high, colours.fixture, colours.quiet]);
+  paintStanding(key, () => paintBodies(bodies.filter(stands), tops));
+  paintBodies(
+    bodies.filter((body) => !stands(body)),
+    tops,
+  );
+  showSurface(width, height);
+}
+
+function stroke(a, b, colour, width, alpha = 1) {
+  if (Math.min(a.depth, b.depth) < 0.03 * camera.distance) return;
+  pen.globalAlpha = alpha;
+  pen.strokeStyle = colour;
+  pen.lineWidth = width;
   pen.beginPath();
-  for (const point of points) {
-    const p = project([point[0], point[1], 0]);
-    pen.lineTo(p.x, p.y);
-  }
+  pen.moveTo(a.x, a.y);
+  pen.lineTo(b.x, b.y);
   pen.stroke();
+  pen.globalAlpha = 1;
 }
 
-// The pieces of a skeleton that have a length, each with its radius.
-function bones(points, radii) {
-  const thick = scenery.size * 0.022;
-  const chosen = (k) => thick * (1 - (0.5 * k) / Math.max(points.length - 2, 1));
-  return points
-    .slice(1)
-    .map((to, k) => ({ from: points[k], to, radius: radii ? radii[k] : chosen(k) }))
-    .filter(({ from, to }) => length(plus(to, from, -1)) > 1e-6);
-}
-
-// The last bone ends at the palm, and a short one has a small gripper.
-function paintGripper(hand, axes, grip, last, colour) {
-  const room = last ? length(plus(last.to, last.from, -1)) : 0;
-  const slim = last?.radius ?? 0;
-  const wanted = Math.max(slim, 0.014 * scenery.size);
-  const radius = room > 4 * slim ? Math.min(wanted, 0.23 * room) : wanted;
-  const palm = gripper(hand, axes, grip, radius, colour);
-  if (room > 4 * radius) last.to = palm;
-}
-
-function paintArm(name, figure, i, place) {
-  const points = triples(blend(figure.points, place));
-  const skeleton = bones(points, figure.radii);
-  const [before, after, part] = place;
-  const grip = figure.grip[before] + part * (figure.grip[after] - figure.grip[before]);
-  const colour = armColour(i);
-  const hand = points.at(-1);
-  shadow(points, (skeleton.at(-1)?.radius ?? 0.01) * 1.3);
-  paintGripper(hand, blend(figure.hand_axes, place), grip, skeleton.at(-1), colour);
-  for (const { from, to, radius } of skeleton) cylinder(from, to, radius, colours.metal);
-  const radii = skeleton.map(({ radius }) => radius);
-  if (figure.joint_axes) paintDrums(blend(figure.joint_axes, place), radii, colour);
-  else
-    for (const { from, radius } of skeleton)
-      item(project(from).depth - radius, () => ball(project(from), 1.35 * radius, colour));
-  if (Object.keys(data.animation.arms).length > 1) labels.push({ p: project(points[0]), text: name, below: true });
-  return hand;
-}
-
-// Where wrist axes meet in one point the later drum is the smaller one.
-function paintDrums(rows, radii, colour) {
-  const count = rows.length / 6;
-  for (let k = 0; k < count; k++) {
-    const radius = radii[Math.floor((k * radii.length) / count)] ?? 0.02 * scenery.size;
-    drum(rows.slice(6 * k, 6 * k + 3), rows.slice(6 * k + 3, 6 * k + 6), (1.38 - 0.05 * k) * radius, colour);
-  }
+// A line whose pieces behind a body are faint: it stays visible there.
+function strokeBehind(a, b, colour, width, alpha = 1) {
+  const [from, to] = [project(a), project(b)];
+  const pieces = Math.min(40, Math.max(1, Math.ceil(Math.hypot(to.x - from.x, to.y - from.y) / 5)));
+  const point = (k) => project(plus(a, plus(b, a, -1), k / pieces));
+  pen.lineCap = pieces > 1 ? "butt" : "round";
+  for (let k = 0; k < pieces; k++)
+    stroke(point(k), point(k + 1), colour, width, isHidden(point(k + 0.5)) ? 0.28 * alpha : alpha);
 }
 
 function paintFrames(place) {
-  const arm = scenery.size * 0.055;
+  const long = scenery.size * 0.055;
   data.animation.frames.forEach((frame) => {
     if (place[0] < frame.visible_from && !(place[2] > 0 && place[1] >= frame.visible_from)) return;
     const at = place[0] < frame.visible_from ? [place[1], place[1], 0] : place;
     const [n, o, a, p] = triples(blend(frame.poses, at));
-    const root = project(p);
-    [
+    for (const [axis, colour] of [
       [n, colours.red],
       [o, colours.green],
       [a, colours.blue],
-    ].forEach(([axis, colour]) => {
-      const tip = project(plus(p, axis, arm));
-      item((root.depth + tip.depth) / 2 - arm / 2, () => {
-        pen.lineCap = "round";
-        stroke(root, tip, colour, 2.2);
-      });
-    });
-    labels.push({ p: root, text: frame.name });
+    ])
+      strokeBehind(p, plus(p, axis, long), colour, 2.2);
+    labels.push({ p: project(p), text: frame.name });
   });
 }
 
 function paintPath(pieces, shown) {
-  for (const piece of pieces) {
-    const [a, b] = [project(piece.a), project(piece.b)];
-    const colour = piece.stage < 0 ? colours.quiet : colours.hues[piece.stage % HUES];
-    const past = piece.t <= now.t;
-    const alpha = (past ? 0.95 : 0.5) * (shown ? 1 : 0.6);
-    item((a.depth + b.depth) / 2, () => {
-      pen.lineCap = "round";
-      stroke(a, b, colour, past ? 2.8 : 1.8, alpha);
-    });
-    // Once more above everything, faintly: the way stays visible behind an arm.
-    item(-1, () => stroke(a, b, colour, 1.4, 0.3 * alpha));
+  for (const { a, b, t, stage } of pieces) {
+    const colour = stage < 0 ? colours.quiet : colours.hues[stage % HUES];
+    const past = t <= now.t;
+    strokeBehind(a, b, colour, past ? 2.8 : 1.8, (past ? 0.95 : 0.5) * (shown ? 1 : 0.6));
   }
 }
 
 function paintFloor() {
   const step = roundStep(scenery.size, 9);
-  const [x0, y0, x1, y1] = [
-    ...scenery.low.slice(0, 2).map((v) => Math.floor(v / step) - 1),
-    ...scenery.high.slice(0, 2).map((v) => Math.ceil(v / step) + 1),
+  const [low, high] = [
+    scenery.low.slice(0, 2).map((v) => Math.floor(v / step) - 1),
+    scenery.high.slice(0, 2).map((v) => Math.ceil(v / step) + 1),
   ];
-  for (let x = x0; x <= x1; x++)
-    for (let y = y0; y < y1; y++)
-      stroke(project([x * step, y * step, 0]), project([x * step, (y + 1) * step, 0]), colours.floor, 1);
-  for (let y = y0; y <= y1; y++)
-    for (let x = x0; x < x1; x++)
-      stroke(project([x * step, y * step, 0]), project([(x + 1) * step, y * step, 0]), colours.floor, 1);
-  const origin = project([0, 0, 0]);
-  pen.font = "12px system-ui, sans-serif";
+  const at = (x, y) => project([x * step, y * step, scenery.floor]);
+  for (let x = low[0]; x <= high[0]; x++)
+    for (let y = low[1]; y < high[1]; y++) stroke(at(x, y), at(x, y + 1), colours.floor, 1);
+  for (let y = low[1]; y <= high[1]; y++)
+    for (let x = low[0]; x < high[0]; x++) stroke(at(x, y), at(x + 1, y), colours.floor, 1);
+  canvas.dataset.grid = `${number(step * MILLIMETRES, 0)} mm`;
+}
+
+function paintWorldAxes() {
+  const long = 1.6 * roundStep(scenery.size, 9);
+  pen.font = LABEL_FONT;
   [
     ["x", colours.red],
     ["y", colours.green],
     ["z", colours.blue],
   ].forEach(([name, colour], k) => {
-    const tip = project([0, 1, 2].map((i) => (i === k ? 1.6 * step : 0)));
-    stroke(origin, tip, colour, 1.6);
+    const end = [0, 1, 2].map((i) => (i === k ? long : 0));
+    strokeBehind([0, 0, 0], end, colour, 1.6);
+    const tip = project(end);
     pen.fillStyle = colour;
+    pen.globalAlpha = isHidden(tip) ? 0.4 : 1;
     pen.fillText(name, tip.x + 4, tip.y - 3);
+    pen.globalAlpha = 1;
   });
-  document.getElementById("view").dataset.grid = `${number(step * MILLIMETRES, 0)} mm`;
-}
-
-// Names that would lie on each other are joined.
-function paintLabels() {
-  const joined = [];
-  for (const label of labels) {
-    const near = joined.find(
-      (other) => other.below === label.below && Math.hypot(other.p.x - label.p.x, other.p.y - label.p.y) < 9,
-    );
-    if (near) near.text += `, ${label.text}`;
-    else joined.push({ ...label });
-  }
-  pen.font = "12px system-ui, sans-serif";
-  pen.lineJoin = "round";
-  pen.lineWidth = 3.5;
-  pen.strokeStyle = colours.sky;
-  for (const { p, text, below } of joined) {
-    const x = Math.min(Math.max(p.x + (below ? -18 : 7), 4), canvas.clientWidth - pen.measureText(text).width - 4);
-    const y = p.y + (below ? 24 : -5);
-    pen.strokeText(text, x, y);
-    pen.fillStyle = colours.ink;
-    pen.fillText(text, x, y);
-  }
-  pen.fillStyle = colours.quiet;
-  pen.fillText(`grid ${canvas.dataset.grid}`, 10, canvas.clientHeight - 10);
 }
 
 function paintHand(p) {
   const at = project(p);
-  item(at.depth - scenery.size, () => {
-    pen.beginPath();
-    pen.arc(at.x, at.y, 4, 0, 2 * Math.PI);
-    pen.fillStyle = colours.card;
-    pen.fill();
-    pen.lineWidth = 2;
-    pen.strokeStyle = colours.accent;
-    pen.stroke();
-  });
+  pen.beginPath();
+  pen.arc(at.x, at.y, 4, 0, 2 * Math.PI);
+  pen.globalAlpha = isHidden(at) ? 0.4 : 1;
+  pen.fillStyle = colours.card;
+  pen.fill();
+  pen.lineWidth = 2;
+  pen.strokeStyle = colours.accent;
+  pen.stroke();
+  pen.globalAlpha = 1;
+}
+
+// Frames, arms, parts and what stands are named, and nothing twice.
+function nameBodies(bodies, arms) {
+  const named = new Set(labels.map((label) => label.text.toUpperCase()));
+  for (const { name, pose, tint } of bodies)
+    if ((tint === "part" || (tint === "fixture" && name !== "TABLE")) && !named.has(name.toUpperCase()))
+      labels.push({ p: project(pose.slice(9)), text: name, quiet: tint === "fixture" });
+  if (arms.length > 1)
+    for (const [name, _, frames] of arms) labels.push({ p: project(frames[0].slice(9)), text: name, below: true });
 }
 
 function drawView() {
@@ -192,13 +179,17 @@ function drawView() {
   let width, height;
   [pen, width, height] = sharpen(canvas);
   lens = aim(width, height);
-  [items, labels] = [[], []];
-  const place = locate(data.animation.t, now.t);
+  labels = [];
+  const { place, bodies, arms } = bodiesAt(now.t);
   paintFloor();
+  paintSolids(bodies, width, height);
+  paintWorldAxes();
+  paths.forEach((pieces, i) => {
+    paintPath(pieces, i === now.arm);
+  });
   paintFrames(place);
-  paths.forEach((pieces, i) => paintPath(pieces, i === now.arm));
-  Object.entries(data.animation.arms).forEach(([name, figure], i) => paintHand(paintArm(name, figure, i, place)));
-  items.sort((a, b) => b.depth - a.depth).forEach(({ paint }) => paint());
+  for (const [_, __, frames] of arms) paintHand(frames.at(-1).slice(9));
+  nameBodies(bodies, arms);
   paintLabels();
 }
 

@@ -1,0 +1,166 @@
+"""Where the parts of a cell are believed to be: in the world, or on the hand of an arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, read_only
+from armwright.cell.model import Cell
+from armwright.cell.scene import Gripper
+from armwright.spatial.poses import inverse
+from armwright.spatial.shapes import Shape, support
+
+# Fingers hold a part that they close on from no other side than the one its grasp pose is for.
+_COS_MAX_TILT = np.cos(np.radians(45.0))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class PartTrack:
+    """Where one part was during a run.
+
+    Attributes:
+        times: from when on each of the following holds [s], from 0.
+        arms: the arm on whose hand the part is; None where it is in the world.
+        poses: (4, 4) of the part relative to that hand; in the world where no arm holds it.
+    """
+
+    times: tuple[float, ...]
+    arms: tuple[str | None, ...]
+    poses: tuple[Array, ...]
+
+    def at(self, time: float) -> tuple[str | None, Array]:
+        """Return the arm that holds the part at a time [s], or None, and its pose on that hand or in the world."""
+        index = max(int(np.searchsorted(self.times, time, side="right")) - 1, 0)
+        return self.arms[index], self.poses[index]
+
+
+class PartPoses:
+    """Where the parts of a cell are, and how far the grippers are open.
+
+    Fingers that close hold the part whose grasp pose is nearest to the tool, if it is no farther away than half the
+    opening of the gripper and its approach direction differs by no more than 45 degrees from that of the tool. The part
+    then moves with the hand, and stays where it is when they open.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        """Put the parts where the cell has them at the start, and open all grippers."""
+        self._cell = cell
+        self._tracks = {
+            name: PartTrack(times=(0.0,), arms=(None,), poses=(part.pose,)) for name, part in cell.parts.items()
+        }
+        self._openings = {name: _gripper(cell, name).opening for name in cell.arms}
+
+    def copy(self) -> PartPoses:
+        """Return the same state; changes of one of them do not change the other."""
+        other = PartPoses(self._cell)
+        other._tracks, other._openings = dict(self._tracks), dict(self._openings)
+        return other
+
+    @property
+    def tracks(self) -> Mapping[str, PartTrack]:
+        """Where each part has been so far, by name."""
+        return dict(self._tracks)
+
+    def carrier(self, part: str) -> str | None:
+        """Return the arm that holds a part; None where none does."""
+        return self._tracks[part].arms[-1]
+
+    def pose(self, part: str) -> Array:
+        """Return the pose (4, 4) of a part on the hand that holds it; in the world where none does."""
+        return self._tracks[part].poses[-1]
+
+    def in_world(self, part: str, hands: Mapping[str, Array]) -> Array:
+        """Return the pose (4, 4) of a part in the world.
+
+        Args:
+            part: its name.
+            hands: (4, 4) pose of each hand in the world.
+        """
+        arm = self.carrier(part)
+        return self.pose(part) if arm is None else hands[arm] @ self.pose(part)
+
+    def held_by(self, arm: str) -> tuple[str, ...]:
+        """Return the parts that an arm holds."""
+        return tuple(part for part in self._tracks if self.carrier(part) == arm)
+
+    def opening(self, arm: str) -> float:
+        """Return the distance between the fingers of an arm [m]."""
+        return self._openings[arm]
+
+    def graspable(self, arm: str, tool: Array, hands: Mapping[str, Array]) -> str | None:
+        """Return the part that the fingers of an arm would hold if they closed at a pose; None where there is none.
+
+        Args:
+            arm: its name.
+            tool: (4, 4) pose of its tool in the world.
+            hands: (4, 4) pose of each hand in the world.
+        """
+        within, nearest = _gripper(self._cell, arm).opening / 2, None
+        for name, part in self._cell.parts.items():
+            grasp = self.in_world(name, hands) @ part.grasp
+            distance = float(np.linalg.norm(grasp[:3, 3] - tool[:3, 3]))
+            if distance <= within and grasp[:3, 2] @ tool[:3, 2] >= _COS_MAX_TILT:
+                within, nearest = distance, name
+        return nearest
+
+    def close(self, arm: str, hands: Mapping[str, Array], now: float, width: float | None = None) -> str | None:
+        """Let the fingers of an arm close; return the part that they hold from now on, or None.
+
+        Args:
+            arm: its name.
+            hands: (4, 4) pose of each hand in the world.
+            now: the time [s].
+            width: to which they close where nothing is between them [m]; 0 when left out.
+        """
+        part = self.graspable(arm, hands[arm], hands)
+        self._openings[arm] = min(width or 0.0, _gripper(self._cell, arm).opening)
+        if part is not None:
+            X_HP = inverse(hands[arm]) @ self.in_world(part, hands)
+            self._put(part, arm, X_HP, now)
+            self._openings[arm] = _width_across(self._cell.parts[part].shape, X_HP)
+        return part
+
+    def open(self, arm: str, hands: Mapping[str, Array], now: float, width: float | None = None) -> tuple[str, ...]:
+        """Let the fingers of an arm open; return the parts that it has let go, which stay where they are.
+
+        Args:
+            arm: its name.
+            hands: (4, 4) pose of each hand in the world.
+            now: the time [s].
+            width: to which they open [m]; as far as they can when left out.
+        """
+        parts = self.held_by(arm)
+        for part in parts:
+            self._put(part, None, self.in_world(part, hands), now)
+        opening = _gripper(self._cell, arm).opening
+        self._openings[arm] = opening if width is None else min(width, opening)
+        return parts
+
+    def see(self, part: str, pose: Array, now: float) -> None:
+        """Take note that a part which no arm holds stands at a pose (4, 4) in the world."""
+        if self.carrier(part) is None:
+            self._put(part, None, pose, now)
+
+    def _put(self, part: str, arm: str | None, pose: Array, now: float) -> None:
+        track = self._tracks[part]
+        # Of the same moment the last counts.
+        kept = len(track.times) if track.times[-1] < now else len(track.times) - 1
+        self._tracks[part] = PartTrack(
+            times=(*track.times[:kept], now),
+            arms=(*track.arms[:kept], arm),
+            poses=(*track.poses[:kept], read_only(pose)),
+        )
+
+
+def _gripper(cell: Cell, arm: str) -> Gripper:
+    """Return the gripper of an arm; the usual one where nothing is known of it."""
+    return cell.arms[arm].gripper or Gripper()
+
+
+def _width_across(shape: Shape, X_HP: Array) -> float:
+    """Return how far apart the fingers are that hold a part: both are as far from the middle as its farther side."""
+    across = X_HP[:3, :3].T[:, 1]
+    return 2 * max(float(X_HP[1, 3]) + support(shape, across), support(shape, -across) - float(X_HP[1, 3]))

@@ -1,0 +1,97 @@
+"""What happened in a world, tick by tick."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.model import Cell
+from armwright.cell.observations import MeasuredStream
+from armwright.cell.part_poses import PartTrack
+from armwright.physics.servo import Measured, Reference
+from armwright.physics.world_model import WorldModel, part_pose
+
+# Rows that are taken together.
+_BLOCK = 1024
+# Poses of parts are kept so often [s].
+_PARTS = 0.02
+_STILL = 1e-5
+
+
+class Log:
+    """What is recorded of a world."""
+
+    def __init__(self, cell: Cell, world: WorldModel) -> None:
+        """Begin with nothing."""
+        self._cell, self._parts = cell, tuple(world.parts)
+        self._full: dict[str, tuple[Array, ...]] = dict.fromkeys(cell.arms, ())
+        self._rows = {name: np.empty((_BLOCK, 4 * arm.arm.n + 1)) for name, arm in cell.arms.items()}
+        self._count = 0
+        self._every = max(1, round(_PARTS / cell.period))
+        self._tracks: dict[str, tuple[tuple[float, Array], ...]] = {
+            name: ((0.0, part.pose),) for name, part in world.parts.items()
+        }
+        self.worst_slip = dict.fromkeys(cell.arms, 0.0)
+
+    def copy(self) -> Log:
+        """Return the same records; what is added to one does not change the other."""
+        other = object.__new__(Log)
+        other.__dict__.update(self.__dict__)
+        other._full, other._tracks = dict(self._full), dict(self._tracks)
+        other._rows = {name: rows.copy() for name, rows in self._rows.items()}
+        other.worst_slip = dict(self.worst_slip)
+        return other
+
+    def add(self, arm: str, tick: int, reference: Reference, measured: Measured, opening: float) -> None:
+        """Record what a servo did at a tick."""
+        row = self._rows[arm][tick % _BLOCK]
+        n = len(measured.q)
+        row[:n], row[n : 2 * n], row[2 * n : 3 * n] = measured.q, measured.qd, measured.tau
+        row[3 * n : 4 * n], row[-1] = reference.q, opening
+        if tick % _BLOCK == _BLOCK - 1:
+            self._full[arm] = (*self._full[arm], self._rows[arm])
+            self._rows[arm] = np.empty_like(self._rows[arm])
+        self._count = tick + 1
+
+    def add_parts(self, tick: int, data: Any) -> None:
+        """Record where parts are that have moved."""
+        if tick % self._every:
+            return
+        for name in self._parts:
+            X = part_pose(data, name)
+            if np.abs(X - self._tracks[name][-1][1]).max() > _STILL:
+                self._tracks[name] = (*self._tracks[name], (tick * self._cell.period, X))
+
+    def add_slip(self, arm: str, slip: float) -> None:
+        """Record how far a part has moved in the hand [m]."""
+        self.worst_slip[arm] = max(self.worst_slip[arm], slip)
+
+    def streams(self) -> tuple[MeasuredStream, ...]:
+        """Return what was recorded, one stream per arm."""
+        return tuple(self._stream(name) for name in self._cell.arms)
+
+    def _stream(self, name: str) -> MeasuredStream:
+        rows = np.concatenate([*self._full[name], self._rows[name]])[: self._count]
+        n = (rows.shape[1] - 1) // 4
+        return MeasuredStream(
+            arm=name,
+            t=np.arange(self._count, dtype=np.float64) * self._cell.period,
+            q=rows[:, :n],
+            qd=rows[:, n : 2 * n],
+            tau=rows[:, 2 * n : 3 * n],
+            sent=rows[:, 3 * n : 4 * n],
+            opening=rows[:, -1],
+        )
+
+    def tracks(self) -> dict[str, PartTrack]:
+        """Return where the parts were."""
+        return {
+            name: PartTrack(
+                times=tuple(time for time, _ in track),
+                arms=(None,) * len(track),
+                poses=tuple(X for _, X in track),
+            )
+            for name, track in self._tracks.items()
+        }

@@ -1,0 +1,100 @@
+"""What goes wrong in a world between the statements of a program, in words.
+
+R603: fingers closed on nothing. R604: an arm presses on what it should not. R605: a part is lost from the hand.
+R606: an arm is not where it was sent. R607: the world has become unstable.
+"""
+
+from __future__ import annotations
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.hardware import Mishap
+from armwright.physics.contacts import Touch
+
+_LOOK_AGAIN = "look again before the MOVE to it: put both in a TRY, and RETRY after opening and moving away"
+
+
+def closed_on_nothing(time: float, arm: str, part: str, distance: float) -> Mishap:
+    """Return what is said where fingers that close do not get hold of a part, which is a distance away [m]."""
+    return Mishap(
+        time=time,
+        arm=arm,
+        code="R603",
+        message=f"{arm} closed on nothing: {part} is {distance * 1e3:.3g} mm away",
+        label="the gripper closes here",
+        helps=(_LOOK_AGAIN,),
+    )
+
+
+def touched(time: float, touch: Touch) -> Mishap:
+    """Return what is said where an arm presses on something."""
+    return Mishap(
+        time=time,
+        arm=touch.arm,
+        code="R604",
+        message=f"{touch.what} hits {touch.other} with {touch.force:.3g} N",
+        label=f"{touch.arm} was under way here",
+        helps=("approach from where nothing is in the way, or end the MOVE by force: `ON FORCE(Z) > 10 DO HALT`",),
+    )
+
+
+def lost(time: float, arm: str, part: str, holds: float, mass: float) -> Mishap:
+    """Return what is said where a part has left the hand.
+
+    Args:
+        time: when [s].
+        arm: whose hand.
+        part: its name.
+        holds: the mass that the gripper holds at rest [kg].
+        mass: of the part [kg].
+    """
+    too_heavy = mass > holds
+    cause = f"at rest its gripper holds {holds:.3g} kg of such a surface, and {part} has {mass:.3g} kg"
+    advice = "a larger force_N or friction of the gripper holds it" if too_heavy else "a lower speed jerks less"
+    return Mishap(
+        time=time,
+        arm=arm,
+        code="R605",
+        message=f"{arm} has lost {part}",
+        label="it was in the hand here",
+        helps=(f"{cause}: {advice}",),
+    )
+
+
+def off_track(time: float, arm: str, model: Arm, error: Array, limits: Array) -> Mishap:
+    """Return what is said where joints are farther than the limits from where they were sent, (n,) each."""
+    joint = int((error / limits).argmax())
+    revolute = model.joints[joint].revolute
+    amount = f"{error[joint] * 57.29577951308232:.3g} deg" if revolute else f"{error[joint] * 1e3:.3g} mm"
+    return Mishap(
+        time=time,
+        arm=arm,
+        code="R606",
+        message=f"{arm} does not follow its motion: {model.joint_label(joint)} is {amount} off",
+        label=f"{arm} was under way here",
+        helps=("use a lower speed, a lighter load, or check what blocks the arm",),
+    )
+
+
+def pressed_too_deep(time: float, arm: str, depth: float, allowed: float) -> Mishap:
+    """Return what is said where an arm presses into the plane of contact deeper than the cell allows [m]."""
+    return Mishap(
+        time=time,
+        arm=arm,
+        code="E404",
+        message=f"{arm} presses {depth * 1e3:.3g} mm deep into the plane, more than {allowed * 1e3:g} mm",
+        label="this MOVE is stopped there",
+        helps=("end the MOVE at a smaller force, or use a lower speed",),
+    )
+
+
+def unstable(time: float) -> Mishap:
+    """Return what is said where the numbers of a world have no meaning any more."""
+    return Mishap(
+        time=time,
+        arm=None,
+        code="R607",
+        message="the simulated world has become unstable, and its numbers have no meaning any more",
+        label="it happened here",
+        helps=("check masses and stiffnesses of the cell file, or use a shorter servo_ms",),
+    )

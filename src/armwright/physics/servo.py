@@ -1,0 +1,170 @@
+"""The servo of an arm in a world: where it is sent, what its sensors read, and the efforts that follow from both."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple, Protocol
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.control import Sensors, Servo
+from armwright.compiled.arm import compile_arm
+from armwright.motion.trajectory import Trajectory
+from armwright.physics.plant import ArmIndices, dry_offsets
+
+# The integral of errors is fed back with this part of the cube of the bandwidth.
+_INTEGRAL = 0.2
+# Dry friction is compensated where the reference moves faster than this [rad/s, m/s].
+_MOVING = 1e-3
+# Part of a new difference of positions in the estimated speed.
+_SMOOTHING = 0.2
+# A duration that exceeds whole ticks by no more has those.
+_TICK_TOLERANCE = 1e-9
+
+
+class Reference(NamedTuple):
+    """Where the joints of an arm are sent at a moment: positions, speeds and accelerations, (n,) each."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+class TorqueLaw(Protocol):
+    """A controller of a user's own: called at every servo tick, for the efforts of the joints."""
+
+    def __call__(self, t: float, q: Array, qd: Array, reference: Reference) -> Array:
+        """Return the efforts (n,) [N m] or [N].
+
+        Args:
+            t: time [s].
+            q: (n,) joint positions, as the sensors read them.
+            qd: (n,) joint speeds, as the sensors read them.
+            reference: where the joints are sent.
+        """
+
+
+class Sent:
+    """A trajectory on the ticks of the servo."""
+
+    def __init__(self, trajectory: Trajectory, tick: int, period: float) -> None:
+        """Begin at a tick."""
+        self.trajectory, self.tick = trajectory, tick
+        count = math.ceil(trajectory.duration / period - _TICK_TOLERANCE) + 1
+        t = np.minimum(np.arange(count) * period, trajectory.duration)
+        self._q, self._qd, self._qdd = (trajectory(t, order) for order in range(3))
+        # Then the arm stands.
+        self._qd[-1] = self._qdd[-1] = 0.0
+
+    def at(self, tick: int) -> Reference:
+        """Return where the joints are sent at a tick."""
+        index = min(max(tick - self.tick, 0), len(self._q) - 1)
+        return Reference(self._q[index], self._qd[index], self._qdd[index])
+
+    def configuration(self, time: float, period: float) -> Array:
+        """Return the positions (n,) at any time from its beginning on."""
+        return self.trajectory(min(max(0.0, time - self.tick * period), self.trajectory.duration))
+
+
+@attrs.define(eq=False)
+class Measured:
+    """What the servo did at a tick: positions, speeds and efforts, (n,) each."""
+
+    q: Array
+    qd: Array
+    tau: Array
+
+
+class ArmServo:
+    """The servo of one arm."""
+
+    def __init__(  # noqa: PLR0917 - what an arm is driven by
+        self,
+        arm: Arm,
+        plant: Arm,
+        indices: ArmIndices,
+        settings: Servo,
+        sensors: Sensors,
+        period: float,
+        law: TorqueLaw | None = None,
+    ) -> None:
+        """Take an arm.
+
+        Args:
+            arm: that the controller believes in.
+            plant: that stands in the world.
+            indices: where it is in the arrays of the world.
+            settings: of the controller.
+            sensors: what it knows.
+            period: of the servo [s].
+            law: another controller; None for that of the settings.
+        """
+        self.arm, self.indices, self._period, self._settings, self._law = arm, indices, period, settings, law
+        # Compensated dry friction would chatter at rest with the measured speed: it follows the reference.
+        smooth = tuple(attrs.evolve(motor, coulomb_forward=0.0, coulomb_backward=0.0) for motor in arm.motors)
+        self._compiled = compile_arm(attrs.evolve(arm, motors=smooth), quickly=True)
+        forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
+        self._dry, self._lean = (forward + backward) / 2, (forward - backward) / 2
+        self._offsets = dry_offsets(plant)
+        self._sums = np.zeros(arm.n)
+        self._effort = arm.limits.effort
+        w = settings.bandwidth
+        self._kp, self._kd = w**2, 2 * w
+        self._ki = _INTEGRAL * w**3 if settings.integral else 0.0
+        self._sensors = sensors
+        turns = np.array([2 * math.pi if joint.revolute else 1.0 for joint in arm.joints])
+        # An encoder is on the motor, before the gear.
+        gears = np.abs(arm.motor_values("gear_ratio"))
+        self._count = turns / (sensors.counts * gears) if sensors.counts else None
+        # The latest readings of positions, the newest last; so many are kept that the oldest is the delayed one.
+        self._readings: tuple[Array, ...] = ()
+        self._speed = np.zeros(arm.n)
+
+    def start(self, data: Any) -> None:
+        """Begin at rest in a new world."""
+        data.qfrc_applied[self.indices.speeds] = self._offsets
+
+    def drive(self, data: Any, t: float, reference: Reference) -> Measured:
+        """Read the sensors, and command the motors until the next tick."""
+        q, qd = self._read(data)
+        if self._law is not None:
+            tau = np.asarray(self._law(t, q, qd, reference), dtype=np.float64)
+        else:
+            error = reference.q - q
+            correction = self._kd * (reference.qd - qd) + self._kp * error + self._ki * self._sums
+            if self._settings.law == "pd":
+                # The weight is taken off, and errors are corrected as if each joint moved its own inertia.
+                tau = self._compiled.gravity_efforts(q) + self._compiled.mass_matrix(q).diagonal() * correction
+            else:
+                tau = self._compiled.inverse_dynamics(q, qd, reference.qdd + correction)
+            direction = np.tanh(reference.qd / _MOVING)
+            tau = tau + self._dry * direction + self._lean * np.abs(direction)
+            # What a motor cannot give is not to be asked for twice.
+            self._sums += error * self._period * (np.abs(tau) < self._effort)
+        tau = np.minimum(np.maximum(tau, -self._effort), self._effort)
+        data.ctrl[self.indices.motors] = tau
+        return Measured(q, qd, tau)
+
+    def _read(self, data: Any) -> tuple[Array, Array]:
+        """Return positions and speeds as the controller knows them."""
+        q = data.qpos[self.indices.positions]
+        if self._sensors.exact:
+            return q, data.qvel[self.indices.speeds]
+        if self._count is not None:
+            q = np.round(q / self._count) * self._count
+        keep = self._sensors.delay + 2
+        self._readings = (*self._readings, q)[-keep:]
+        latest, before = self._readings[max(0, len(self._readings) - 1 - self._sensors.delay)], self._readings[0]
+        # Speed is known by differences alone, smoothed over a few ticks.
+        self._speed += _SMOOTHING * ((latest - before) / self._period - self._speed)
+        return latest, self._speed
+
+    def copy(self) -> ArmServo:
+        """Return a servo in the same state."""
+        other = object.__new__(ArmServo)
+        other.__dict__.update(self.__dict__)
+        other._sums, other._speed = self._sums.copy(), self._speed.copy()
+        return other

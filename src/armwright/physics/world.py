@@ -1,0 +1,503 @@
+"""A cell with physics: the hardware of a program that can drop parts, miss them, and run into things.
+
+The arms are driven by servos, their fingers hold by friction, and parts fall. Beside the world there is a kinematic
+simulator, which follows the same commands: it knows where arms have been sent and where the program must believe that
+parts are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import STANDARD_GRAVITY
+from armwright.arrays import Array
+from armwright.cell.hardware import DeviceError, Mishap, PeakContact
+from armwright.cell.model import Cell
+from armwright.cell.observations import MeasuredStream, Observations, Picture
+from armwright.cell.part_poses import PartPoses
+from armwright.cell.scene import Gripper, Part
+from armwright.cell.simulator import Simulator
+from armwright.errors import InvalidValueError, closest
+from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.trajectory import Trajectory, hold
+from armwright.physics import mishaps
+from armwright.physics.contacts import Contacts
+from armwright.physics.gripper import GripperDrive
+from armwright.physics.measured import Log
+from armwright.physics.pictures import Photographer, png
+from armwright.physics.plant import arm_indices
+from armwright.physics.servo import ArmServo, Sent, TorqueLaw
+from armwright.physics.vision import camera_in_world, look
+from armwright.physics.world_model import WorldModel, in_hand, part_pose, tool_pose, world_model
+from armwright.spatial.poses import homogeneous, inverse, to_noap
+from armwright.spatial.rotations import rotation_from_vector
+
+# How long a held part may be off the pads, and an arm off its track [s].
+_LOST, _OFF_TRACK = 0.05, 0.02
+# Held parts are looked at so often [s]; a contact counts as over after so long [s].
+_LOOK, _PAUSE = 0.01, 0.1
+# How long an arm is left alone that has had a mishap [s]: it brakes.
+_STOP = 0.2
+# A time so little before a tick is on it.
+_TICK_TOLERANCE = 1e-6
+# Of very many pictures the last ones are kept.
+_MAX_PICTURES = 500
+# Ticks between poses of the tool that are compared.
+_TIP_TICKS = 10
+# In wrists, the noise of moments by that of forces [m].
+_MOMENT_NOISE = 0.1
+
+
+@attrs.define(eq=False)
+class _Hand:
+    """What an arm of a world holds.
+
+    Attributes:
+        drive: of its gripper.
+        part: in its hand; None without one.
+        pose: (4, 4) of the part seen from the tool when it was gripped.
+        off: for how many ticks it has not been between the pads.
+        closed_tick: at which the gripper will have closed; None where it is not closing.
+        expected: the part that it closes on; None where the program does not say.
+        guarded: whether the program looks out for contact during the motion.
+        off_track: for how many ticks the arm has not been where it was sent.
+        stopping_until: tick up to which the arm is stopped because of a mishap, and others are no news.
+        quiet_until: tick up to which contacts are no news.
+        deepest: how deep the arm has pressed into the plane since its motion began [m].
+    """
+
+    drive: GripperDrive
+    part: str | None = None
+    pose: Array | None = None
+    off: int = 0
+    closed_tick: int | None = None
+    expected: str | None = None
+    guarded: bool = False
+    off_track: int = 0
+    stopping_until: int = 0
+    quiet_until: int = 0
+    deepest: float = 0.0
+
+    def copy(self) -> _Hand:
+        """Return a hand in the same state."""
+        return attrs.evolve(self, drive=self.drive.copy())
+
+
+class PhysicsCell:
+    """A cell as a world with physics. The same commands from the same seed give the same bits."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        *,
+        seed: int = 0,
+        laws: Mapping[str, TorqueLaw] | None = None,
+        parts: Mapping[str, Part] | None = None,
+    ) -> None:
+        """Set up the initial state.
+
+        Args:
+            cell: the cell.
+            seed: what is random is drawn from it: where parts stand, and the noise of sensors and cameras.
+            laws: controllers of arms by name, instead of the servos of the cell.
+            parts: as they are in this world; drawn from their spreads where they are left out.
+
+        Raises:
+            UnsupportedArmError: masses of an arm are unknown.
+            InvalidValueError: things stand inside each other at the start, or a law is for no arm of the cell.
+        """
+        self._cell, self._believed = cell, Simulator(cell)
+        self._seed, self._rng = seed, np.random.default_rng(seed)
+        self._world = world_model(cell, drawn_parts(cell, self._rng) if parts is None else parts)
+        self._contacts = Contacts(self._world)
+        self._data = _initial_data(self._world)
+        model, period = self._world.model, cell.period
+        self._servos, self._hands, self._sent = {}, {}, {}
+        laws = dict(laws or {})
+        for name, arm in cell.arms.items():
+            self._servos[name] = ArmServo(
+                arm.arm,
+                arm.plant or arm.arm,
+                arm_indices(model, name, arm.arm.n),
+                arm.servo,
+                arm.sensors,
+                period,
+                laws.pop(name, None),
+            )
+            self._servos[name].start(self._data)
+            self._hands[name] = _Hand(GripperDrive(model, name, arm.gripper or Gripper()))
+            self._hands[name].drive.start(self._data)
+            self._sent[name] = Sent(hold(arm.start, 0.0), 0, period)
+        for name in laws:
+            near = closest(name, cell.arms)
+            hint = f"; did you mean {near}?" if near else ""
+            raise InvalidValueError(f"laws: {name} is no arm of cell '{cell.name}'{hint}")
+        self._every = max(1, round(_LOOK / period))
+        self._tick, self._held = 0, dict[str, str]()
+        self._log = Log(cell, self._world)
+        self._pictures: tuple[Picture, ...] = ()
+        # Made for the first picture, and shared by copies.
+        self._photographers: list[Photographer] = []
+        self._tare = {name: np.zeros(6) for name in cell.arms}
+        self._tracking = {name: _tracking_limits(cell, name) for name in cell.arms}
+        self._settle()
+
+    def _settle(self) -> None:
+        """Refuse a world in which things stand inside each other."""
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        mujoco.mj_forward(self._world.model, self._data)
+        overlaps = self._contacts.overlaps(self._data)
+        if overlaps:
+            worst = max(overlaps, key=lambda overlap: overlap.depth)
+            raise InvalidValueError(
+                f"cell '{self._cell.name}': {worst.one} and {worst.other} stand inside each other at the start, "
+                f"{worst.depth * 1e3:.3g} mm deep"
+            )
+
+    def copy(self) -> PhysicsCell:
+        """Return a world in the same state; later commands to one do not change the other."""
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        other = object.__new__(PhysicsCell)
+        other.__dict__.update(self.__dict__)
+        other._believed, other._data = self._believed.copy(), mujoco.MjData(self._world.model)
+        mujoco.mj_copyData(other._data, self._world.model, self._data)
+        other._servos = {name: servo.copy() for name, servo in self._servos.items()}
+        other._hands = {name: hand.copy() for name, hand in self._hands.items()}
+        other._sent, other._held, other._tare = dict(self._sent), dict(self._held), dict(self._tare)
+        other._log, other._rng = self._log.copy(), np.random.default_rng()
+        other._rng.bit_generator.state = self._rng.bit_generator.state
+        # What is held changes what may be touched.
+        other._contacts = Contacts(self._world)
+        other._contacts.hold(other._held)
+        return other
+
+    # ---- time ----------------------------------------------------------------------------------------------------
+
+    def advance(self, now: float) -> Mishap | None:
+        """Let time go by, until now or until something goes wrong."""
+        end = math.floor(now / self._cell.period + _TICK_TOLERANCE)
+        while self._tick < end:
+            self._step()
+            mishap = self._watch()
+            if mishap is not None and self._is_news(mishap):
+                return mishap
+        return None
+
+    def _is_news(self, mishap: Mishap) -> bool:
+        """Whether a program must be told of a mishap: not while its arm is stopped because of another."""
+        hand = None if mishap.arm is None else self._hands[mishap.arm]
+        if hand is None:
+            return True
+        if self._tick < hand.stopping_until:
+            return False
+        hand.stopping_until = self._tick + round(_STOP / self._cell.period)
+        return True
+
+    @property
+    def _now(self) -> float:
+        return self._tick * self._cell.period
+
+    def _step(self) -> None:
+        """Let one period of the servo go by."""
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        data = self._data
+        for name, servo in self._servos.items():
+            reference = self._sent[name].at(self._tick)
+            measured = servo.drive(data, self._now, reference)
+            self._hands[name].drive.step(data)
+            self._log.add(name, self._tick, reference, measured, self._hands[name].drive.opening(data))
+        mujoco.mj_step(self._world.model, data, self._world.substeps)
+        self._tick += 1
+        self._log.add_parts(self._tick, data)
+
+    # ---- mishaps -------------------------------------------------------------------------------------------------
+
+    def _watch(self) -> Mishap | None:
+        """Return what has gone wrong at this tick."""
+        data, look = self._data, self._tick % self._every == 0
+        if look and _is_unstable(data):
+            return mishaps.unstable(self._now)
+        for name, hand in self._hands.items():
+            if hand.closed_tick is not None and self._tick >= hand.closed_tick:
+                hand.closed_tick = None
+                if (mishap := self._grip(name, hand)) is not None:
+                    return mishap
+            elif look and hand.part is not None and (mishap := self._check_grip(name, hand)) is not None:
+                return mishap
+            if look and (mishap := self._check_track(name, hand)) is not None:
+                return mishap
+        return self._check_contacts()
+
+    def _grip(self, arm: str, hand: _Hand) -> Mishap | None:
+        """See what a gripper holds that has closed."""
+        part = self._contacts.gripped(self._data, arm)
+        if part is None or (hand.expected is not None and part != hand.expected):
+            if hand.expected is None:
+                return None
+            distance = self._distance(arm, hand.expected)
+            return mishaps.closed_on_nothing(self._now, arm, hand.expected, distance)
+        hand.part, hand.pose, hand.off = part, in_hand(self._data, arm, part), 0
+        self._held[arm] = part
+        self._contacts.hold(self._held)
+        return None
+
+    def _distance(self, arm: str, part: str) -> float:
+        """Return how far the tool of an arm is from where it grips a part [m]."""
+        grasp = part_pose(self._data, part) @ self._cell.parts[part].grasp
+        return float(np.linalg.norm(grasp[:3, 3] - tool_pose(self._data, arm)[:3, 3]))
+
+    def _check_grip(self, arm: str, hand: _Hand) -> Mishap | None:
+        """See whether a part is still in the hand."""
+        assert hand.part is not None  # noqa: S101 - asked for only then
+        assert hand.pose is not None  # noqa: S101
+        there = in_hand(self._data, arm, hand.part)
+        slip = float(np.linalg.norm((inverse(hand.pose) @ there)[:3, 3]))
+        self._log.add_slip(arm, slip)
+        off = self._contacts.gripped(self._data, arm) != hand.part
+        hand.off = hand.off + self._every if off else 0
+        if hand.off * self._cell.period < _LOST and slip <= self._cell.alarms.slip:
+            return None
+        part, gripper = hand.part, hand.drive.gripper
+        self._let_go(arm)
+        friction = max(gripper.friction, 0.0)
+        pads = 2 if gripper.kind == "fingers" else 1
+        holds = pads * friction * gripper.force / STANDARD_GRAVITY
+        return mishaps.lost(self._now, arm, part, holds, self._world.parts[part].mass)
+
+    def _let_go(self, arm: str) -> None:
+        hand = self._hands[arm]
+        hand.part = hand.pose = None
+        self._held.pop(arm, None)
+        self._contacts.hold(self._held)
+
+    def _check_track(self, arm: str, hand: _Hand) -> Mishap | None:
+        """See whether an arm is where it was sent."""
+        servo = self._servos[arm]
+        error = np.abs(self._sent[arm].at(self._tick).q - self._data.qpos[servo.indices.positions])
+        off = (error > self._tracking[arm]).any()
+        before, hand.off_track = hand.off_track, hand.off_track + self._every if off else 0
+        limit = _OFF_TRACK / self._cell.period
+        if not before < limit <= hand.off_track:
+            return None
+        return mishaps.off_track(self._now, arm, servo.arm, error, self._tracking[arm])
+
+    def _check_contacts(self) -> Mishap | None:
+        """See whether an arm, or what it holds, presses on what it should not, or too deep on the plane."""
+        touch = self._contacts.unwanted(self._data, self._cell.alarms.touch)
+        if touch is not None:
+            hand, quiet = self._hands[touch.arm], max(1, round(_PAUSE / self._cell.period))
+            news = self._tick > hand.quiet_until and not hand.guarded
+            hand.quiet_until = self._tick + quiet
+            if news:
+                return mishaps.touched(self._now, touch)
+        if self._world.plate:
+            depth = self._contacts.plate_depth(self._data)
+            for name, hand in self._hands.items():
+                if hand.guarded and depth > hand.deepest:
+                    allowed = self._cell.contact.max_depth
+                    first, hand.deepest = hand.deepest <= allowed, depth
+                    if depth > allowed and first:
+                        return mishaps.pressed_too_deep(self._now, name, depth, allowed)
+        return None
+
+    # ---- arms ----------------------------------------------------------------------------------------------------
+
+    def configuration(self, arm: str, now: float) -> Array:
+        """Return the joint positions (n,) of an arm: as they are now, as they are sent at a time to come."""
+        if now > self._now + self._cell.period * _TICK_TOLERANCE:
+            return self.sent_configuration(arm, now)
+        return np.array(self._data.qpos[self._servos[arm].indices.positions])
+
+    def sent_configuration(self, arm: str, now: float) -> Array:
+        """Return the joint positions (n,) that an arm is sent to, now or at a time to come."""
+        return self._believed.sent_configuration(arm, now)
+
+    def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array, *, guarded: bool = False) -> None:
+        """Let an arm follow a trajectory that begins where it has been sent."""
+        self._believed.start_motion(arm, trajectory, now, tip, guarded=guarded)
+        self._sent[arm] = Sent(trajectory, round(now / self._cell.period), self._cell.period)
+        hand = self._hands[arm]
+        if not guarded:
+            # What it pressed on while it was guarded, it may press on until it is away.
+            quiet = self._tick + (round(_PAUSE / self._cell.period) if hand.guarded else 0)
+            hand.quiet_until = max(hand.quiet_until, quiet)
+        hand.guarded, hand.deepest = guarded, 0.0
+
+    def contact_time(self, arm: str) -> None:
+        """Return None: when a motion comes into contact is not known beforehand."""
+
+    def excess_depth_time(self, arm: str) -> None:
+        """Return None: how deep a motion presses is not known beforehand."""
+
+    def peak_contact(self, arm: str, now: float) -> PeakContact:  # noqa: ARG002 - it is now
+        """Return the deepest contact of an arm with the plane since its latest motion began."""
+        depth = self._hands[arm].deepest
+        return PeakContact(depth, depth * self._cell.contact.stiffness)
+
+    def contact_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Return the force (3,) on the tool of an arm and what it holds, as its sensor reads it [N]."""
+        sensor = self._cell.arms[arm].force_sensor
+        force = self._contacts.tool_wrench(self._data, arm)[:3] - self._tare[arm][:3] + sensor.bias
+        if sensor.noise:
+            force = force + self._rng.normal(scale=sensor.noise, size=3)
+        return np.asarray(force)
+
+    def tool_wrenches(self, arm: str, now: float) -> Array:  # noqa: ARG002 - nobody knows beforehand
+        """Return no wrenches (1, 6): planned efforts are those of free motion."""
+        return np.zeros((1, 6))
+
+    # ---- gripper, devices, camera --------------------------------------------------------------------------------
+
+    def move_fingers(
+        self, arm: str, now: float, *, closed: bool, width: float | None = None, frame: str | None = None
+    ) -> float:
+        """Close or open the gripper of an arm; return the time it takes."""
+        seconds = self._believed.move_fingers(arm, now, closed=closed, width=width, frame=frame)
+        hand, ticks = self._hands[arm], math.ceil(seconds / self._cell.period - _TICK_TOLERANCE)
+        # It arrives a little earlier than it says.
+        hand.drive.send(self._data, closed=closed, width=width, ticks=max(1, round(0.7 * ticks)))
+        hand.closed_tick = self._tick + max(1, ticks) if closed else None
+        hand.expected = self._part_of(frame) if closed else None
+        if not closed:
+            self._let_go(arm)
+        return seconds
+
+    def _part_of(self, frame: str | None) -> str | None:
+        """Return the part that a frame of the program stands for."""
+        if frame is None:
+            return None
+        return self._cell.seen_parts.get(frame, frame if frame in self._cell.parts else None)
+
+    def operate(self, device: str, *, on: bool) -> float:
+        """Switch a device; return the time it takes."""
+        return self._believed.operate(device, on=on)
+
+    def active_devices(self) -> frozenset[str]:
+        """Return the devices that are on."""
+        return self._believed.active_devices()
+
+    def part_poses(self) -> PartPoses:
+        """Return where the parts are believed to be."""
+        return self._believed.part_poses()
+
+    def locate(self, frame: str, now: float) -> tuple[Array, float]:
+        """Let the camera locate the object of a frame; return its pose in the world and the time it takes."""
+        sight = self._cell.sights.get(frame)
+        if sight is None:
+            return self._believed.locate(frame, now)
+        if sight.camera is not None:
+            X_WF = self._seen(frame, sight.camera)
+        elif sight.kind == "part":
+            X_WF = part_pose(self._data, sight.name) @ sight.relation
+        else:
+            X_WF = self._cell.markers[sight.name].pose @ sight.relation
+        if sight.kind == "part":
+            self._believed.part_poses().see(sight.name, X_WF @ inverse(sight.relation), now)
+        return X_WF, self._cell.vision_time
+
+    def _seen(self, frame: str, camera: str) -> Array:
+        """Take a picture and return the pose of a frame that is found in it.
+
+        Raises:
+            DeviceError: it is not found.
+        """
+        if not self._photographers:
+            self._photographers.append(Photographer(self._world.model, self._cell.cameras))
+        carrier = self._cell.cameras[camera].on
+        q = None if carrier is None else self.configuration(carrier, self._now)
+        X_WC = camera_in_world(self._cell, self._cell.cameras[camera], q)
+        seed = (self._seed, self._tick)
+        seen = look(self._photographers[0], self._data, self._cell, frame, X_WC, seed)
+        text = seen.message if seen.pose is None else f"{frame} at {_position_text(seen.pose)}"
+        taken = Picture(
+            time=self._now, camera=camera, frame=frame, png=png(seen.picture), found=seen.pose is not None, text=text
+        )
+        self._pictures = (*self._pictures, taken)[-_MAX_PICTURES:]
+        if seen.pose is None:
+            raise DeviceError(seen.message)
+        return seen.pose
+
+    # ---- results -------------------------------------------------------------------------------------------------
+
+    def true_pose(self, part: str) -> Array:
+        """Return the pose (4, 4) of a part in the world, as it is now."""
+        return part_pose(self._data, part)
+
+    def observations(self) -> Observations:
+        """Return what the servos measured, where the parts were, and the largest errors."""
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        measured = self._log.streams()
+        facts = {
+            "engine": "MuJoCo",
+            "version": mujoco.__version__,
+            "step": self._cell.period / self._world.substeps,
+            "seed": self._seed,
+            "tracking": {
+                stream.arm: np.abs(stream.q - stream.sent).max(axis=0, initial=0.0).tolist() for stream in measured
+            },
+            "tip": {stream.arm: _tip_error(self._cell, stream) for stream in measured},
+            "slip": self._log.worst_slip,
+            "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
+        }
+        return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)
+
+
+def drawn_parts(cell: Cell, rng: np.random.Generator) -> dict[str, Part]:
+    """Return the parts of a cell where they stand in a world: each drawn from its spread."""
+    parts = {}
+    for name, part in cell.parts.items():
+        x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (part.spread.position, part.spread.position, part.spread.yaw)
+        turn = homogeneous(rotation_from_vector(np.array([0.0, 0.0, yaw])), np.zeros(3))
+        pose = np.array(part.pose)
+        pose[:3, :3] = turn[:3, :3] @ pose[:3, :3]
+        pose[:2, 3] += (x, y)
+        parts[name] = attrs.evolve(part, pose=pose)
+    return parts
+
+
+def _initial_data(world: WorldModel) -> Any:
+    import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+    # What has become meaningless is told, not forgotten.
+    world.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    data = mujoco.MjData(world.model)
+    for name, arm in world.cell.arms.items():
+        data.qpos[arm_indices(world.model, name, arm.arm.n).positions] = arm.start
+    return data
+
+
+def _tip_error(cell: Cell, stream: MeasuredStream) -> float:
+    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m]."""
+    arm = cell.arms[stream.arm].arm
+    sent, there = (forward(arm, q[::_TIP_TICKS])[:, :3, 3] for q in (stream.sent, stream.q))
+    return float(np.linalg.norm(sent - there, axis=1).max(initial=0.0))
+
+
+def _tracking_limits(cell: Cell, arm: str) -> Array:
+    """Return how far each joint may be from where it was sent, (n,) [rad] or [m]."""
+    alarms = cell.alarms
+    joints = cell.arms[arm].arm.joints
+    return np.array([alarms.tracking_angle if joint.revolute else alarms.tracking_length for joint in joints])
+
+
+def _position_text(X: Array) -> str:
+    """Return the text of the position of a pose (4, 4) in the world."""
+    return "({:.1f}, {:.1f}, {:.1f}) mm".format(*(X[:3, 3] * 1e3))
+
+
+def _is_unstable(data: Any) -> bool:
+    """Whether positions, speeds or accelerations are no numbers, or have grown beyond all bounds."""
+    import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+    kinds = mujoco.mjtWarning
+    bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC, kinds.mjWARN_BADCTRL)
+    return any(data.warning[int(kind)].number for kind in bad)

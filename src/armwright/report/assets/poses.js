@@ -1,0 +1,65 @@
+// Poses as twelve numbers, the columns n, o, a, p; where arms, their bodies and the parts are at an instant.
+
+function compose(X, Y) {
+  const Z = new Array(12);
+  for (let c = 0; c < 12; c += 3)
+    for (let r = 0; r < 3; r++)
+      Z[c + r] = X[r] * Y[c] + X[3 + r] * Y[c + 1] + X[6 + r] * Y[c + 2] + (c === 9 ? X[9 + r] : 0);
+  return Z;
+}
+
+function screw(angle, shift) {
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  return [c, s, 0, -s, c, 0, 0, 0, 1, 0, 0, shift];
+}
+
+// How a body is changed in the frame that carries it: fingers by the opening, a rod by the shift of the next joint.
+function change({ frame, slide, stretches }, figure, q, place) {
+  const X = screw(0, 0);
+  if (slide) X[10] = (slide * gripOf(figure, place) * figure.opening) / 2;
+  if (stretches) X[8] = figure.joints[frame].d + q[frame];
+  return X;
+}
+
+// The frames 0 to n of an arm, and last its tool, in the world.
+function framesOf(figure, place) {
+  const q = blend(figure.q, place);
+  const frames = [figure.base];
+  figure.joints.forEach((joint, i) => {
+    const [turn, shift] = joint.revolute ? [q[i], 0] : [0, q[i]];
+    frames.push(compose(compose(frames[i], screw(joint.theta + turn, joint.d + shift)), joint.behind));
+  });
+  frames.push(compose(frames.at(-1), figure.tool));
+  return frames;
+}
+
+function gripOf(figure, [i, j, s]) {
+  return figure.grip[i] + s * (figure.grip[j] - figure.grip[i]);
+}
+
+// All bodies at t: name, pose in the world, number of the shape, and what colours it.
+function bodiesAt(t) {
+  const { animation } = data;
+  const place = locate(animation.t, t);
+  const arms = Object.entries(animation.arms).map(([name, figure]) => [name, figure, framesOf(figure, place)]);
+  const tools = Object.fromEntries(arms.map(([name, _, frames]) => [name, frames.at(-1)]));
+  const bodies = animation.fixtures.map(({ name, shape, pose }) => ({ name, shape, pose, tint: "fixture", whose: 0 }));
+  animation.parts.forEach((part, whose) => {
+    const last = Math.max(
+      0,
+      part.times.findLastIndex((time) => time <= t + HAIR),
+    );
+    const arm = part.arms[last];
+    const pose = arm === null ? part.poses[last] : compose(tools[arm], part.poses[last]);
+    bodies.push({ name: part.name, shape: part.shape, pose, tint: "part", whose, arm });
+  });
+  arms.forEach(([_, figure, frames], whose) => {
+    const q = blend(figure.q, place);
+    for (const body of figure.bodies) {
+      const { name, shape, tint } = body;
+      const pose = compose(compose(frames[body.frame], change(body, figure, q, place)), body.pose);
+      bodies.push({ name, shape, pose, tint, whose });
+    }
+  });
+  return { place, bodies, arms };
+}
