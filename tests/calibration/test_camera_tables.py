@@ -84,7 +84,7 @@ def test_joint_positions_of_pictures(tmp_path: Path) -> None:
 
 def test_a_lens_in_a_file(tmp_path: Path) -> None:
     """The lens of a camera of a cell file is read, whatever else the camera has."""
-    lines = "[cameras.eye]\nwidth = 640\nheight = 480\nfocal = [600.0, 601.0]\ncentre = [320.0, 240.0]\n"
+    lines = "[cameras.eye]\nwidth = 640\nheight = 480\nfocal_px = [600.0, 601.0]\ncentre_px = [320.0, 240.0]\n"
     lens = read_lens(written(tmp_path / "a.toml", lines + "distortion = [0.1, 0, 0, 0, 0]\npose = [1]\n"))
 
     np.testing.assert_array_equal(lens.matrix, [[600, 0, 320], [0, 601, 240], [0, 0, 1]])
@@ -92,8 +92,8 @@ def test_a_lens_in_a_file(tmp_path: Path) -> None:
     for text, message in (
         ("", "cameras: missing, expected a table"),
         (lines + "[cameras.other]\n", "cameras: expected one camera, got 2"),
-        (lines.replace("600.0", "-1"), "cameras, eye, focal: expected numbers above 0"),
-        (lines.replace("600.0", "1e99"), "cameras, eye, focal: expected numbers no larger than 1e"),
+        (lines.replace("600.0", "-1"), "cameras, eye, focal_px: expected numbers above 0"),
+        (lines.replace("600.0", "1e99"), "cameras, eye, focal_px: expected numbers no larger than 1e"),
         (lines.replace("640", "0"), "cameras, eye, width: expected 1 to 100000, got 0"),
         (lines.replace("width = 640\n", ""), "cameras, eye, width: missing"),
     ):

@@ -1,6 +1,7 @@
 """Trajectories: quintics, exact extremes, slowing, turning round, joining and sampling."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import hypothesis.strategies as st
 import numpy as np
@@ -302,3 +303,18 @@ def test_extremes_of_no_derivative(ask: Callable[[Trajectory, object], object]) 
     for order in (0.5, "speed", True):
         with pytest.raises(KindError, match="order: expected an integer, got "):
             ask(move, order)
+
+
+def test_the_rest_of_a_motion(rng: np.random.Generator) -> None:
+    """What is left of a motion after a time is the same motion, that time later; of one that is over, standing."""
+    motion = join([quintic(a, b, 1.5) for a, b in pairwise(rng.normal(size=(4, 3)))])
+    for t in (0.0, 0.7, 1.5, 4.2):
+        rest = motion.after(t)
+        local = np.linspace(0, rest.duration, 50)
+        assert rest.duration == pytest.approx(motion.duration - t)
+        for order in range(3):
+            np.testing.assert_allclose(rest(local, order)[:-1], motion(local + t, order)[:-1], atol=1e-9)
+    assert motion.after(9.0).duration == 0
+    np.testing.assert_array_equal(motion.after(9.0)(0.0), motion(motion.duration))
+    with pytest.raises(InvalidValueError):
+        motion.after(-1.0)

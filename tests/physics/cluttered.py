@@ -32,7 +32,8 @@ class Task(NamedTuple):
 
 def checker_of(name: str, standing: list[Body]) -> ClearanceChecker:
     arm = load_arm(name)
-    moving = arm_bodies(ARM, arm)
+    # The base stands.
+    moving = [body for body in arm_bodies(ARM, arm) if body.link]
     pairs = [(i, len(moving) + j) for i in range(len(moving)) for j in range(len(standing))]
     placed = PlacedArm(compile_arm(arm, quickly=True), np.eye(4))
     return ClearanceChecker({ARM: placed}, [*moving, *standing], pairs)

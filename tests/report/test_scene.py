@@ -24,7 +24,7 @@ from armwright.report.page import RunPage, run_page
 from armwright.report.run_data import run_page_data
 from armwright.report.run_files import RunInputs, write_run
 from armwright.report.run_scene import kept_poses, moved_parts
-from armwright.report.shape_table import ShapeTable, coarse_mesh
+from armwright.report.shape_table import ShapeTable, coarse_mesh, shape_data
 from armwright.report.tracking import measured_motion, seen_pictures
 from armwright.spatial.poses import homogeneous, to_noap
 from armwright.spatial.rotations import elementary_rotation
@@ -338,11 +338,11 @@ def test_plates_that_cross(visit) -> None:
 def test_every_shape_is_drawn(visit) -> None:
     """A view with one more body of any kind is another picture; what is inside out or empty breaks nothing."""
     shapes: list[dict[str, Any]] = [
-        {"kind": "box", "size": [0.006, 0.009, 0.003]},
-        {"kind": "cylinder", "radius": 0.003, "length": 0.006},
-        {"kind": "capsule", "radius": 0.003, "length": 0.006},
-        {"kind": "sphere", "radius": 0.003},
-        ShapeTableOf(attrs.evolve(torus(20, 10), vertices=0.05 * torus(20, 10).vertices)),
+        {"kind": "box", "size": [0.2, 0.3, 0.1]},
+        {"kind": "cylinder", "radius": 0.1, "length": 0.2},
+        {"kind": "capsule", "radius": 0.1, "length": 0.2},
+        {"kind": "sphere", "radius": 0.1},
+        shape_data(torus(20, 10)),
     ]
     seen = []
     for count in range(len(shapes) + 1):
@@ -357,12 +357,6 @@ def test_every_shape_is_drawn(visit) -> None:
         assert opened.complaints == []
         seen.append(opened.pixels())
     assert len(set(seen)) == len(seen)
-
-
-def ShapeTableOf(mesh: Mesh) -> dict[str, Any]:
-    table = ShapeTable()
-    table.number(mesh)
-    return table.as_data()[0]
 
 
 @pytest.mark.browser

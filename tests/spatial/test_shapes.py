@@ -58,6 +58,10 @@ def test_random_points(shape: Shape, rng: np.random.Generator) -> None:
     assert volume(shape) == pytest.approx(len(there) / len(points) * (2 * far) ** 3, rel=0.02)
     np.testing.assert_allclose(inertia(shape), np.trace(squares) * np.eye(3) - squares, atol=0.01 * far**2)
     np.testing.assert_array_equal(centroid(shape), 0.0)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    assert (there @ direction).max() == pytest.approx(support(shape, direction), rel=0.05)
+    assert (there @ direction).max() <= support(shape, direction)
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
@@ -95,6 +99,7 @@ def test_mesh_of_a_box(rng: np.random.Generator) -> None:
     assert volume(mesh) == pytest.approx(ConvexHull(corners).volume, rel=1e-12)
     np.testing.assert_allclose(centroid(mesh), away, atol=1e-12)
     np.testing.assert_allclose(inertia(mesh), inertia(box), atol=1e-12)
+    assert support(mesh, np.array([0.0, 0.0, 1.0])) == pytest.approx(away[2] + size[2] / 2)
     assert farthest(mesh) == pytest.approx(np.linalg.norm(corners, axis=1).max())
 
 

@@ -160,8 +160,8 @@ class CameraCalibration:
         lines += [
             f"width = {lens.width}",
             f"height = {lens.height}",
-            f"focal = {_numbers_text(lens.focal)}",
-            f"centre = {_numbers_text(lens.centre)}",
+            f"focal_px = {_numbers_text(lens.focal)}",
+            f"centre_px = {_numbers_text(lens.centre)}",
             f"distortion = {_numbers_text(lens.distortion)}",
         ]
         return "\n".join(lines) + "\n"

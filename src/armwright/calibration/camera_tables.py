@@ -176,11 +176,11 @@ def _stem(name: str) -> str:
 
 def _lens(table: Table) -> Lens:
     width, height = (table.number(key, lower=1, upper=_MAX_SIDE) for key in ("width", "height"))
-    focal, centre = table.vector("focal", 2), table.vector("centre", 2)
+    focal, centre = table.vector("focal_px", 2), table.vector("centre_px", 2)
     if not (focal > 0).all():
-        raise table.error("focal", f"expected numbers above 0, got {focal.tolist()}")
+        raise table.error("focal_px", f"expected numbers above 0, got {focal.tolist()}")
     distortion = table.vector("distortion", 5, default=[0.0] * 5)
-    for key, value, largest in (("focal", focal, 1e7), ("centre", centre, 1e7), ("distortion", distortion, 1e3)):
+    for key, value, largest in (("focal_px", focal, 1e7), ("centre_px", centre, 1e7), ("distortion", distortion, 1e3)):
         if (np.abs(value) > largest).any():
             raise table.error(key, f"expected numbers no larger than {largest:g}, got {value.tolist()}")
     return Lens(width=int(width), height=int(height), focal=focal, centre=centre, distortion=distortion)

@@ -101,7 +101,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         corner=_optional_number(motion, "corner_mm", 1e-3, *CORNER_MM),
         clearance=motion.number("clearance_mm", default=0.0, lower=CLEARANCE_MM[0], upper=CLEARANCE_MM[1]) * 1e-3,
         around=DETOURS[motion.choice("around", DETOURS, default="none")],
-        plan=motion.flag("plan", default=False),
+        plan=motion.flag("plan"),
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):

@@ -113,7 +113,8 @@ function surveyed() {
       if (part.arms[i] === null) points.push(...boundsOf(animation.shapes[part.shape], X));
     });
   const near = extent(points);
-  const [least, most] = [near.low.map((v) => v - 0.4 * near.size), near.high.map((v) => v + 0.4 * near.size)];
+  const margin = points.length > 1 ? 0.4 * near.size : Infinity;
+  const [least, most] = [near.low.map((v) => v - margin), near.high.map((v) => v + margin)];
   let floor = 0;
   for (const { shape, pose } of animation.fixtures)
     for (const p of boundsOf(animation.shapes[shape], pose)) {
