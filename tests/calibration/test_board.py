@@ -60,7 +60,7 @@ def test_a_mirrored_picture_is_refused(rng: np.random.Generator) -> None:
     picture = photographed(rng, CHARUCO, simple_lens(*SIZE, 0.8), pose(CHARUCO, (0.2, 0.1, 0.3), 0.45), 2.0)
     find = board_finder(CHARUCO)
 
-    with pytest.raises(InvalidValueError, match="left.png: the board is there as a mirror image"):
+    with pytest.raises(InvalidValueError, match=r"left.png: the board is there as a mirror image"):
         find("left.png", picture[:, ::-1].copy())
     assert find("empty.png", np.full((480, 640), 128, dtype=np.uint8)) is None
 
@@ -95,9 +95,9 @@ def test_views_with_too_little_are_left_out_by_name() -> None:
     views = board_views(CHARUCO, SIZE, [*good, view("few", [0, 1, 2, 9, 10]), view("row", list(range(8)))])
     assert views.names == ("a", "b", "c")
     assert views.left_out == {"few": "5 corners, expected 6 or more", "row": "all its corners are on one line"}
-    with pytest.raises(TooFewError, match="expected 3 pictures or more .* got 2; few: 5 corners"):
+    with pytest.raises(TooFewError, match=r"expected 3 pictures or more .* got 2; few: 5 corners"):
         board_views(CHARUCO, SIZE, [*good[:2], view("few", [0, 1, 2, 9, 10])])
-    with pytest.raises(InvalidValueError, match="d: corner 3 is there more than once"):
+    with pytest.raises(InvalidValueError, match=r"d: corner 3 is there more than once"):
         board_views(CHARUCO, SIZE, [view("d", [3, 3, 4, 5, 6, 7, 8])])
     with pytest.raises(InvalidValueError, match="expected corners from 0 to 47 of a board of 9 x 7 squares, got 48"):
         board_views(CHARUCO, SIZE, [BoardView(name="d", corners=[48], pixels=pixels[:1])])
@@ -132,21 +132,21 @@ def test_pictures_that_do_not_belong_together(pictures: list[Path], tmp_path: Pa
     """Another size, another board, too many or too few pictures are refused with a reason."""
     Image.fromarray(np.zeros((100, 200), dtype=np.uint8)).save(tmp_path / "small.png")
 
-    with pytest.raises(FileFormatError, match="small.png: expected 640 x 480 pixels as in 0.png, got 200 x 100"):
+    with pytest.raises(FileFormatError, match=r"small.png: expected 640 x 480 pixels as in 0.png, got 200 x 100"):
         views_of_pictures([*pictures, tmp_path / "small.png"], CHARUCO)
     with pytest.raises(TooFewError, match=r"not found in any of 5 pictures; .*columns x rows, 9 x 7.*dictionary"):
         views_of_pictures(pictures, attrs.evolve(CHARUCO, dictionary="6X6_250"))
-    with pytest.raises(TooFewError, match="expected 3 pictures or more .* got 1; 4.png: the board is not found"):
+    with pytest.raises(TooFewError, match=r"expected 3 pictures or more .* got 1; 4.png: the board is not found"):
         views_of_pictures([pictures[0], pictures[4]], CHARUCO)
     with raised(pictures=3), pytest.raises(InvalidValueError, match="too many pictures: 5; the limit is 3"):
         views_of_pictures(pictures, CHARUCO)
-    with pytest.raises(TooFewError, match="expected 3 pictures or more, got none"):
+    with pytest.raises(TooFewError, match=r"expected 3 pictures or more, got none"):
         views_of_pictures([], CHARUCO)
 
 
 def test_dictionaries() -> None:
     """An unknown dictionary has the nearest name beside it; one with too few markers for the board is refused."""
-    with pytest.raises(UnknownNameError, match="no dictionary of markers '4X4_60'. Did you mean '4X4_50'"):
+    with pytest.raises(UnknownNameError, match=r"no dictionary of markers '4X4_60'. Did you mean '4X4_50'"):
         board_finder(attrs.evolve(CHARUCO, dictionary="4X4_60"))
     with pytest.raises(InvalidValueError, match="12 x 10 squares has 60 markers, and the dictionary 4X4_50 only 50"):
         board_finder(Board(columns=12, rows=10, square=0.02, marker=0.015))

@@ -73,10 +73,10 @@ def test_joint_positions_of_pictures(tmp_path: Path) -> None:
 
     assert present == [0, 2]
     np.testing.assert_allclose(q[:, :3], [[np.radians(10), 0, 0.2], [0, np.pi / 2, 0.1]])
-    with pytest.raises(TooFewError, match="no row is of picture c.png; there are rows of run/b.png, a"):
+    with pytest.raises(TooFewError, match=r"no row is of picture c.png; there are rows of run/b.png, a"):
         joints.of(["c.png"])
     twice = written(tmp_path / "twice.csv", f"{head}\na,0,0,0,0,0,0\na.png,0,0,0,0,0,0\n")
-    with pytest.raises(FileFormatError, match="expected one row of each picture; a.png is in line 2"):
+    with pytest.raises(FileFormatError, match=r"expected one row of each picture; a.png is in line 2"):
         read_picture_joints(twice, arm)
     with pytest.raises(FileFormatError, match="no such column; stanford has 6 joints, and the file has 1"):
         read_picture_joints(written(tmp_path / "few.csv", "picture,joint_1_deg\na,0\n"), arm)

@@ -186,7 +186,7 @@ def shares_within(sample: Sample, draw: object, full: int, what: str) -> None:
 
 
 def test_truth_lies_in_the_intervals_of_projected_sets(sample: Sample) -> None:
-    """With lens distortion, noise of pixels, and arm errors of 0.1 mm and 0.5 mrad or of joints, 95 % hold the truth."""
+    """With distortion, noise of pixels, and arm errors of 0.1 mm and 0.5 mrad or of joints, 95 % hold the truth."""
 
     def draw(rng: np.random.Generator, eye_in_hand: bool) -> object:  # noqa: FBT001
         accuracy = ArmAccuracy() if rng.random() < 0.6 else ArmAccuracy(joints=np.full(6, 2e-4))
@@ -248,11 +248,11 @@ def test_the_wrong_setup_is_refused(rng: np.random.Generator, *, eye_in_hand: bo
     scene = random_scene(rng, ARM, 10, eye_in_hand=eye_in_hand, accuracy=ArmAccuracy())
     views = projected(rng, scene, PIXEL_NOISE)
 
-    with pytest.raises(ContradictionError, match="the camera is on the hand,? or beside the arm|behind the camera"):
+    with pytest.raises(ContradictionError, match=r"the camera is on the hand,? or beside the arm|behind the camera"):
         calibrate_hand_eye(views, scene.readings, lens=scene.lens, eye_in_hand=not eye_in_hand)
 
 
-def one_axis_scene(rng: np.random.Generator, scene: Scene, joint: int, spread: float) -> Scene:
+def one_axis_scene(scene: Scene, joint: int, spread: float) -> Scene:
     """Return a scene in which one joint alone moves."""
     q = np.repeat(scene.readings.q[:1], 6, axis=0)
     q[:, joint] += np.linspace(0, spread, 6)
@@ -261,10 +261,10 @@ def one_axis_scene(rng: np.random.Generator, scene: Scene, joint: int, spread: f
 
 @SETUPS
 def test_parallel_rotations_are_refused_with_their_direction(rng: np.random.Generator, *, eye_in_hand: bool) -> None:
-    """Where one joint alone turns, the position of the camera along its axis is open, and the message names the axis."""
+    """Where one joint alone turns, the position of the camera along its axis is open; the message names the axis."""
     scene = random_scene(rng, ARM, 6, eye_in_hand=eye_in_hand, accuracy=ArmAccuracy())
     joint = 5 if eye_in_hand else 0
-    moved = one_axis_scene(rng, scene, joint, np.radians(40))
+    moved = one_axis_scene(scene, joint, np.radians(40))
     X = np.repeat(scene.seen[:1], 6, axis=0)
     # The last axis of the arm is z of the tool, and the first one z of the base.
     with pytest.raises(
@@ -286,7 +286,7 @@ def test_small_rotations_and_few_pictures_are_refused(rng: np.random.Generator) 
 
     with pytest.raises(InvalidValueError, match=r"turns by [23](\.\d)? degrees at most"):
         calibrate_hand_eye(views, near, lens=scene.lens)
-    with pytest.raises(TooFewError, match="expected 3 pictures or more with joint positions, got 2"):
+    with pytest.raises(TooFewError, match=r"expected 3 pictures or more with joint positions, got 2"):
         calibrate_hand_eye(views.take([0, 1]), scene.readings.take([0, 1]), lens=scene.lens)
     with pytest.raises(ShapeError, match="as many pictures as joint positions, got 6 and 2"):
         calibrate_hand_eye(views, scene.readings.take([0, 1]), lens=scene.lens)

@@ -81,7 +81,8 @@ def bench_text(arm: str = "stanford") -> str:
     entries, (x, y, z), (low, high) = ARMS[arm]
     middle = np.mean((low, high), axis=0)
     # The block and where it goes to begin on either side of the middle.
-    (bx, by), (sx, sy) = middle + (0.0, 0.09), middle - (0.0, 0.09)
+    beside = np.array([0.0, 0.09])
+    (bx, by), (sx, sy) = middle + beside, middle - beside
     numbers = {
         name: f"{value:g}" for name, value in {"x": x, "y": y, "z": z, "bx": bx, "by": by, "sx": sx, "sy": sy}.items()
     }

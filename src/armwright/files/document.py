@@ -217,17 +217,6 @@ class Table:
                 raise self.error(key, f"expected {length} texts in quotes, got {_value_text(row)}", i)
         return value
 
-    def flag(self, key: str, default: Any = _MISSING) -> bool:
-        """Return a truth value.
-
-        Raises:
-            FileFormatError: it is missing without a default, or something else.
-        """
-        value = self._value(key, default, "true or false")
-        if not isinstance(value, bool):
-            raise self.error(key, f"expected true or false, got {_value_text(value)}")
-        return value
-
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
         """Return a string that is one of ``choices``.
 

@@ -102,11 +102,13 @@ class CheckedBodies:
     Attributes:
         pairs: how many pairs of bodies may not meet, at the start.
         guessed: by arm of which no solids are known, the radii of the guessed ones, the largest and the smallest [m].
+        estimated: the names of bodies of other arms that their files call a guess.
         left_out: pairs of names that do not count, because they meet at the start though one of them is a guess.
     """
 
     pairs: int
     guessed: Mapping[str, tuple[float, float]]
+    estimated: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
 
 
@@ -161,6 +163,13 @@ class CellCollisions:
         radii = {name: guessed_radii(arm.arm) for name, arm in self._cell.arms.items() if not has_solids(arm.arm)}
         return CheckedBodies(
             pairs=self._count,
+            estimated=tuple(
+                dict.fromkeys(
+                    body.name
+                    for body, role in zip(bodies, self._bodies.roles, strict=True)
+                    if role.guessed and role.arm not in radii
+                )
+            ),
             guessed={name: (float(r.max()), float(r.min())) for name, r in radii.items()},
             left_out=tuple(dict.fromkeys((bodies[i].name, bodies[j].name) for i, j in sorted(self._left_out))),
         )

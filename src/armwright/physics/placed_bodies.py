@@ -86,7 +86,8 @@ class CellBodies:
         bodies, guessed = arm_bodies(name, arm, placed.gripper), not has_solids(arm)
         for body in bodies:
             in_hand = placed.gripper is None and body.link == arm.n
-            self.roles.append(Role(arm=name, in_hand=in_hand, grips=in_hand, guessed=guessed and body.link > 0))
+            is_guess = body.solid.guessed or (guessed and body.link > 0)
+            self.roles.append(Role(arm=name, in_hand=in_hand, grips=in_hand, guessed=is_guess))
         self._fixed += bodies
 
     def _gripper_bodies(self, name: str, opening: float) -> list[Body]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from armwright.errors import counted
 from armwright.physics.collisions import LOOKED_FOR, CheckedBodies, StageClearance
 from armwright.program.vm.recording import Recording
 
 # The text wherever a motion is reported whose collisions are not checked.
 NOT_CHECKED = "not checked"
-# Names of pairs that are listed.
+# Names that are listed.
 _LISTED = 5
 
 
@@ -43,12 +43,17 @@ def _guesses(checked: CheckedBodies) -> list[str]:
         f"the links of {arm} are guessed capsules of {smallest * 1e3:.0f} to {largest * 1e3:.0f} mm radius"
         for arm, (largest, smallest) in checked.guessed.items()
     ]
+    if checked.estimated:
+        texts.append(f"a guess: {_listed(checked.estimated)}")
     if checked.left_out:
-        listed = ", ".join(f"{one} and {other}" for one, other in checked.left_out[:_LISTED])
-        more = len(checked.left_out) - _LISTED
-        rest = f" and {counted(more, 'more pair')}" if more > 0 else ""
-        texts.append(f"left out, as the guess meets the other at the start: {listed}{rest}")
+        pairs = [f"{one} with {other}" for one, other in checked.left_out]
+        texts.append(f"left out, as the guess meets the other at the start: {_listed(pairs)}")
     return texts
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def clearance_data(clearance: StageClearance | None) -> dict[str, Any] | None:

@@ -91,12 +91,13 @@ def collision_message(collision: Collision, goal: str, arm: str) -> str:
     return f"`{goal}` cannot be reached by {arm} on this path: {meets} {where}, {deep}"
 
 
-def collision_location(collision: Collision, arm: str) -> list[str]:
+def collision_location(collision: Collision) -> list[str]:
     """Return where in the world and when an arm would run into something, and what is known of the solids."""
+    own, other = collision.bodies
     when = "" if collision.at_start else f", {collision.time:.3f} s after this MOVE begins"
     notes = [f"at {_position(collision.place)} mm in the world{when}"]
     if collision.guessed:
-        notes.append(f"what the links look like is guessed from their lengths: the file of {arm} has no solids of them")
+        notes.append(f"the shape of {own} or {other} is a guess: the arm file has no exact solid of it")
     return notes
 
 

@@ -1,0 +1,90 @@
+"""Random moves of arms of the catalogue among random boxes, against another library at many configurations."""
+
+from collections.abc import Sequence
+
+import coal
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.model import Cell, CellArm
+from armwright.cell.part_poses import PartPoses
+from armwright.cell.scene import Fixture, Gripper
+from armwright.kinematics.forward_kinematics import link_poses
+from armwright.motion.quintic_polynomials import quintic
+from armwright.motion.trajectory import Trajectory
+from armwright.physics.clearance import RESOLUTION, Body
+from armwright.physics.collisions import CellCollisions
+from armwright.physics.placed_bodies import CellBodies
+from armwright.physics.wanted_contacts import PlannedMove
+from armwright.spatial.shapes import Box, farthest
+from oracles.arms import random_configurations, random_pose
+from oracles.solids import coal_shape
+from samples import Sample
+
+# Distances of convex solids are found by iteration [m].
+ITERATED = 1e-5
+BOXES = 5
+
+
+def random_cell(arm: Arm, rng: np.random.Generator, motion: Trajectory) -> Cell:
+    """A cell with boxes near where the hand goes, but not where it begins."""
+    frames = link_poses(arm, motion(np.linspace(0, 1, 9)))
+    fixtures = {}
+    for number in range(BOXES):
+        X = random_pose(rng)
+        X[:3, 3] = frames[rng.integers(2, 9), -1, :3, 3] + rng.normal(size=3) * 0.2
+        fixtures[f"BOX{number}"] = Fixture(name=f"BOX{number}", shape=Box(size=rng.uniform(0.002, 0.25, 3)), pose=X)
+    return Cell(
+        name="random", arms={"ARM_1": CellArm(arm=arm, start=motion(0.0), gripper=Gripper())}, fixtures=fixtures
+    )
+
+
+def meets(arm: Arm, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], q: Array, deeper: float) -> bool:
+    """Whether any pair overlaps at any of some configurations, by coal; spheres around them tell which may."""
+    frames, shapes = link_poses(arm, q), [coal_shape(body.solid.shape) for body in bodies]
+    poses = [frames[:, body.link] @ body.solid.pose if body.arm else body.solid.pose[None] for body in bodies]
+    radii = [farthest(body.solid.shape) for body in bodies]
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    for i, j in pairs:
+        apart = np.linalg.norm(poses[i][:, :3, 3] - poses[j][:, :3, 3], axis=1) - radii[i] - radii[j]
+        for k in np.flatnonzero(np.broadcast_to(apart, len(q)) < 2 * RESOLUTION).tolist():
+            X, Y = (X[min(k, len(X) - 1)] for X in (poses[i], poses[j]))
+            one, other = (coal.Transform3s(np.ascontiguousarray(it[:3, :3]), it[:3, 3]) for it in (X, Y))
+            result.clear()
+            if coal.distance(shapes[i], one, shapes[j], other, request, result) < -deeper:
+                return True
+    return False
+
+
+@pytest.mark.parametrize("name", ["stanford", "puma560", "ur5"])
+def test_no_collision_is_missed(name: str, sample: Sample) -> None:
+    """What another library finds at 10,000 configurations of a move was found before, and little else."""
+    arm = load_arm(name)
+    moves, looks = (1000, 10_000) if sample.whole else (12, 400)
+    missed = false_alarms = collisions = 0
+    for k in range(moves):
+        rng = np.random.default_rng([sample.seed, k])
+        motion = quintic(*random_configurations(arm, rng, 2), 1.0)
+        cell = random_cell(arm, rng, motion)
+        checker, known = CellCollisions(cell), CellBodies(cell)
+        bodies = known.arranged(PartPoses(cell))
+        left_out = set(checker.checked.left_out)
+        pairs = [(i, j) for i, j in known.pairs(bodies) if (bodies[i].name, bodies[j].name) not in left_out]
+        move = PlannedMove(arm="ARM_1", stages=(motion,))
+
+        found = checker.check(move, {}, PartPoses(cell), {}).collision
+
+        hit = meets(arm, bodies, pairs, motion(np.linspace(0, 1, looks)), ITERATED)
+        collisions += found is not None
+        missed += hit and found is None
+        if found is not None and not hit:
+            false_alarms += 1
+            near = meets(arm, bodies, pairs, motion(np.array([found.time])), -RESOLUTION - ITERATED)
+            assert near or meets(arm, bodies, pairs, motion(np.linspace(0, 1, 50 * looks)), 0.0)
+    share = false_alarms / max(collisions, 1)
+    sample.record(f"collisions of moves of {name}, missed", moves, missed, collisions=collisions, false_alarms=share)
+    assert missed == 0
+    assert share <= 0.2
