@@ -193,7 +193,7 @@ def test_a_world_without_meaning(tmp_path: Path) -> None:
     class Broken(PhysicsCell):
         def advance(self, now: float) -> Mishap | None:
             if now > 0.5:
-                self._data.qvel[0] = np.nan
+                self._data.qvel[-1] = np.nan
             return super().advance(now)
 
     assert failure(cell, hardware=Broken(cell)).diagnostic.code == "R607"
@@ -201,14 +201,14 @@ def test_a_world_without_meaning(tmp_path: Path) -> None:
 
 def test_things_inside_each_other(tmp_path: Path) -> None:
     """A table through the base of an arm, and a part inside a part, are refused by their names."""
-    with pytest.raises(InvalidValueError, match="TABLE and ARM_1 .* stand inside each other at the start"):
+    with pytest.raises(InvalidValueError, match=r"(TABLE and ARM_1 .*|ARM_1 .* and TABLE) stand inside each other at the start"):
         PhysicsCell(blind(tmp_path, ("z = 0.03, from = [0.22", "z = 0.40, from = [-0.3")))
     inside = OBSTACLE.replace("0.9, 0.5, 0.13", "0.52, 0.10, 0.13")
-    with pytest.raises(InvalidValueError, match="(POST and BLOCK|BLOCK and POST) stand inside each other"):
+    with pytest.raises(InvalidValueError, match=r"(POST and BLOCK|BLOCK and POST) stand inside each other"):
         PhysicsCell(blind(tmp_path, ("[parts.BLOCK]", inside)))
 
 
-# ---- the same every time ----------------------------------------------------------------------------------------------
+# ---- the same every time ---------------------------------------------------------------------------------------------
 
 
 def digest(world: PhysicsCell) -> str:
@@ -251,10 +251,10 @@ def test_back_in_the_debugger(tmp_path: Path) -> None:
         while timeline.step_count < steps:
             timeline.advance()
 
-    go(60)
+    go(24)
     first = digest(timeline.machine.hardware)
-    timeline.return_to(30)
-    go(60)
+    timeline.seek(12)
+    timeline.seek(24)
     assert digest(timeline.machine.hardware) == first
 
 
@@ -272,7 +272,7 @@ def test_drawn_parts(tmp_path: Path) -> None:
     assert 0.45 < np.abs(angles).max() <= np.radians(30)
 
 
-# ---- servo and forces -------------------------------------------------------------------------------------------------
+# ---- servo and forces ------------------------------------------------------------------------------------------------
 
 
 def heavier(arm: Arm, factor: float) -> Arm:
@@ -309,7 +309,7 @@ def test_a_law_of_its_own(tmp_path: Path) -> None:
     """A user's controller is asked at every tick; one that holds nothing lets the arm fall, which is told."""
     cell, asked = blind(tmp_path), []
 
-    def limp(t: float, q: Array, qd: Array, reference: Reference) -> Array:
+    def limp(t: float, q: Array, qd: Array, reference: Reference) -> Array:  # noqa: ARG001 - what a law is given
         asked.append((t, reference.q - q))
         return np.zeros_like(q)
 
