@@ -61,7 +61,7 @@ def moved(cell: Cell, x: float, y: float) -> dict[str, Part]:
     return {**cell.parts, "BLOCK": attrs.evolve(block, pose=flat_pose(*(block.pose[:2, 3] + (x, y)), 0.05, 0.0))}
 
 
-# ---- parts are placed -------------------------------------------------------------------------------------------------
+# ---- parts are placed ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.share(0.02)
@@ -102,10 +102,11 @@ def same_trace(cell: Cell, code: Any, recording: Recording) -> None:
     other = interpret(code, kinematic, Simulator(kinematic))
     assert [(e.kind, e.text) for e in other.effects] == [(e.kind, e.text) for e in recording.effects]
     for mine, its in zip(recording.effects, other.effects, strict=True):
-        assert (mine.t0, mine.t1) == pytest.approx((its.t0, its.t1), abs=cell.period / 2)
+        # What the program computes from measured poses of the hand may take a tick more or less.
+        assert (mine.t0, mine.t1) == pytest.approx((its.t0, its.t1), abs=1.5 * cell.period)
 
 
-# ---- what goes wrong --------------------------------------------------------------------------------------------------
+# ---- what goes wrong -------------------------------------------------------------------------------------------------
 
 
 def failure(cell: Cell, program: str = PROGRAM, hardware: Any = None, **options: Any) -> RunError:
@@ -155,7 +156,9 @@ def test_an_arm_hits_what_nobody_knew(tmp_path: Path) -> None:
     error = failure(cell, parts={**cell.parts, "POST": post})
 
     assert error.diagnostic.code == "R604"
-    assert error.diagnostic.message.startswith(("BLOCK hits POST with", "ARM_1 finger hits POST", "ARM_1 link"))
+    assert error.diagnostic.message.startswith(
+        ("ARM_1 palm hits POST with", "ARM_1 link 6 hits POST with", "BLOCK hits POST with")
+    )
 
 
 def test_a_part_too_heavy(tmp_path: Path) -> None:
@@ -201,7 +204,8 @@ def test_a_world_without_meaning(tmp_path: Path) -> None:
 
 def test_things_inside_each_other(tmp_path: Path) -> None:
     """A table through the base of an arm, and a part inside a part, are refused by their names."""
-    with pytest.raises(InvalidValueError, match=r"(TABLE and ARM_1 .*|ARM_1 .* and TABLE) stand inside each other at the start"):
+    apart = r"(TABLE and ARM_1 .*|ARM_1 .* and TABLE) stand inside each other at the start"
+    with pytest.raises(InvalidValueError, match=apart):
         PhysicsCell(blind(tmp_path, ("z = 0.03, from = [0.22", "z = 0.40, from = [-0.3")))
     inside = OBSTACLE.replace("0.9, 0.5, 0.13", "0.52, 0.10, 0.13")
     with pytest.raises(InvalidValueError, match=r"(POST and BLOCK|BLOCK and POST) stand inside each other"):

@@ -184,7 +184,13 @@ class PhysicsCell:
         """Let time go by, until now or until something goes wrong."""
         end = math.floor(now / self._cell.period + _TICK_TOLERANCE)
         while self._tick < end:
-            self._step()
+            try:
+                self._step()
+            except InvalidValueError:
+                # Numbers without meaning have come to a servo.
+                if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():
+                    raise
+                return mishaps.unstable(self._now)
             mishap = self._watch()
             if mishap is not None and self._is_news(mishap):
                 return mishap
