@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import attrs
 import pytest
 
 import armwright
@@ -29,13 +30,14 @@ def public(namespace: str) -> Iterator[tuple[str, Any]]:
 
 @pytest.mark.parametrize("namespace", NAMESPACES)
 def test_signatures_are_short(namespace: str) -> None:
-    """No signature that ``help`` prints is over 200 characters long."""
+    """No signature that ``help`` prints is over 200 characters long; the names of the fields of a model may be 300."""
     for name, value in public(namespace):
         try:
             signature = str(inspect.signature(value))
         except ValueError:  # some builtin types have none
             continue
-        assert len(signature.replace("self, ", "")) <= 200, f"{namespace}.{name}{signature}"
+        most = 300 if inspect.isclass(value) and attrs.has(value) else 200
+        assert len(signature.replace("self, ", "")) <= most, f"{namespace}.{name}{signature}"
 
 
 def test_shortened_signatures_keep_names_and_annotations() -> None:
