@@ -110,7 +110,7 @@ class PhysicsCell:
 
         Raises:
             UnsupportedArmError: masses of an arm are unknown.
-            InvalidValueError: things stand inside each other at the start, a camera is to find a part that has no marker,
+            InvalidValueError: things stand inside each other at the start, a camera looks for a part without a marker,
                 or a law is for no arm of the cell.
             MissingExtraError: a camera takes pictures, and OpenCV is missing.
         """
