@@ -89,7 +89,9 @@ def _interval(table: Table, key: str, upper: float, unit: float = 1.0) -> Interv
         return None
     low, high = table.vector(key, 2).tolist()
     if not 0.0 <= low <= high <= upper:
-        raise table.error(key, f"expected two numbers from 0 to {upper:g}, the lower one first, got [{low:g}, {high:g}]")
+        raise table.error(
+            key, f"expected two numbers from 0 to {upper:g}, the lower one first, got [{low:g}, {high:g}]"
+        )
     return low * unit, high * unit
 
 

@@ -143,7 +143,9 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
         ended_by: code and message of the error that has ended the program; None where none has.
     """
     moving = _come_to_rest(world, cell, now)
-    errors = {part: placing_error(world.true_pose(part), goal_pose(cell, part), cell.parts[part]) for part in _goals(cell)}
+    errors = {
+        part: placing_error(world.true_pose(part), goal_pose(cell, part), cell.parts[part]) for part in _goals(cell)
+    }
     cause, message = ended_by or _fault(world, cell, moving, errors) or ("", "")
     return Verdict(
         cause=cause,
