@@ -46,7 +46,7 @@ def _poses(table: Table, known: Collection[str]) -> dict[str, Spread]:
     poses: dict[str, Spread] = {}
     refuse_too_many(table, "entries")
     for key in table:
-        name = _known_name(table, key, key, read_name(table, key, poses), known, "part or marker")
+        name = _known_name(table, key, read_name(table, key, poses), known, "part or marker")
         entry = table.table(key)
         poses[name] = Spread(
             position=entry.number("xy_mm", default=0.0, lower=0.0, upper=1e6) * 1e-3,
@@ -60,11 +60,11 @@ def _goals(table: Table, parts: Collection[str], places: Collection[str]) -> dic
     goals: dict[str, Goal] = {}
     refuse_too_many(table, "entries")
     for key in table:
-        name = _known_name(table, key, key, read_name(table, key, goals), parts, "part")
+        name = _known_name(table, key, read_name(table, key, goals), parts, "part")
         entry = table.table(key)
         text = entry.text("at")
         goals[name] = Goal(
-            at=_known_name(entry, "at", text, read_name(entry, "at", (), text), places, "marker or frame"),
+            at=_known_name(entry, "at", read_name(entry, "at", (), text), places, "marker or frame"),
             distance=entry.number("mm", default=2.0, lower=1e-3, upper=1e4) * 1e-3,
             angle=np.radians(entry.number("deg", default=3.0, lower=1e-3, upper=180.0)),
         )
@@ -95,11 +95,11 @@ def _interval(table: Table, key: str, upper: float, unit: float = 1.0) -> Interv
     return low * unit, high * unit
 
 
-def _known_name(table: Table, key: str, written: str, name: str, known: Collection[str], kind: str) -> str:
+def _known_name(table: Table, key: str, name: str, known: Collection[str], kind: str) -> str:
     """Return a name that must be one of those of the cell."""
     if name not in known:
         near = closest(name, known)
         names = ", ".join(sorted(known)) or "none"
         hint = f"did you mean {near}?" if near else f"known: {names}"
-        raise table.error(key, f"{written} is no {kind} of the cell; {hint}")
+        raise table.error(key, f"{name} is no {kind} of the cell; {hint}")
     return name

@@ -147,7 +147,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
             raise
         error, recording = stopped, stopped.recording()
     verdict = None if single is None else single.verdict(recording.duration, error)
-    _finish(recording, loaded.diagnostics, inputs, output, error, verdict, as_json=as_json, quiet=quiet)
+    _finish(recording, loaded.diagnostics, inputs, output, error, verdict=verdict, as_json=as_json, quiet=quiet)
 
 
 def _finish(
@@ -156,8 +156,8 @@ def _finish(
     inputs: "RunInputs",
     output: Path | None,
     error: "RunError | None",
-    verdict: "TrialVerdict | None",
     *,
+    verdict: "TrialVerdict | None",
     as_json: bool,
     quiet: bool,
 ) -> None:

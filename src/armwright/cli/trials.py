@@ -111,12 +111,16 @@ def run_trials(
 
     With a folder, every finished trial is stored in it, and the same command resumes trials that were interrupted.
     """
+    from hashlib import sha256
+
+    from armwright.arm.write import toml_text
     from armwright.program.vm.trials import ProgramTrials
     from armwright.report.run_files import input_hashes
     from armwright.report.trials_files import trials_files
     from armwright.report.trials_summary import TrialsSummary
 
-    identity = {"options": inputs.options, "inputs": input_hashes(inputs)}
+    arms = {name: sha256(toml_text(arm.plant or arm.arm).encode()).hexdigest() for name, arm in cell.arms.items()}
+    identity = {"options": inputs.options, "inputs": input_hashes(inputs), "arms": arms}
     task = ProgramTrials(code=loaded.code, cell=cell, seed=seed, limits=limits, identity=identity)
     with sweep_bar(f"{count} trials", quiet=quiet or as_json) as progress:
         trials = evaluate_trials(task, count, output, progress)
@@ -144,8 +148,10 @@ def evaluate_trials(
         columns = _evaluate_here(task, design, progress)
     else:
         columns = _evaluate_on_cores(task, design, output, progress)
-    rows = zip(*columns, strict=True)
-    return tuple(trial(number, *row) for number, row in enumerate(rows, 1))
+    return tuple(
+        trial(number, message, dict(zip(task.outputs, numbers, strict=True)))
+        for number, (message, *numbers) in enumerate(zip(*columns, strict=True), 1)
+    )
 
 
 def _evaluate_on_cores(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import attrs
@@ -42,12 +42,13 @@ class Trial(NamedTuple):
     ended: bool
 
 
-def trial(number: int, failure: str, distance: float, angle: float, duration: float, ended: float) -> Trial:
-    """Return a trial from its row of a sweep."""
+def trial(number: int, failure: str, numbers: Mapping[str, float]) -> Trial:
+    """Return a trial from its row of a sweep: what its failure says, and its outputs by name."""
     cause, separator, message = failure.partition(SEPARATOR)
     if failure and not separator:
         cause, message = "killed", failure
-    return Trial(number, cause, message, distance, angle, duration, ended == 1.0)
+    distance, angle, duration = (numbers[name] for name in ("distance", "angle", "duration"))
+    return Trial(number, cause, message, distance, angle, duration, numbers["ended"] == 1.0)
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
@@ -122,10 +123,8 @@ class TrialsSummary:
     def notes(self) -> tuple[str, ...]:
         """The share of success with its interval, the placing errors, and how a failure is repeated."""
         low, high = self.interval
-        rows = [
-            f"{self.successes} of {len(self.trials)} trials succeed: {self.success:.1%}, "
-            f"with 95 % confidence {low:.1%} to {high:.1%}"
-        ]
+        share = f"{self.successes} of {len(self.trials)} trials succeed: {self.success:.1%}"
+        rows = [f"{share}, with 95 % confidence {low:.1%} to {high:.1%}"]
         if self.distances.size:
             middle, most = _quantiles(self.distances * 1e3)
             turned, most_turned = _quantiles(np.degrees(self.angles))
