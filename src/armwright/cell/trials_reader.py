@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
-
-import numpy as np
 
 from armwright.cell.entries import read_name, refuse_too_many
 from armwright.cell.scene import Spread
@@ -50,7 +49,7 @@ def _poses(table: Table, known: Collection[str]) -> dict[str, Spread]:
         entry = table.table(key)
         poses[name] = Spread(
             position=entry.number("xy_mm", default=0.0, lower=0.0, upper=1e6) * 1e-3,
-            yaw=np.radians(entry.number("yaw_deg", default=0.0, lower=0.0, upper=180.0)),
+            yaw=math.radians(entry.number("yaw_deg", default=0.0, lower=0.0, upper=180.0)),
         )
         entry.refuse_unknown_keys()
     return poses
@@ -66,7 +65,7 @@ def _goals(table: Table, parts: Collection[str], places: Collection[str]) -> dic
         goals[name] = Goal(
             at=_known_name(entry, "at", read_name(entry, "at", (), text), places, "marker or frame"),
             distance=entry.number("mm", default=2.0, lower=1e-3, upper=1e4) * 1e-3,
-            angle=np.radians(entry.number("deg", default=3.0, lower=1e-3, upper=180.0)),
+            angle=math.radians(entry.number("deg", default=3.0, lower=1e-3, upper=180.0)),
         )
         entry.refuse_unknown_keys()
     return goals

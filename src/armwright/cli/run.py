@@ -22,7 +22,7 @@ from armwright.cli.programs import (
     print_diagnostics,
 )
 from armwright.cli.progress import waiting
-from armwright.cli.trials import MAX_TRIALS, SingleTrial, TrialVerdict, check_trial_options, run_trials
+from armwright.cli.trials import MAX_TRIALS, Machines, SingleTrial, TrialVerdict, check_trial_options, run_trials
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
@@ -71,6 +71,12 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     trial: Annotated[
         int | None, Option(min=1, max=MAX_TRIALS, help="Number of the only trial to run, with all its files.")
+    ] = None,
+    workers: Annotated[
+        int | None, Option(min=1, help="Number of processes for --trials; the default is the number of cores.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, Option(help="Address of a Dask scheduler for --trials, as in tcp://10.0.0.1:8786.")
     ] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
@@ -131,9 +137,19 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     if trials is not None or trial is not None:
         check_trial_options(used_cell, trials, trial, physics=physics)
     if trials is not None:
-        run_trials(
-            loaded, used_cell, inputs, limits, seed=seed, count=trials, output=output, as_json=as_json, quiet=quiet
+        machines = Machines(workers, scheduler)
+        summary = run_trials(
+            loaded.code,
+            used_cell,
+            inputs,
+            limits,
+            machines,
+            seed=seed,
+            count=trials,
+            output=output,
+            watched=not (quiet or as_json),
         )
+        print_result(summary, as_json=as_json, quiet=quiet, output=output)
         return
     hardware, single = hardware_factory(physics=physics, seed=seed), None
     if trial is not None:

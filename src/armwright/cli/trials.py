@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armwright.cli.options import usage_error
-from armwright.cli.output import command_line, print_result
+from armwright.cli.output import command_line
 from armwright.cli.progress import sweep_bar
 from armwright.cli.results import write_results
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from armwright.cell.model import Cell
     from armwright.physics.trials import Verdict
     from armwright.physics.world import PhysicsCell
-    from armwright.program.api import LoadedProgram
+    from armwright.program.bytecode.instructions import Code
     from armwright.program.vm.machine import Limits, RunError
     from armwright.program.vm.trials import ProgramTrials
     from armwright.report.run_files import RunInputs
-    from armwright.report.trials_summary import Trial
+    from armwright.report.trials_summary import Trial, TrialsSummary
     from armwright.sweep.designs import Design
     from armwright.sweep.progress import Progress
 
@@ -95,19 +95,26 @@ class SingleTrial:
         return TrialVerdict(self._number, judge_run(self._world, self.case, duration, error))
 
 
+class Machines(NamedTuple):
+    """What runs trials: some processes of this machine, as many as cores where there is no number, or a scheduler."""
+
+    workers: int | None
+    scheduler: str | None
+
+
 def run_trials(
-    loaded: "LoadedProgram",
+    code: "Code",
     cell: "Cell",
     inputs: "RunInputs",
     limits: "Limits",
+    machines: Machines,
     *,
     seed: int,
     count: int,
     output: Path | None,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    """Run trials of a program, and print and write their summary.
+    watched: bool,
+) -> "TrialsSummary":
+    """Run trials of a program, write their files, and return their summary.
 
     With a folder, every finished trial is stored in it, and the same command resumes trials that were interrupted.
     """
@@ -121,17 +128,21 @@ def run_trials(
 
     arms = {name: sha256(toml_text(arm.plant or arm.arm).encode()).hexdigest() for name, arm in cell.arms.items()}
     identity = {"options": inputs.options, "inputs": input_hashes(inputs), "arms": arms}
-    task = ProgramTrials(code=loaded.code, cell=cell, seed=seed, limits=limits, identity=identity)
-    with sweep_bar(f"{count} trials", quiet=quiet or as_json) as progress:
-        trials = evaluate_trials(task, count, output, progress)
+    task = ProgramTrials(code=code, cell=cell, seed=seed, limits=limits, identity=identity)
+    with sweep_bar(f"{count} trials", quiet=not watched) as progress:
+        trials = evaluate_trials(task, count, output, machines, progress)
     summary = TrialsSummary(program=inputs.program.name, cell=cell.name, seed=seed, trials=trials)
     if output is not None:
         write_results(output, trials_files(summary, command=command_line()))
-    print_result(summary, as_json=as_json, quiet=quiet, output=output)
+    return summary
 
 
 def evaluate_trials(
-    task: "ProgramTrials", count: int, output: Path | None, progress: "Callable[[Progress], None] | None" = None
+    task: "ProgramTrials",
+    count: int,
+    output: Path | None,
+    machines: Machines,
+    progress: "Callable[[Progress], None] | None" = None,
 ) -> "tuple[Trial, ...]":
     """Run trials 1 to ``count``: on the cores of the machine, or in this process without the extra ``sweep``."""
     import numpy as np
@@ -147,15 +158,19 @@ def evaluate_trials(
     except MissingExtraError:
         columns = _evaluate_here(task, design, progress)
     else:
-        columns = _evaluate_on_cores(task, design, output, progress)
+        columns = _evaluate_in_sweep(task, design, output, machines, progress)
     return tuple(
         trial(number, message, dict(zip(task.outputs, numbers, strict=True)))
         for number, (message, *numbers) in enumerate(zip(*columns, strict=True), 1)
     )
 
 
-def _evaluate_on_cores(
-    task: "ProgramTrials", design: "Design", output: Path | None, progress: "Callable[[Progress], None] | None"
+def _evaluate_in_sweep(
+    task: "ProgramTrials",
+    design: "Design",
+    output: Path | None,
+    machines: Machines,
+    progress: "Callable[[Progress], None] | None",
 ) -> list[list[Any]]:
     """Return the messages and the outputs of all trials; with a folder finished ones are kept in it."""
     import tempfile
@@ -165,7 +180,15 @@ def _evaluate_on_cores(
     with tempfile.TemporaryDirectory() as passing:
         folder = Path(passing, _FOLDER) if output is None else output / _FOLDER
         try:
-            results = run(task, design, folder, block=-(-len(design) // _MAX_BLOCKS), progress=progress)
+            results = run(
+                task,
+                design,
+                folder,
+                block=-(-len(design) // _MAX_BLOCKS),
+                workers=machines.workers,
+                scheduler=machines.scheduler,
+                progress=progress,
+            )
         except BaseException as error:
             if output is not None:
                 error.add_note(f"finished trials are stored in '{folder}'; the same command resumes them")
