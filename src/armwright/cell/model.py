@@ -12,6 +12,7 @@ from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, rea
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight
+from armwright.cell.trials import Trials
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import one_pose
@@ -113,6 +114,7 @@ class Cell:
         plan: whether a path is planned past other bodies where a point-to-point motion would run into one.
         around: the kind of detour of an infeasible straight line, by ``via`` poses or ``damped`` least squares; None
             for no detour.
+        trials: what trials with physics draw, and what they must reach.
     """
 
     name: str
@@ -137,6 +139,7 @@ class Cell:
     period: float = 1e-3
     around: Around | None = None
     plan: bool = False
+    trials: Trials = attrs.field(factory=Trials)
 
     def __attrs_post_init__(self) -> None:
         """Give every arm the gravity of the cell, with a warning where its file states another."""

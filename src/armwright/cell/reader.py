@@ -20,6 +20,7 @@ from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane
 from armwright.cell.names import arm_name
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
+from armwright.cell.trials_reader import read_trials
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, FileFormatError, MeshWarning, closest
 from armwright.files.document import Document, Table
@@ -75,11 +76,12 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     refuse_hidden_markers(top, fixtures, parts, markers)
     cameras = read_cameras(camera, top.table("cameras"), arms)
     sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
+    frames = _read_frames(top.table("frames"), arms)
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
         gravity=_read_gravity(top),
-        frames=_read_frames(top.table("frames"), arms),
+        frames=frames,
         fixtures=fixtures,
         parts=parts,
         markers=markers,
@@ -102,6 +104,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         clearance=motion.number("clearance_mm", default=0.0, lower=CLEARANCE_MM[0], upper=CLEARANCE_MM[1]) * 1e-3,
         around=DETOURS[motion.choice("around", DETOURS, default="none")],
         plan=motion.flag("plan"),
+        trials=read_trials(top.table("trials"), parts, markers, frames),
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):

@@ -22,6 +22,7 @@ from armwright.cli.programs import (
     print_diagnostics,
 )
 from armwright.cli.progress import waiting
+from armwright.cli.trials import MAX_TRIALS, Machines, SingleTrial, TrialVerdict, check_trial_options, run_trials
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
@@ -64,6 +65,19 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     physics: Physics = False,
     seed: Seed = 0,
+    trials: Annotated[
+        int | None,
+        Option(min=1, max=MAX_TRIALS, help="Number of trials drawn from [trials] of the cell file, with --physics."),
+    ] = None,
+    trial: Annotated[
+        int | None, Option(min=1, max=MAX_TRIALS, help="Number of the only trial to run, with all its files.")
+    ] = None,
+    workers: Annotated[
+        int | None, Option(min=1, help="Number of processes for --trials; the default is the number of cores.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, Option(help="Address of a Dask scheduler for --trials, as in tcp://10.0.0.1:8786.")
+    ] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     max_steps: Annotated[
@@ -85,7 +99,8 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     frames.json (the final frame tree), run.json (inputs, versions, summary) and report.html, a page that opens from the
     disk and shows the arm moving. With --around, the tool detours where a straight line meets a singularity or a limit;
     a warning has the location, the cause, and the cost in mm, mrad and s. With --physics, servos move the arms, fingers
-    hold by friction, and parts fall; measured.csv has what the servos measured.
+    hold by friction, and parts fall; measured.csv has what the servos measured. With --trials, many cases of the cell
+    are drawn, and the share of success is reported, with the causes of failure; --trial repeats one of them.
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
@@ -100,15 +115,6 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--cell", f"missing: {program} {needs}")
     used_cell = _adjust_cell(loaded.cell, servo_ms, deviation_mm, around, plan=plan)
     limits = Limits(steps=max_steps, time=max_time)
-    error: RunError | None = None
-    try:
-        recording = _interpret(
-            loaded.code, hardware_factory(physics=physics, seed=seed), used_cell, limits, watched=not (quiet or as_json)
-        )
-    except RunError as stopped:
-        if stopped.recording is None:
-            raise
-        error, recording = stopped, stopped.recording()
     options = {
         "servo_ms": used_cell.period * 1e3,
         "deviation_mm": used_cell.deviation * 1e3,
@@ -118,6 +124,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         "std": std.value,
         "strict": strict,
         **({"physics": True, "seed": seed} if physics else {}),
+        **({} if trial is None else {"trial": trial}),
     }
     inputs = RunInputs(
         program=program,
@@ -127,7 +134,36 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         options=options,
         motion_rows=most_rows,
     )
-    _finish(recording, loaded.diagnostics, inputs, output, error, as_json=as_json, quiet=quiet)
+    if trials is not None or trial is not None:
+        check_trial_options(used_cell, trials, trial, physics=physics)
+    if trials is not None:
+        machines = Machines(workers, scheduler)
+        summary = run_trials(
+            loaded.code,
+            used_cell,
+            inputs,
+            limits,
+            machines,
+            seed=seed,
+            count=trials,
+            output=output,
+            watched=not (quiet or as_json),
+        )
+        print_result(summary, as_json=as_json, quiet=quiet, output=output)
+        return
+    hardware, single = hardware_factory(physics=physics, seed=seed), None
+    if trial is not None:
+        single = SingleTrial(used_cell, seed, trial)
+        hardware, used_cell = single.hardware, single.case.cell
+    error: RunError | None = None
+    try:
+        recording = _interpret(loaded.code, hardware, used_cell, limits, watched=not (quiet or as_json))
+    except RunError as stopped:
+        if stopped.recording is None:
+            raise
+        error, recording = stopped, stopped.recording()
+    verdict = None if single is None else single.verdict(recording.duration, error)
+    _finish(recording, loaded.diagnostics, inputs, output, error, verdict=verdict, as_json=as_json, quiet=quiet)
 
 
 def _finish(
@@ -137,6 +173,7 @@ def _finish(
     output: Path | None,
     error: "RunError | None",
     *,
+    verdict: "TrialVerdict | None",
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -156,7 +193,8 @@ def _finish(
     if as_json:
         folder = {"output": str(output)} if output else {}
         frames = {"time": error.time, "frames": _frame_positions(error)} if error else {}
-        print_json({**result.as_data(), **folder, "left_out": notes, **frames})
+        tried = {} if verdict is None else {"trial": verdict.as_data()}
+        print_json({**result.as_data(), **folder, "left_out": notes, **frames, **tried})
     else:
         if diagnostics:
             print_diagnostics(diagnostics, recording.code.source)
@@ -165,6 +203,8 @@ def _finish(
         print_result(result, as_json=False, quiet=quiet)
         if error is not None:
             print_result_table(console(stderr=True), frame_table(error, recording.code))
+        if verdict is not None and not quiet:
+            print(verdict.text)
         if output is not None and (error is not None or not quiet):
             # On a line of its own and not wrapped, so that it can be clicked or copied.
             print(f"report{' up to the failure' if error else ''}: {output / 'report.html'}")

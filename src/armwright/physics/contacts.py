@@ -143,6 +143,13 @@ class Contacts:
         others = {*pairs[mine[:, 0] & ~mine[:, 1], 1].tolist(), *pairs[mine[:, 1] & ~mine[:, 0], 0].tolist()}
         return sorted({self.names[other] for other in others})
 
+    def touching_arms(self, data: Any, part: str) -> tuple[str, ...]:
+        """Return the arms whose links or grippers touch a part."""
+        pairs = data.contact.geom
+        mine = np.isin(pairs, self._part_geoms[part])
+        others = {*pairs[mine[:, 0], 1].tolist(), *pairs[mine[:, 1], 0].tolist()}
+        return tuple(sorted({self._owners[other] for other in others} - {_UNOWNED}))
+
     def overlaps(self, data: Any) -> list[Overlap]:
         """Return what stands inside other things."""
         found = []

@@ -20,7 +20,7 @@ from armwright.cell.hardware import DeviceError, Mishap, PeakContact
 from armwright.cell.model import Cell
 from armwright.cell.observations import MeasuredStream, Observations, Picture
 from armwright.cell.part_poses import PartPoses
-from armwright.cell.scene import Gripper, Part
+from armwright.cell.scene import Gripper, Part, Spread
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError, closest
 from armwright.kinematics.forward_kinematics import forward
@@ -34,7 +34,7 @@ from armwright.physics.plant import arm_indices
 from armwright.physics.seeing import target_of
 from armwright.physics.servo import ArmServo, Sent, TorqueLaw
 from armwright.physics.vision import camera_in_world, look
-from armwright.physics.world_model import WorldModel, in_hand, part_pose, tool_pose, world_model
+from armwright.physics.world_model import WorldModel, in_hand, part_pose, part_velocity, tool_pose, world_model
 from armwright.spatial.poses import homogeneous, inverse, to_noap
 from armwright.spatial.rotations import rotation_from_vector
 
@@ -48,6 +48,8 @@ _STOP = 0.2
 _TICK_TOLERANCE = 1e-6
 # Of very many pictures the last ones are kept.
 _MAX_PICTURES = 500
+# So are they of very many mishaps.
+_MAX_MISHAPS = 1000
 # Ticks between poses of the tool that are compared.
 _TIP_TICKS = 10
 # In wrists, the noise of moments by that of forces [m].
@@ -147,6 +149,7 @@ class PhysicsCell:
         self._tick, self._held = 0, dict[str, str]()
         self._log = Log(cell, self._world)
         self._pictures: tuple[Picture, ...] = ()
+        self._mishaps: tuple[Mishap, ...] = ()
         # Made for the first picture, and shared by copies.
         self._photographers: list[Photographer] = []
         self._tare = {name: np.zeros(6) for name in cell.arms}
@@ -199,6 +202,7 @@ class PhysicsCell:
                 return mishaps.unstable(self._now)
             mishap = self._watch()
             if mishap is not None and self._is_news(mishap):
+                self._mishaps = (*self._mishaps, mishap)[-_MAX_MISHAPS:]
                 return mishap
         return None
 
@@ -213,7 +217,8 @@ class PhysicsCell:
         return True
 
     @property
-    def _now(self) -> float:
+    def now(self) -> float:
+        """The time up to which the world has gone [s]."""
         return self._tick * self._cell.period
 
     def _step(self) -> None:
@@ -223,7 +228,7 @@ class PhysicsCell:
         data = self._data
         for name, servo in self._servos.items():
             reference = self._sent[name].at(self._tick)
-            measured = servo.drive(data, self._now, reference)
+            measured = servo.drive(data, self.now, reference)
             self._hands[name].drive.step(data)
             self._log.add(name, self._tick, reference, measured, self._hands[name].drive.opening(data))
         mujoco.mj_step(self._world.model, data, self._world.substeps)
@@ -236,7 +241,7 @@ class PhysicsCell:
         """Return what has gone wrong at this tick."""
         data, look = self._data, self._tick % self._every == 0
         if look and _is_unstable(data):
-            return mishaps.unstable(self._now)
+            return mishaps.unstable(self.now)
         for name, hand in self._hands.items():
             if hand.closed_tick is not None and self._tick >= hand.closed_tick:
                 hand.closed_tick = None
@@ -255,7 +260,7 @@ class PhysicsCell:
             if hand.expected is None:
                 return None
             distance = self._distance(arm, hand.expected)
-            return mishaps.closed_on_nothing(self._now, arm, hand.expected, distance)
+            return mishaps.closed_on_nothing(self.now, arm, hand.expected, distance)
         hand.part, hand.pose, hand.off = part, in_hand(self._data, arm, part), 0
         self._held[arm] = part
         if self._cell.arms[arm].servo.knows_parts:
@@ -284,7 +289,7 @@ class PhysicsCell:
         friction = max(gripper.friction, 0.0)
         pads = 2 if gripper.kind == "fingers" else 1
         holds = pads * friction * gripper.force / STANDARD_GRAVITY
-        return mishaps.lost(self._now, arm, part, holds, self._world.parts[part].mass)
+        return mishaps.lost(self.now, arm, part, holds, self._world.parts[part].mass)
 
     def _let_go(self, arm: str) -> None:
         hand = self._hands[arm]
@@ -302,7 +307,7 @@ class PhysicsCell:
         limit = _OFF_TRACK / self._cell.period
         if not before < limit <= hand.off_track:
             return None
-        return mishaps.off_track(self._now, arm, servo.arm, error, self._tracking[arm])
+        return mishaps.off_track(self.now, arm, servo.arm, error, self._tracking[arm])
 
     def _check_contacts(self) -> Mishap | None:
         """See whether an arm, or what it holds, presses on what it should not, or too deep on the plane."""
@@ -312,7 +317,7 @@ class PhysicsCell:
             news = self._tick > hand.quiet_until and not hand.guarded
             hand.quiet_until = self._tick + quiet
             if news:
-                return mishaps.touched(self._now, touch)
+                return mishaps.touched(self.now, touch)
         if self._world.plate:
             depth = self._contacts.plate_depth(self._data)
             for name, hand in self._hands.items():
@@ -320,14 +325,14 @@ class PhysicsCell:
                     allowed = self._cell.contact.max_depth
                     first, hand.deepest = hand.deepest <= allowed, depth
                     if depth > allowed and first:
-                        return mishaps.pressed_too_deep(self._now, name, depth, allowed)
+                        return mishaps.pressed_too_deep(self.now, name, depth, allowed)
         return None
 
     # ---- arms ----------------------------------------------------------------------------------------------------
 
     def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) of an arm: as they are now, as they are sent at a time to come."""
-        if now > self._now + self._cell.period * _TICK_TOLERANCE:
+        if now > self.now + self._cell.period * _TICK_TOLERANCE:
             return self.sent_configuration(arm, now)
         return np.array(self._data.qpos[self._servos[arm].indices.positions])
 
@@ -427,13 +432,13 @@ class PhysicsCell:
         if not self._photographers:
             self._photographers.append(Photographer(self._world.model, self._cell.cameras))
         carrier = self._cell.cameras[camera].on
-        q = None if carrier is None else self.configuration(carrier, self._now)
+        q = None if carrier is None else self.configuration(carrier, self.now)
         X_WC = camera_in_world(self._cell, self._cell.cameras[camera], q)
         seed = (self._seed, self._tick)
         seen = look(self._photographers[0], self._data, self._cell, frame, X_WC, seed)
         text = seen.message if seen.pose is None else f"{frame} at {_position_text(seen.pose)}"
         taken = Picture(
-            time=self._now, camera=camera, frame=frame, png=png(seen.picture), found=seen.pose is not None, text=text
+            time=self.now, camera=camera, frame=frame, png=png(seen.picture), found=seen.pose is not None, text=text
         )
         self._pictures = (*self._pictures, taken)[-_MAX_PICTURES:]
         if seen.pose is None:
@@ -445,6 +450,20 @@ class PhysicsCell:
     def true_pose(self, part: str) -> Array:
         """Return the pose (4, 4) of a part in the world, as it is now."""
         return part_pose(self._data, part)
+
+    def speed(self, part: str) -> tuple[float, float]:
+        """Return how fast a part moves [m/s] and turns [rad/s]."""
+        velocity = part_velocity(self._data, part)
+        return float(np.linalg.norm(velocity[:3])), float(np.linalg.norm(velocity[3:]))
+
+    def touching_arms(self, part: str) -> tuple[str, ...]:
+        """Return the arms whose links or grippers touch a part."""
+        return self._contacts.touching_arms(self._data, part)
+
+    @property
+    def mishaps(self) -> tuple[Mishap, ...]:
+        """What has gone wrong so far, also where the program has dealt with it."""
+        return self._mishaps
 
     def observations(self) -> Observations:
         """Return what the servos measured, where the parts were, and the largest errors."""
@@ -470,13 +489,15 @@ def drawn_parts(cell: Cell, rng: np.random.Generator) -> dict[str, Part]:
     """Return the parts of a cell where they stand in a world: each drawn from its spread."""
     parts = {}
     for name, part in cell.parts.items():
-        x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (part.spread.position, part.spread.position, part.spread.yaw)
-        turn = homogeneous(rotation_from_vector(np.array([0.0, 0.0, yaw])), np.zeros(3))
-        pose = np.array(part.pose)
-        pose[:3, :3] = turn[:3, :3] @ pose[:3, :3]
-        pose[:2, 3] += (x, y)
-        parts[name] = attrs.evolve(part, pose=pose)
+        parts[name] = attrs.evolve(part, pose=drawn_pose(part.pose, part.spread, rng))
     return parts
+
+
+def drawn_pose(X: Array, spread: Spread, rng: np.random.Generator) -> Array:
+    """Return a pose (4, 4) in the world near another one."""
+    x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (spread.position, spread.position, spread.yaw)
+    turned = rotation_from_vector(np.array([0.0, 0.0, yaw])) @ X[:3, :3]
+    return homogeneous(turned, X[:3, 3] + (x, y, 0.0))
 
 
 def _initial_data(world: WorldModel) -> Any:

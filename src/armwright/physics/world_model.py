@@ -221,6 +221,11 @@ def part_pose(data: Any, name: str) -> Array:
     return X
 
 
+def part_velocity(data: Any, name: str) -> Array:
+    """Return the velocity (6,) of a part: of its origin along the axes of the world, and how it turns about its own."""
+    return np.array(data.joint(name).qvel)
+
+
 def tool_pose(data: Any, arm: str) -> Array:
     """Return the pose (4, 4) of the tool of an arm in the world."""
     X = np.eye(4)

@@ -316,6 +316,12 @@ def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: 
     }
 
 
+def input_hashes(origin: RunInputs) -> list[str | None]:
+    """Return the SHA-256 hashes of program, cell and imports, to tell whether they are as they were."""
+    paths = [origin.program, *([] if origin.cell is None else [origin.cell]), *origin.imports]
+    return [_file_record(path)["sha256"] for path in paths]
+
+
 def _file_record(path: Path, text: str | None = None) -> dict[str, str | None]:
     digest = hash_of_read_file(path) or sha256(path) if text is None else hashlib.sha256(text.encode()).hexdigest()
     return {"path": str(path), "sha256": digest}

@@ -1,0 +1,95 @@
+"""Trials of a program in a cell with physics, as the task of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+
+from armwright.arrays import Array
+from armwright.cell.model import Cell
+from armwright.physics.trials import Case, Verdict, draw_case, judge
+from armwright.physics.world import PhysicsCell
+from armwright.program.bytecode.instructions import Code
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.machine import Limits, RunError
+from armwright.sweep.task import FAILURE, Output
+
+# Between the cause of a failure and its message.
+SEPARATOR = ": "
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ProgramTrials:
+    """Trials of a program. A point is the number of a trial.
+
+    Attributes:
+        code: of the program.
+        cell: in which it runs.
+        seed: of all trials.
+        limits: of each run.
+        identity: all else that the results depend on, as JSON data, such as hashes of the files.
+    """
+
+    code: Code
+    cell: Cell
+    seed: int
+    limits: Limits = attrs.field(factory=Limits)
+    identity: Mapping[str, Any] = attrs.field(factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The name of the task."""
+        return "trials"
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """The other inputs of the results."""
+        return {"seed": self.seed, "limits": attrs.asdict(self.limits), **self.identity}
+
+    @property
+    def outputs(self) -> Mapping[str, Output]:
+        """How a trial ended; its cause of failure is its message."""
+        return {
+            "distance": Output(description="of the part that is farthest from its goal", units="m"),
+            "angle": Output(description="of the part that is turned most from its goal", units="rad"),
+            "duration": Output(description="until the program ended", units="s"),
+            "ended": Output(description="1 where the program has come to its end, 0 where an error ended it"),
+        }
+
+    @property
+    def axes(self) -> Mapping[str, Any]:
+        """No axes."""
+        return {}
+
+    def __call__(self, points: Array) -> Mapping[str, Any]:
+        """Run the trials with the numbers (m, 1)."""
+        rows = [self._run(round(number)) for number in points[:, 0].tolist()]
+        columns: dict[str, Any] = {name: [row[name] for row in rows] for name in self.outputs}
+        return {**columns, FAILURE: [row[FAILURE] for row in rows]}
+
+    def _run(self, number: int) -> dict[str, Any]:
+        case = draw_case(self.cell, self.seed, number)
+        world = case.world()
+        error: RunError | None = None
+        try:
+            duration = interpret(self.code, case.cell, world, limits=self.limits).duration
+        except RunError as stopped:
+            error, duration = stopped, stopped.time
+        verdict = judge_run(world, case, duration, error)
+        failure = f"{verdict.cause}{SEPARATOR}{verdict.message}" if verdict.cause else ""
+        return {
+            "distance": verdict.distance,
+            "angle": verdict.angle,
+            "duration": duration,
+            "ended": float(error is None),
+            FAILURE: failure,
+        }
+
+
+def judge_run(world: PhysicsCell, case: Case, duration: float, error: RunError | None) -> Verdict:
+    """Return the verdict on the world of a program that ended after some time [s], by itself or by an error."""
+    # As many ticks as arms take to come to rest may have gone by since an error.
+    now = max(duration, world.now)
+    return judge(world, case.cell, now, error and (error.diagnostic.code, str(error)))
