@@ -1,9 +1,10 @@
 """Fuzzing of what reads files, by changing valid ones: `python fuzz/files.py TARGET [INPUTS] [SEED]`.
 
-Targets are `arm`, `linkage`, `urdf`, `cell`, `mesh`, `poses`, `iso9283`, `calibration` and `clearance` (measured
-tables). It needs nothing beside armwright. An input is a valid file in which keys, numbers, types, lines and cells were
-changed, lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised, when it
-takes more than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it again.
+Targets are `arm`, `linkage`, `urdf`, `mjcf`, `cell`, `mesh`, `poses`, `iso9283`, `calibration` and `clearance`
+(measured tables). It needs nothing beside armwright. An input is a valid file in which keys, numbers, types, lines and
+cells were changed, lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised,
+when it takes more than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it
+again.
 """
 
 import base64
@@ -24,6 +25,7 @@ import numpy as np
 
 from armwright.accuracy.measurement_file import read_measurements as read_accuracy
 from armwright.arm.load import load_arm, load_urdf, read_arm
+from armwright.arm.mjcf.reader import load_mjcf
 from armwright.calibration.measurements import read_measurements
 from armwright.cell.assembly import read_assembly_frames
 from armwright.cell.reader import read_cell
@@ -31,6 +33,7 @@ from armwright.clearance.estimation.measurement_file import read_clearance_measu
 from armwright.clearance.reader import read_linkage
 from armwright.errors import ArmwrightError
 from armwright.motion.poses_file import read_poses
+from armwright.physics.mjcf import arm_mjcf
 from armwright.spatial.meshes.reader import read_mesh
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -231,6 +234,11 @@ TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]
     "arm": (".toml", read_arm, lambda: _texts(*(SOURCE / "arm" / "catalogue").glob("*.toml"))),
     "linkage": (".toml", read_linkage, lambda: _texts(*(SOURCE / "clearance" / "catalogue").glob("*.toml"))),
     "urdf": (".urdf", load_urdf, lambda: _texts(EXAMPLES / "seven_joints.urdf")),
+    "mjcf": (
+        ".xml",
+        lambda path: load_mjcf(path, tip="pinch", lock=["left", "right"]),
+        lambda: [*_texts(EXAMPLES / "desk_arm.xml"), arm_mjcf(load_arm("puma560")).text],
+    ),
     "cell": (".toml", read_cell, lambda: _texts(*EXAMPLES.glob("*cell*.toml"))),
     "mesh": (".mesh", _read_mesh, _meshes),
     "poses": (".toml", read_poses, lambda: _texts(EXAMPLES / "puma_poses.toml", EXAMPLES / "round_the_post.toml")),

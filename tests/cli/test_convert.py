@@ -3,15 +3,18 @@
 import json
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
+from armwright.arm.mjcf.reader import load_mjcf
 from armwright.arm.urdf.reader import load_urdf
 from armwright.kinematics.forward_kinematics import forward
 from cli_calls import armwright
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "seven_joints.urdf"
+EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLE, DESK, CELL = (EXAMPLES / name for name in ("seven_joints.urdf", "desk_arm.xml", "two_arms.toml"))
 
 
 def test_catalogue_to_urdf(tmp_path: Path) -> None:
@@ -40,6 +43,52 @@ def test_urdf_to_arm_file(tmp_path: Path) -> None:
         "lost": [],
     }
     assert load_arm(tmp_path / "seven.toml") == load_urdf(EXAMPLE)
+
+
+def test_catalogue_to_mjcf(tmp_path: Path) -> None:
+    """An arm of the catalogue becomes an MJCF file; what that cannot hold is said, and stands in the file too."""
+    done = armwright("convert", "puma560", "-o", tmp_path / "puma.xml")
+
+    assert (done.returncode, done.stderr) == (0, "")
+    lost = [line.strip() for line in done.stdout.splitlines()[1:]]
+    comments = (tmp_path / "puma.xml").read_text(encoding="utf-8").splitlines()
+    assert all(f"<!-- Not represented: {sentence}. -->" in comments for sentence in lost)
+    assert sum("no body has a mass of" in sentence for sentence in lost) == 2
+    assert lost[-1].startswith("the mass matrix of the file differs by up to 0.000")
+    q = np.linspace(-1, 1, 6)
+    np.testing.assert_allclose(forward(load_arm(tmp_path / "puma.xml"), q), forward(load_arm("puma560"), q), atol=1e-12)
+
+
+def test_printed() -> None:
+    """Without -o the text is printed, and nothing is written; what is lost is on the standard error."""
+    done = armwright("convert", "ur5", "--to", "mjcf")
+
+    assert done.returncode == 0
+    assert done.stdout.startswith("<?xml")
+    assert done.stdout.endswith("</mujoco>\n")
+    assert "joint 1: the maximum speed, 3.14159 rad/s, is not in the file\n" in done.stderr
+
+
+def test_mjcf_to_arm_file(tmp_path: Path) -> None:
+    """An MJCF file becomes an arm file, its fingers locked in millimetres."""
+    part = ("--tip", "pinch", "--lock", "left=20,right=20")
+
+    done = armwright("convert", DESK, "-o", tmp_path / "desk.toml", *part, "--json")
+
+    data = json.loads(done.stdout)
+    assert (data["name"], data["joints"], data["lost"]) == ("desk_arm", 6, [])
+    expected = load_mjcf(DESK, tip="pinch", lock={"left": 0.02, "right": 0.02})
+    assert load_arm(tmp_path / "desk.toml") == expected
+
+
+def test_cell_to_mjcf(tmp_path: Path) -> None:
+    """A cell becomes an MJCF file that MuJoCo loads."""
+    done = armwright("convert", CELL, "--to", "mjcf", "-o", tmp_path / "cell.xml")
+
+    assert (done.returncode, done.stderr) == (0, "")
+    assert ": 2 arms, " in done.stdout.splitlines()[0]
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "cell.xml"))
+    assert model.body("ARM_2/link6").id > 0
 
 
 def test_part_of_a_chain(tmp_path: Path) -> None:
@@ -109,10 +158,21 @@ def test_other_commands_read_urdf() -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
-        (("puma560",), 2, "Missing option '-o'"),
-        (("puma560", "-o", "puma.xml"), 2, "expected a name that ends in .urdf or .toml, got puma.xml"),
-        (("puma560", "-o", "puma.toml", "--tip", "hand"), 2, "expected a URDF file, whose links and joints have names"),
-        (("puma560", "-o", "puma.toml", "--lock", "j1"), 2, "expected a URDF file, whose links and joints have names"),
+        (("puma560",), 2, "-o: missing; specify the file to write, or the format as --to, which is printed then"),
+        (("puma560", "-o", "puma.yml"), 2, "expected a name that ends in .urdf, .xml or .toml, got puma.yml"),
+        (("puma560", "--to", "mjfc"), 2, "'mjfc' is not one of 'urdf', 'mjcf', 'toml'"),
+        (("ntu-3r", "-o", "ntu.xml"), 3, "specify mass and inertia of link 3"),
+        ((CELL, "-o", "cell.urdf"), 2, "is a cell; expected mjcf, as the other formats hold a single arm"),
+        (
+            ("puma560", "-o", "puma.toml", "--tip", "hand"),
+            2,
+            "expected a URDF or MJCF file, whose links and joints have names",
+        ),
+        (
+            ("puma560", "-o", "puma.toml", "--lock", "j1"),
+            2,
+            "expected a URDF or MJCF file, whose links and joints have names",
+        ),
         (("pumma560", "-o", "puma.toml"), 2, "Did you mean 'puma560'?"),
         ((EXAMPLE, "-o", "seven.toml", "--tip", "tool_pont"), 2, "no link 'tool_pont'. Did you mean 'tool_point'?"),
         ((EXAMPLE, "-o", "seven.toml", "--lock", "waist=x"), 2, "--lock: expected J1,J2=30, got 'x' for waist"),

@@ -167,7 +167,15 @@ def test_run_file(stacked: Path) -> None:
 
     assert run["inputs"]["program"]["sha256"] == hashlib.sha256(STACKING.read_bytes()).hexdigest()
     assert run["inputs"]["cell"]["sha256"] == hashlib.sha256(STANFORD.read_bytes()).hexdigest()
-    options = {"servo_ms": 1.0, "deviation_mm": 1.0, "corner_mm": 20.0, "around": "none", "std": "2", "strict": False}
+    options = {
+        "servo_ms": 1.0,
+        "deviation_mm": 1.0,
+        "corner_mm": 20.0,
+        "around": "none",
+        "plan": False,
+        "std": "2",
+        "strict": False,
+    }
     assert run["options"] == options
     assert (run["ended"], run["exit_status"], run["left_out"]) == ("finished", 0, [])
     assert run["command"].startswith("armwright run ")

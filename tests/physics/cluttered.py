@@ -15,6 +15,7 @@ from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.quintic_polynomials import point_to_point
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, PlacedArm
+from armwright.physics.configuration_checks import ConfigurationChecks
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
@@ -55,7 +56,7 @@ def configurations(checker: ClearanceChecker, rng: np.random.Generator, count: i
 
 
 def is_free(checker: ClearanceChecker, q: Array) -> bool:
-    return bool((checker.distances_of({ARM: q}, 1.0) > 2 * RESOLUTION).all())
+    return bool((ConfigurationChecks(checker).distances_of({ARM: q}, 1.0) > 2 * RESOLUTION).all())
 
 
 def solutions(checker: ClearanceChecker, q: Array, start: Array) -> Array:

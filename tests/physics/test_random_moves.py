@@ -67,7 +67,7 @@ def test_no_collision_is_missed(name: str, sample: Sample) -> None:
     # The hand of the Stanford arm is part of its last link; the others have flanges.
     tool = homogeneous(np.eye(3), (0.0, 0.0, 0.0 if name == "stanford" else 0.12))
     arm = attrs.evolve(load_arm(name), tool=tool)
-    moves, looks = (1000, 10_000) if sample.whole else (12, 400)
+    moves, looks = (1000, 10_000) if sample.whole else (6, 300)
     missed = false_alarms = collisions = 0
     for k in range(moves):
         rng = np.random.default_rng([sample.seed, k])

@@ -347,7 +347,7 @@ def test_every_shape_is_drawn(visit) -> None:
     seen = []
     for count in range(len(shapes) + 1):
         fixtures = [
-            Body(name=f"B{i}", shape=i, pose=to_noap(homogeneous(np.eye(3), [0.004 * (i - 2), 0, 0.004])))
+            Body(name=f"B{i}", shape=i, pose=to_noap(homogeneous(np.eye(3), [0.25 * (i - 2), 0, 0.3])))
             for i in range(count)
         ]
         page = two_parts(np.eye(4), np.eye(4), (0.01, 0.01, 0.01))

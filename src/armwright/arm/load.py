@@ -10,6 +10,7 @@ import numpy as np
 
 from armwright.arm.collision_pairs import collision_pairs_in
 from armwright.arm.dh import about_com, from_modified
+from armwright.arm.mjcf.reader import load_mjcf
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
 from armwright.arm.solid_entries import solids_in
@@ -26,6 +27,7 @@ _CATALOGUE = Path(__file__).parent / "catalogue"
 
 # Files of the robot description format; one of xacro is told apart there, with what to do.
 _URDF = (".urdf", ".xacro")
+_MJCF = ".xml"
 
 
 def arm_names() -> tuple[str, ...]:
@@ -37,11 +39,11 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
     """Return an arm by its name in the catalogue, or from a file.
 
     Args:
-        name: such as ``puma560``; something with a slash or ending in .toml, .json or .urdf is a path.
+        name: such as ``puma560``; something with a slash or ending in .toml, .json, .urdf or .xml (MJCF) is a path.
         packages: folders of packages, by name, in which the meshes of a URDF file are.
 
     Raises:
-        MissingExtraError: the file is URDF, and lxml is not installed.
+        MissingExtraError: the file is URDF or MJCF, and lxml or MuJoCo is not installed.
         KindError: the name is neither a text nor a path.
         UnknownNameError: the catalogue has no such arm; the nearest is named.
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
@@ -49,7 +51,10 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
     if not isinstance(name, str | Path):
         raise KindError(f"name: expected the name of an arm or the path of a file, got {shown(name)}")
     if is_path(name):
-        return load_urdf(name, packages=packages) if Path(name).suffix.lower() in _URDF else read_arm(name)
+        suffix = Path(name).suffix.lower()
+        if suffix in _URDF:
+            return load_urdf(name, packages=packages)
+        return load_mjcf(name) if suffix == _MJCF else read_arm(name)
     if name not in arm_names():
         raise UnknownNameError("arm", str(name), arm_names())
     return read_arm(_CATALOGUE / f"{name}.toml")
@@ -57,7 +62,7 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
 
 def is_path(name: str | Path) -> bool:
     """Whether a name means a file and not an arm of the catalogue."""
-    return isinstance(name, Path) or "/" in name or name.lower().endswith((".toml", ".json", *_URDF))
+    return isinstance(name, Path) or "/" in name or name.lower().endswith((".toml", ".json", _MJCF, *_URDF))
 
 
 def read_arm(path: Path | str) -> Arm:

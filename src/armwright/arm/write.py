@@ -34,6 +34,22 @@ def toml_text(arm: Arm) -> str:
     return "\n".join(_lines(known_arm(arm)))
 
 
+def without_meshes(arm: Arm) -> tuple[Arm, list[str]]:
+    """Return an arm without the meshes among its solids, which an arm file cannot hold, and say which these are."""
+    lost: list[str] = []
+
+    def kept(solids: Sequence[Solid], what: str) -> tuple[Solid, ...]:
+        meshes = [solid.shape.name for solid in solids if isinstance(solid.shape, Mesh)]
+        lost.extend(f"{what}: the mesh '{name}' is not in the file" for name in meshes)
+        return tuple(solid for solid in solids if not isinstance(solid.shape, Mesh))
+
+    base = kept(arm.base_solids, "base")
+    links = [
+        attrs.evolve(link, solids=kept(link.solids, link.name or f"link {i}")) for i, link in enumerate(arm.links, 1)
+    ]
+    return attrs.evolve(arm, base_solids=base, links=links), lost
+
+
 def _lines(arm: Arm) -> Iterator[str]:
     yield f"name = {_text(arm.name)}"
     for key in ("title", "source", "base_link", "tool_link"):

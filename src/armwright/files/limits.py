@@ -32,7 +32,8 @@ class Limit(NamedTuple):
 
 
 LIMITS: Mapping[str, Limit] = {
-    "file_mb": Limit(4, "MB", "size of an arm, cell, linkage, URDF, poses or estimate file"),
+    "file_mb": Limit(4, "MB", "size of an arm, cell, linkage, URDF, MJCF, poses or estimate file"),
+    "meshes_mb": Limit(100, "MB", "size of the mesh files of an MJCF file together"),
     "program_mb": Limit(
         1, "MB", "size of a program in RLO, or of its intermediate code, also from standard input (`-`)"
     ),
@@ -43,6 +44,7 @@ LIMITS: Mapping[str, Limit] = {
     "line_characters": Limit(1_000_000, "characters", "length of a line of a CSV table"),
     "nesting": Limit(60, "levels", "depth of tables, lists and dotted keys in TOML and JSON, and of elements in XML"),
     "attributes": Limit(100, "attributes", "attributes of an element in XML"),
+    "elements": Limit(100_000, "elements", "elements of an MJCF file, with the files that it includes"),
     "digits": Limit(1000, "digits", "digits of an integer in TOML and JSON"),
     "entries": Limit(
         10_000, "entries", "tables of a list such as `[[pose]]`, devices, answers of a camera, measured poses and runs"
@@ -50,7 +52,12 @@ LIMITS: Mapping[str, Limit] = {
     "joints": Limit(100, "joints", "joints of an arm, from the base to the tip"),
     "bodies": Limit(100, "bodies", "bodies of a linkage, and also its joints, pins with clearance, drives and loads"),
     "frames": Limit(10_000, "frames", "frames of a cell"),
-    "imports": Limit(100, "files", "files that a program IMPORTs; the limit of frames applies to all of them together"),
+    "imports": Limit(
+        100,
+        "files",
+        "files that a program IMPORTs, the limit of frames applies to all of them together; files that an MJCF file "
+        "includes",
+    ),
     "hanging": Limit(1000, "frames", "depth of the frame tree of a cell, from a frame to WORLD"),
     "arms": Limit(20, "arms", "arms of a cell"),
     "revolutions": Limit(1000, "revolutions", "limits of a revolute joint, as revolutions from zero"),

@@ -25,7 +25,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.distances import TOLERANCE, Distances
-from armwright.spatial.shapes import Solid, box_about, farthest
+from armwright.spatial.shapes import Solid, farthest
 
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
@@ -94,20 +94,6 @@ class Closest(NamedTuple):
     time: float
 
 
-class Meeting(NamedTuple):
-    """Two bodies that are too near at a configuration.
-
-    Attributes:
-        number: of the configuration, from 0.
-        bodies: their numbers.
-        distance: between them [m]; below 0 where they overlap.
-    """
-
-    number: int
-    bodies: tuple[int, int]
-    distance: float
-
-
 class Least(NamedTuple):
     """The least distance on motions.
 
@@ -173,11 +159,8 @@ class ClearanceChecker:
             pairs: the numbers of bodies that may not meet.
         """
         self.arms = arms
-        self._distances = Distances([body.solid.shape for body in bodies])
-        self._radii = np.array([farthest(body.solid.shape) for body in bodies])
-        boxes = [box_about(body.solid.shape) for body in bodies]
-        self._boxes = np.array([box for box, _ in boxes]).reshape(-1, 3)
-        self._around = np.array([around for _, around in boxes])
+        self.distances = Distances([body.solid.shape for body in bodies])
+        self.radii = np.array([farthest(body.solid.shape) for body in bodies])
         self._arrange(bodies, pairs)
 
     def _arrange(self, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> None:
@@ -287,67 +270,12 @@ class ClearanceChecker:
             row[near.places] = near.distances
         return result
 
-    def first_meeting(self, configurations: Mapping[str, Array], margins: Array) -> Meeting | None:
-        """Return the first of several configurations at which bodies are closer than they may be; None for none.
-
-        Args:
-            configurations: (k, n) of each arm; (n,) of one that stands.
-            margins: (p,) the distance that each pair has to keep [m].
-        """
-        poses = self._poses_at(configurations)
-        nearest = self._least_distances(poses)
-        standing: set[int] = set()
-        for i in np.flatnonzero((nearest < margins).any(axis=1)).tolist():
-            near = np.flatnonzero(nearest[i] < margins)
-            moving = set(self._pairs[near].ravel().tolist()) - standing
-            for body in moving:
-                self._distances.place(body, poses[i, body])
-            standing |= {body for body in moving if self._bodies[body].arm is None}
-            for (a, b), margin in zip(self._pairs[near].tolist(), margins[near].tolist(), strict=True):
-                distance = self._distances.between(a, b, max(margin, TOLERANCE))
-                if distance < margin:
-                    return Meeting(i, (a, b), distance)
-        return None
-
-    def distances_of(self, configurations: Mapping[str, Array], within: float) -> Array:
-        """Return the distances (p,) of all pairs at one configuration (n,) of each arm [m]; ``within`` where more."""
-        poses = self._poses_at(configurations)
-        result = np.full(len(self._pairs), within)
-        for body, pose in enumerate(poses[0]):
-            self._distances.place(body, pose)
-        for k in np.flatnonzero(self._least_distances(poses)[0] < within).tolist():
-            a, b = self._pairs[k].tolist()
-            result[k] = self._distances.between(a, b, within)
-        return result
-
-    def _poses_at(self, configurations: Mapping[str, Array]) -> Array:
-        """Return the poses (k, b, 4, 4) of all bodies at configurations."""
-        frames = {}
-        for name, q in configurations.items():
-            frames[name] = self.arms[name].base @ self.arms[name].arm.link_poses(np.atleast_2d(q))
-        poses = np.empty((max(map(len, frames.values())), len(self._bodies), 4, 4))
-        for number, body in enumerate(self._bodies):
-            carrier = np.eye(4) if body.arm is None else frames[body.arm][:, body.link]
-            poses[:, number] = carrier @ body.solid.pose
-        return poses
-
-    def _least_distances(self, poses: Array) -> Array:
-        """Return lower bounds (k, p) of the distances of pairs: from a ball about one body to a box about the other."""
-        bounds = np.full((len(poses), len(self._pairs)), -np.inf)
-        positions, R = poses[:, :, :3, 3], poses[:, :, :3, :3]
-        for ball, box in (self._pairs.T, self._pairs.T[::-1]):
-            away = positions[:, ball] - positions[:, box]
-            inside = np.einsum("kpi,kpij->kpj", away, R[:, box])
-            beyond = np.maximum(np.abs(inside) - self._boxes[box], 0.0)
-            np.maximum(bounds, np.linalg.norm(beyond, axis=2) - self._around[box] - self._radii[ball], out=bounds)
-        return bounds
-
     def nearest_points(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:
         """Return the points (2, 3) of two bodies that are nearest to each other, or deepest in each other [m]."""
         poses, _ = self._placed(motions, np.array([time]), np.array([time]))
         for body in bodies:
-            self._distances.place(body, poses[0, body])
-        return self._distances.nearest(*bodies, within=_FAR).points
+            self.distances.place(body, poses[0, body])
+        return self.distances.nearest(*bodies, within=_FAR).points
 
     def _closest(self, window: Window, near: _Near, place: int) -> Closest:
         a, b = self._pairs[window.pairs[near.places[place]]].tolist()
@@ -367,14 +295,14 @@ class ClearanceChecker:
             both = np.where(self._of_one[pairs], 0.0, moved[i, a, 0])
             change = moved[i, self._outer[pairs], self._from[pairs]] + both
             closer = change + margins[i] + TOLERANCE
-            apart = np.linalg.norm(centres[i, a] - centres[i, b], axis=1) - self._radii[a] - self._radii[b]
+            apart = np.linalg.norm(centres[i, a] - centres[i, b], axis=1) - self.radii[a] - self.radii[b]
             near = np.flatnonzero(apart < closer)
             for body in {*a[near].tolist(), *b[near].tolist()}:
-                self._distances.place(body, poses[i, body])
+                self.distances.place(body, poses[i, body])
             looked_at = zip(
                 a[near].tolist(), b[near].tolist(), np.maximum(closer[near], TOLERANCE).tolist(), strict=True
             )
-            distances = np.array([self._distances.between(one, other, within) for one, other, within in looked_at])
+            distances = np.array([self.distances.between(one, other, within) for one, other, within in looked_at])
             kept = distances < closer[near]
             places = near[kept]
             results.append(_Near(places, distances[kept], change[places]))
@@ -399,7 +327,7 @@ class ClearanceChecker:
                     poses[:, number] = frames[:, body.link] @ body.solid.pose
                     carried = frames[:, : body.link + 1]
                     moved[:, number, : body.link + 1] = _movement(
-                        placed.arm.arm, carried, poses[:, number], self._radii[number], changes
+                        placed.arm.arm, carried, poses[:, number], self.radii[number], changes
                     )
         for number, body in enumerate(self._bodies):
             if body.arm is None:

@@ -9,7 +9,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.motion.trajectory import Trajectory
-from armwright.physics.clearance import ClearanceChecker, Meeting, resolution
+from armwright.physics.clearance import ClearanceChecker, resolution
+from armwright.physics.configuration_checks import ConfigurationChecks, Meeting
 from armwright.spatial.shapes import farthest
 
 # Distances up to this are looked for [m].
@@ -59,7 +60,7 @@ class JointSpace:
             margin: of distance that bodies keep [m], all of them the same or each pair its own.
         """
         self.step, self.checked, self.left = 1.0, 0, 0
-        self._checker, self._name = checker, arm
+        self._checks, self._pairs, self._name = ConfigurationChecks(checker), checker.pairs, arm
         self._standing = {name: motion(motion.duration) for name, motion in others.items()}
         # Pairs that the arm does not move do not count.
         moved = [body.arm == arm and body.link > 0 for body in checker.bodies]
@@ -76,15 +77,15 @@ class JointSpace:
         """Return the pairs that are too near at the start or an end (n,) of a path, the nearest first."""
         self.checked += 1
         margins = self._start if start else self._end
-        distances = self._checker.distances_of(self._at(q), max(float(margins.max(initial=0.0)), ROOM))
+        distances = self._checks.distances_of(self._at(q), max(float(margins.max(initial=0.0)), ROOM))
         pairs = np.flatnonzero(distances < margins)
-        meetings = [Meeting(0, self._checker.pairs[k], float(distances[k])) for k in pairs.tolist()]
+        meetings = [Meeting(0, self._pairs[k], float(distances[k])) for k in pairs.tolist()]
         return sorted(meetings, key=lambda meeting: meeting.distance)
 
     def set_ends(self, ends: Array, room: float) -> None:
         """Keep bodies apart by some room [m], or half of what they are apart at the ends (k, n) of a path."""
         within = float(self._least.max(initial=0.0)) + 2 * room
-        distances = np.min([self._checker.distances_of(self._at(q), within) for q in ends], axis=0)
+        distances = np.min([self._checks.distances_of(self._at(q), within) for q in ends], axis=0)
         self._margins = np.where(np.isinf(self._least), -np.inf, np.maximum(self._least, (distances + self._least) / 2))
         self._ends = ends
 
@@ -92,7 +93,7 @@ class JointSpace:
         """Whether all of several configurations (k, n) are free; False where no more may be checked."""
         inner = ~(np.abs(q[:, None] - self._ends).max(axis=2, initial=0.0) < _SAME).any(axis=1)
         looked_at = q[inner][: self.left]
-        meeting = self._checker.first_meeting(self._at(looked_at), self._margins) if len(looked_at) else None
+        meeting = self._checks.first_meeting(self._at(looked_at), self._margins) if len(looked_at) else None
         count = len(looked_at) if meeting is None else meeting.number + 1
         self.checked += count
         self.left -= count

@@ -17,7 +17,7 @@ from armwright.physics.geoms import add_geom, place, quaternion
 from armwright.physics.gripper import add_gripper, grip
 from armwright.physics.markers import add_marker
 from armwright.physics.pictures import add_camera, add_lights
-from armwright.physics.plant import add_arm, finish, new_world
+from armwright.physics.plant import PlantArm, add_arm, finish, new_world
 from armwright.physics.vision import marker_name
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Solid, centroid, convex_solids, farthest, inertia
@@ -76,6 +76,17 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     Raises:
         UnsupportedArmError: masses of an arm are unknown.
     """
+    spec, plants = world_spec(cell, parts)
+    substeps = round(cell.period / spec.option.timestep)
+    plate = cell.contact.height is not None
+    return WorldModel(cell=cell, model=finish(spec, plants), substeps=substeps, parts=parts, plate=plate)
+
+
+def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantArm, ...]]:
+    """Return the world of a cell as a specification that has not been compiled yet, and its arms.
+
+    Arguments and errors are those of ``world_model``.
+    """
     assert len(cell.arms) <= _MAX_ARMS  # noqa: S101 - a limit of cell files
     substeps = math.ceil(cell.period / _MAX_STEP - 1e-9)
     spec = new_world(cell.gravity, cell.period / substeps)
@@ -98,10 +109,9 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     for name, cell_arm in cell.arms.items():
         for label in (label for part in parts.values() for label, _ in _pieces(part.name, Solid(shape=part.shape))):
             grip(spec, name, cell_arm.gripper or Gripper(), label)
-    plate = _add_plate(spec, cell)
+    _add_plate(spec, cell)
     _add_cameras(spec, cell, {plant.name: plant.tool for plant in plants})
-    model = finish(spec, tuple(plants))
-    return WorldModel(cell=cell, model=model, substeps=substeps, parts=parts, plate=plate)
+    return spec, tuple(plants)
 
 
 def _pieces(name: str, solid: Solid) -> list[tuple[str, Solid]]:
@@ -173,13 +183,13 @@ def _add_part(spec: Any, part: Part, colour: tuple[float, ...]) -> None:
         add_geom(spec, body, label, piece, mass=0.0, rgba=colour, **bits, **_surface(part.friction))
 
 
-def _add_plate(spec: Any, cell: Cell) -> bool:
-    """Add the plane of contact of the cell: a light plate on a spring; return whether there is one."""
+def _add_plate(spec: Any, cell: Cell) -> None:
+    """Add the plane of contact of the cell, if there is one: a light plate on a spring."""
     import mujoco  # noqa: PLC0415 - only cells with several bodies need it
 
     plane = cell.contact
     if plane.height is None:
-        return False
+        return
     plate = spec.worldbody.add_body(name=PLATE, pos=(0.0, 0.0, plane.height), gravcomp=1.0)
     plate.explicitinertial, plate.mass, plate.inertia, plate.ipos = True, _PLATE_MASS, np.ones(3), np.zeros(3)
     plate.add_joint(
@@ -201,7 +211,6 @@ def _add_plate(spec: Any, cell: Cell) -> bool:
         conaffinity=_PART | _HAND,
         **_furniture(0.8),
     )
-    return True
 
 
 def part_pose(data: Any, name: str) -> Array:

@@ -14,6 +14,7 @@ from armwright.arrays import Array
 from armwright.cell.scene import Gripper
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.clearance import Body as SolidBody
+from armwright.physics.hand_solids import gripper_length, gripper_solids
 from armwright.report.animation import ArmFigure, Body, ChainJoint
 from armwright.report.shape_table import ShapeTable
 from armwright.spatial.poses import homogeneous, to_noap
@@ -83,7 +84,7 @@ def opening_of(placed: Placed) -> float:
 
 def _links(name: str, placed: Placed) -> Iterator[tuple[Body, Shape]]:
     arm = placed.arm
-    solids = arm_bodies(name, arm)
+    solids = arm_bodies(name, arm, placed.gripper)
     if any(link.solids for link in arm.links):
         for body in solids:
             yield _body(body.name, body.solid.pose, body.link, "base" if body.link == 0 else "link"), body.solid.shape
@@ -114,7 +115,8 @@ def _guessed(name: str, placed: Placed, solids: list[SolidBody]) -> Iterator[tup
     way = float(np.linalg.norm(arm.tool[:3, 3]))
     if way > radii[-1]:
         # From the origin of the last link towards the tool, as far as the palm.
-        length = max(way - _finger_length(arm), 0.2 * way)
+        behind = _finger_length(arm) if placed.gripper is None else gripper_length(placed.gripper)
+        length = max(way - behind, 0.2 * way)
         z = arm.tool[:3, 3] / way
         pose = homogeneous(_turned_to(z), z * length / 2)
         yield _body(f"{name} tool", pose, arm.n, "link"), Cylinder(radius=0.8 * radii[-1], length=length)
@@ -133,11 +135,13 @@ def _column(name: str, placed: Placed) -> Iterator[tuple[Body, Shape]]:
 def _gripper(name: str, placed: Placed, opening: float) -> Iterator[tuple[Body, Shape]]:
     """Yield fingers that point along a of the tool and open along o, or a cup; the tool is between their tips."""
     tool, finger = placed.arm.n + 1, _finger_length(placed.arm)
-    if placed.gripper is not None and placed.gripper.kind == "suction":
-        for radius, low, high in ((0.1, -1.0, -0.15), (0.28, -0.15, 0.0)):
-            pose = homogeneous(np.eye(3), [0.0, 0.0, (low + high) / 2 * finger])
-            shape = Cylinder(radius=radius * finger, length=(high - low) * finger)
-            yield _body(f"{name} cup", pose, tool, "joint"), shape
+    if placed.gripper is not None:
+        # As it is checked for collisions; closed fingers are half their own thickness aside.
+        for it in gripper_solids(placed.gripper, 0.0):
+            body = _body(f"{name} {it.name}", it.pose, tool, "joint" if it.grips else "link")
+            if it.name == "finger":
+                body = attrs.evolve(body, slide=1 if it.pose[1, 3] > 0 else -1)
+            yield body, it.shape
         return
     thick = 0.14 * finger
     palm = Box(size=[0.34 * finger, opening + 2 * thick, 0.2 * finger])

@@ -76,6 +76,7 @@ def run_page_data(
         animation=animation,
         collisions=collision_text(recording),
         pictures=pictures,
+        clearance=cell.clearance,
     )
 
 

@@ -1,1 +1,1 @@
-"""URDF, the format of ROS: elements, the tree of links and joints, the chain in it, its axes as frames, and back."""
+"""URDF, the format of ROS: elements, the tree of links and joints, and back."""

@@ -21,6 +21,8 @@ from armwright.errors import FileFormatError, closest, shown
 from armwright.extras import import_extra
 from armwright.files.inputs import read_bytes
 from armwright.files.limits import limit, limit_message
+from armwright.spatial.euler import from_rpy
+from armwright.spatial.poses import homogeneous
 
 _MISSING: Any = object()
 # What is matched is not given back: a word of a million digits and a letter is passed once.
@@ -155,6 +157,19 @@ class Element:
         if abs(value) > LARGEST:
             raise self.error(attribute, f"expected a number no larger than {LARGEST:g}, got {shown(word)}")
         return value
+
+
+def origin_of(element: Element) -> Array:
+    """Return the pose (4, 4) that the <origin> in an element gives; the same frame where there is none.
+
+    Raises:
+        FileFormatError: it is not written as one.
+    """
+    origin = element.find("origin")
+    if origin is None:
+        return np.eye(4)
+    rpy, xyz = (origin.vector(key, (0.0, 0.0, 0.0)) for key in ("rpy", "xyz"))
+    return homogeneous(from_rpy(*rpy), xyz)
 
 
 def read_elements(path: Path) -> Element:

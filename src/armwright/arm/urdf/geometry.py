@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from armwright.arm.urdf.elements import Element
+from armwright.arm.urdf.elements import Element, origin_of
 from armwright.arm.urdf.meshes import MeshFiles
-from armwright.arm.urdf.robot import origin_of
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import LARGEST_SIZE, Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
 

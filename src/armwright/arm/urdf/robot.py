@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -12,14 +12,16 @@ import numpy as np
 
 from armwright.arm.model import Limits, Link, Motor
 from armwright.arm.tensors import impossible_moments, moments_message
-from armwright.arm.urdf.elements import Element, read_elements
+from armwright.arm.tree.kinematic_tree import check_lock, listed
+from armwright.arm.urdf.elements import Element, origin_of, read_elements
+from armwright.arm.urdf.geometry import has_unread_shapes, solids_of
 from armwright.arm.urdf.meshes import MeshFiles
 from armwright.arrays import Array
-from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
+from armwright.errors import FileFormatError, closest, one_of
 from armwright.files.limits import limit, limit_message
-from armwright.spatial.euler import from_rpy
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
+from armwright.spatial.shapes import LARGEST_SIZE, Solid
 
 # URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
 NO_LIMIT = 1e30
@@ -53,6 +55,21 @@ class UrdfJoint:
         return self.kind == "fixed"
 
     @property
+    def prismatic(self) -> bool:
+        """Whether the joint slides."""
+        return self.kind == "prismatic"
+
+    @property
+    def anchor(self) -> Array:
+        """A point (3,) of the axis in the frame of the child: its origin."""
+        return np.zeros(3)
+
+    @property
+    def axis(self) -> Array:
+        """Unit vector (3,) in the frame of the child; x where the file says nothing."""
+        return axis_of(self)
+
+    @property
     def origin(self) -> Array:
         """Pose (4, 4) of the child in the frame of the parent, the joint at 0, or where it is locked."""
         X = origin_of(self.element)
@@ -62,6 +79,18 @@ class UrdfJoint:
         if self.element.text("type") == "prismatic":
             return X @ homogeneous(np.eye(3), axis)
         return X @ homogeneous(rotation_from_vector(axis), np.zeros(3))
+
+    def limits(self) -> tuple[Limits, list[str]]:
+        """Return its limits, and sentences on what was taken for unknown."""
+        return limits_of(self)
+
+    def motor(self) -> tuple[Motor, list[str]]:
+        """Return its friction."""
+        return motor_of(self), []
+
+    def error(self, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of the joint."""
+        return self.element.error("", message)
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
@@ -98,6 +127,37 @@ class Robot:
     parent_joints: dict[str, UrdfJoint]
     child_joints: dict[str, list[UrdfJoint]]
     meshes: MeshFiles
+
+    @property
+    def function(self) -> str:
+        """The function that reads such files, in messages."""
+        return "load_urdf"
+
+    def default_base(self) -> str:
+        """Return the link that hangs on nothing.
+
+        Raises:
+            FileFormatError: there are several.
+        """
+        roots = [name for name in self.links if name not in self.parent_joints]
+        if len(roots) > 1:
+            raise self.error(f"the base link is ambiguous: it could be {listed(roots)}; specify one as base (--base)")
+        return roots[0]
+
+    def body(self, link: str) -> Link:
+        """Return the body of a link, in its frame, with its solids."""
+        return attrs.evolve(body_of(self.links[link]), solids=self.solids(link))
+
+    def solids(self, link: str) -> tuple[Solid, ...]:
+        """Return what of a link meets other bodies, in its frame."""
+        return solids_of(self.links[link], self.meshes)
+
+    def left_out(self, links: Sequence[str]) -> list[str]:
+        """Return sentences on the shapes of links that are not read."""
+        unread = [link for link in links if has_unread_shapes(self.links[link], self.meshes)]
+        kinds = f"boxes, cylinders, spheres and capsules up to {LARGEST_SIZE:g} m"
+        notes = [f"of shapes, {kinds} are read; links with others: {listed(unread)}"] if unread else []
+        return [*notes, *self.meshes.notes()]
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the whole file."""
@@ -172,12 +232,7 @@ def _joint(element: Element, links: dict[str, Element], lock: Mapping[str, float
 
 def _locked(joint: UrdfJoint, position: float) -> UrdfJoint:
     """Return a joint as one that is held at a position."""
-    if position:
-        moves = joint.kind in _MOVING
-        limits = limits_of(joint)[0] if moves else Limits()
-        if not (moves and math.isfinite(position) and limits.lower <= position <= limits.upper):
-            ends = f"it goes from {limits.lower:g} to {limits.upper:g}" if moves else f"it is {joint.kind}"
-            raise InvalidValueError(f"lock: joint '{joint.name}' cannot be locked at {position:g} (rad or m): {ends}")
+    check_lock(joint.name, joint.kind, position, limits_of(joint)[0] if position and joint.kind in _MOVING else None)
     return attrs.evolve(joint, kind="fixed", locked=position)
 
 
@@ -189,19 +244,6 @@ def _refuse_cycles(robot: Robot) -> None:
         cycle = sorted(set(error.args[1]))
         joint = robot.parent_joints[cycle[0]]
         raise joint.element.error("", f"links form a cycle: {', '.join(map(repr, cycle))}") from None
-
-
-def origin_of(element: Element) -> Array:
-    """Return the pose (4, 4) that the <origin> in an element gives; the same frame where there is none.
-
-    Raises:
-        FileFormatError: it is not written as one.
-    """
-    origin = element.find("origin")
-    if origin is None:
-        return np.eye(4)
-    rpy, xyz = (origin.vector(key, (0.0, 0.0, 0.0)) for key in ("rpy", "xyz"))
-    return homogeneous(from_rpy(*rpy), xyz)
 
 
 def axis_of(joint: UrdfJoint) -> Array:

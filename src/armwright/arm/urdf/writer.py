@@ -13,12 +13,14 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from armwright.arm.collision_pairs import CollisionPairs
+from armwright.arm.losses import lost_beside_joints, lost_of_joint, mean_dry_friction
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Limits, Link, Motor
+from armwright.arm.names import distinct_names, refuse_names_beyond_xml
 from armwright.arm.positions import known_arm
 from armwright.arm.urdf.geometry import primitives
 from armwright.arm.urdf.robot import NO_LIMIT
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import ShapeError
 from armwright.spatial.euler import to_rpy
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import elementary_rotation
@@ -46,12 +48,7 @@ def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
     tilts = (0.0,) * known_arm(arm).n if tilts is None else tilts
     if len(tilts) != arm.n:
         raise ShapeError(f"tilts: expected {arm.n} of them, one for each joint, got {len(tilts)}")
-    parts = [*(joint.name for joint in arm.joints), *(link.name for link in arm.links)]
-    for name in (arm.name, arm.base_link, arm.tool_link, *parts):
-        if not all(_in_xml(character) for character in name):
-            raise InvalidValueError(
-                f"arm {arm.name!r}: XML cannot represent every character of this name: {name!r}; choose another"
-            )
+    refuse_names_beyond_xml(arm)
     root = _robot(arm, tilts)
     indent(root)
     return f"<?xml version='1.0' encoding='utf-8'?>\n{tostring(root, encoding='unicode')}\n"
@@ -66,32 +63,16 @@ def lost_in_urdf(arm: Arm) -> list[str]:
     if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         x, y, z = arm.gravity
         lost.append(f"gravity of ({x:g}, {y:g}, {z:g}) m/s² is not in the file: in URDF it points downwards along z")
-    for name, value, unit in (("reach", arm.reach, "m"), ("hand speed", arm.tool_speed, "m/s")):
-        if math.isfinite(value):
-            lost.append(f"the {name} of {value:g} {unit} is not in the file")
-    if arm.uncertainty is not None:
-        lost.append("the uncertainty of its dimensions is not in the file")
-    lost += [f"the {name} is not in the file" for name in ("title", "source") if getattr(arm, name)]
-    return lost
+    return [*lost, *lost_beside_joints(arm)]
 
 
 def _lost_of_joint(arm: Arm, index: int) -> Iterator[str]:
     """Say what of one joint, from 0, and its link is lost."""
-    label, joint, motor, link = arm.joint_label(index), arm.joints[index], arm.motors[index], arm.links[index]
-    units = joint.units
+    motor, link, units = arm.motors[index], arm.links[index], arm.joints[index].units
     if motor.inertia:
+        label = arm.joint_label(index)
         yield f"{label}: the inertia of the drive, {motor.inertia:g} {units.inertia}, is not in the file"
-    if motor.gear_ratio != 1:
-        yield f"{label}: the gear ratio {motor.gear_ratio:g} is not in the file"
-    if motor.coulomb_forward != motor.coulomb_backward:
-        yield (
-            f"{label}: Coulomb friction of {motor.coulomb_forward:g} {units.effort} forward and "
-            f"{motor.coulomb_backward:g} {units.effort} backward is {_dry_friction(motor):g} {units.effort} in both "
-            "directions in the file"
-        )
-    if math.isfinite(joint.limits.acceleration):
-        largest = f"{joint.limits.acceleration:g} {units.position}/s²"
-        yield f"{label}: the maximum acceleration, {largest}, is not in the file"
+    yield from lost_of_joint(arm, index)
     yield from _lost_solids(f"link {index + 1}", link.solids)
     if link.unknown:
         yield f"link {index + 1}: its mass and inertia are unknown and not in the file: {link.unknown}"
@@ -111,10 +92,10 @@ def _lost_solids(body: str, solids: Sequence[Solid]) -> Iterator[str]:
 def _robot(arm: Arm, tilts: Sequence[float]) -> Element:
     root = Element("robot", name=arm.name)
     own = [arm.base_link, "", *(link.name for link in arm.links), arm.tool_link]
-    base, *moving, tool = _distinct_names(own, ["base", *(f"link_{i}" for i in range(arm.n + 1)), "tool"])
+    base, *moving, tool = distinct_names(own, ["base", *(f"link_{i}" for i in range(arm.n + 1)), "tool"])
     first, last = "base_to_link_0", f"link_{arm.n}_to_tool"
     own = ["", *(joint.name for joint in arm.joints), ""]
-    _, *joints, _ = _distinct_names(own, [first, *(f"joint_{i}" for i in range(1, arm.n + 1)), last])
+    _, *joints, _ = distinct_names(own, [first, *(f"joint_{i}" for i in range(1, arm.n + 1)), last])
     _shapes(SubElement(root, "link", name=base), arm.base_solids, np.eye(4))
     SubElement(root, "link", name=moving[0])
     _joint(root, (first, "fixed", base, moving[0]), to_rpy(arm.base[:3, :3]), arm.base[:3, 3])
@@ -139,17 +120,6 @@ def _robot(arm: Arm, tilts: Sequence[float]) -> Element:
     return root
 
 
-def _distinct_names(own: Sequence[str], defaults: Sequence[str]) -> list[str]:
-    """Return names that differ: the own ones, and defaults where there is none, or it is taken already."""
-    taken: list[str] = []
-    for name, default in zip(own, defaults, strict=True):
-        chosen = name if name and name not in taken else default
-        while chosen in taken or (chosen != name and chosen in own):
-            chosen += "_"
-        taken.append(chosen)
-    return taken
-
-
 def _joint(root: Element, names: tuple[str, str, str, str], rpy: Array, xyz: Array) -> Element:
     """Append a joint, by its name, its type, its parent and its child."""
     name, kind, parent, child = names
@@ -166,8 +136,8 @@ def _limits_and_friction(joint: Element, limits: Limits, motor: Motor) -> None:
     largest = {"effort": limits.effort, "velocity": limits.speed}
     if stops or not all(map(math.isinf, largest.values())):
         _numbers(joint, "limit", **stops, **largest)
-    if motor.viscous or _dry_friction(motor):
-        _numbers(joint, "dynamics", damping=motor.viscous, friction=_dry_friction(motor))
+    if motor.viscous or mean_dry_friction(motor):
+        _numbers(joint, "dynamics", damping=motor.viscous, friction=mean_dry_friction(motor))
 
 
 def _body(element: Element, link: Link, rpy: Array, X: Array) -> None:
@@ -209,12 +179,3 @@ def _number(value: float) -> str:
     """Write a number so that it is read back to the last bit; one without bounds as the largest there is."""
     value = float(value) + 0.0
     return repr(math.copysign(NO_LIMIT, value) if math.isinf(value) else value)
-
-
-def _dry_friction(motor: Motor) -> float:
-    return (motor.coulomb_forward + motor.coulomb_backward) / 2
-
-
-def _in_xml(character: str) -> bool:
-    code = ord(character)
-    return code in {0x9, 0xA, 0xD} or 0x20 <= code <= 0xD7FF or 0xE000 <= code <= 0xFFFD or code >= 0x10000

@@ -129,7 +129,7 @@ class Machine:
             trees=tuple(state.trees),
             configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
             observations=self.hardware.observations(),
-            checked=None if self.collisions is None else self.collisions.checked,
+            checked=None if self._collisions is None else self._collisions.checked,
         )
 
     # ---- names and values ------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from armwright.errors import counted
 from armwright.motion.detour import Detour
 from armwright.motion.plan import Obstacle
 from armwright.physics.clearance import RESOLUTION
-from armwright.physics.collisions import LOOKED_FOR, Collision, StageClearance
+from armwright.physics.collisions import Collision
 from armwright.physics.planner import PlannedPath
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm.recording import RunStage
@@ -112,14 +112,6 @@ def collision_advice(collision: Collision, arm: str) -> list[str]:
     return [f"{come}, {leave}, or go another way by `VIA`; another configuration at the start may help too"]
 
 
-def clearance_text(clearance: StageClearance) -> str:
-    """Return how near a stage comes to other bodies."""
-    if clearance.distance is None:
-        return f"no other body within {LOOKED_FOR * 1e3:g} mm"
-    own, other = clearance.bodies
-    return f"least distance {clearance.distance * 1e3:.1f} mm, {own} and {other} after {clearance.time:.3f} s"
-
-
 def clearance_warning(run: RunStage, wanted: float) -> Diagnostic | None:
     """Return the warning about a stage that comes nearer to other bodies than is wanted [m]; None where it does not."""
     clearance = run.clearance
@@ -171,8 +163,6 @@ def stage_note(run: RunStage) -> str:
         notes.append(f"without stops the path is infeasible at {where}")
     if stage.certificate is not None:
         notes.append(stage.certificate.summary)
-    if run.clearance is not None:
-        notes.append(clearance_text(run.clearance))
     return "; ".join(notes)
 
 

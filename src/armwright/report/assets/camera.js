@@ -94,6 +94,17 @@ function boundsOf(shape, X) {
   );
 }
 
+// The frames of an arm, and the ends of its bodies along z.
+function endsOf({ bodies }, frames, shapes) {
+  const ends = bodies.flatMap(({ shape, pose, frame, stretches }) => {
+    const { length: long, size } = shapes[shape];
+    const half = stretches ? 0 : (long ?? size?.[2] ?? 0) / 2;
+    const X = compose(frames[frame], pose);
+    return [-half, half].map((z) => plus(X.slice(9), X.slice(6, 9), z));
+  });
+  return [...frames.map((X) => X.slice(9)), ...ends];
+}
+
 // Everything the arms, the parts and the frames ever touch, in points; and the size of it all. Of what stands, no more
 // than is near: a hall would make the arms small.
 function surveyed() {
@@ -102,7 +113,7 @@ function surveyed() {
   const skip = Math.max(1, Math.floor(animation.t.length / 60));
   for (let i = 0; i < animation.t.length; i += skip)
     for (const figure of Object.values(animation.arms))
-      for (const X of framesOf(figure, [i, i, 0])) points.push(X.slice(9));
+      points.push(...endsOf(figure, framesOf(figure, [i, i, 0]), animation.shapes));
   for (const frame of animation.frames) {
     frame.poses.forEach((row, i) => {
       if (i >= frame.visible_from && i % skip === 0) points.push(row.slice(9));

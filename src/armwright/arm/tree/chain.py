@@ -1,0 +1,193 @@
+"""The chain in a tree of links: from a base link to a tip link, and what hangs on every link of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+
+from armwright.arm.dh import carry
+from armwright.arm.model import Link
+from armwright.arm.tree.kinematic_tree import Tree, TreeJoint, listed
+from armwright.arrays import Array
+from armwright.errors import one_of
+from armwright.files.limits import limit, limit_message
+from armwright.spatial.poses import homogeneous
+from armwright.spatial.shapes import Solid
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class MovingJoint:
+    """A joint of the chain that moves, in the frame of the base link, all joints at 0.
+
+    Attributes:
+        joint: the joint.
+        X_BJ: (4, 4) a frame on its axis.
+        axis: (3,) its axis, a unit vector.
+        bodies: of all links that it moves and no later joint does.
+    """
+
+    joint: TreeJoint
+    X_BJ: Array
+    axis: Array
+    bodies: tuple[Link, ...]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Chain:
+    """The chain from one link to another, all joints at 0.
+
+    Attributes:
+        base: name of the first link.
+        tip: name of the last link.
+        moving: the joints that move, from the base to the tip.
+        X_BT: (4, 4) the tip seen from the base.
+        X_RB: (4, 4) the base seen from the root of the tree.
+        base_solids: what of the base meets other bodies, in its frame.
+        notes: sentences on what was chosen.
+    """
+
+    base: str
+    tip: str
+    moving: tuple[MovingJoint, ...]
+    X_BT: Array
+    X_RB: Array
+    base_solids: tuple[Solid, ...]
+    notes: tuple[str, ...] = ()
+
+
+def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Chain:
+    """Return the chain between two links.
+
+    Args:
+        tree: the file.
+        base: name of the first link; the tree's own when left out.
+        tip: name of the last link; when left out the only one at the end of moving joints, or the link that carries
+            all of them.
+
+    Raises:
+        UnknownNameError: there is no link of that name.
+        FileFormatError: it is not clear which link is meant, nothing moves between them, or a joint is none of an arm.
+    """
+    base = tree.default_base() if base is None else one_of("link", base, tree.links)
+    notes: tuple[str, ...] = ()
+    if tip is None:
+        tip, notes = _default_tip(tree, base)
+    one_of("link", tip, tree.links)
+    path = _joint_path(tree, base, tip)
+    for joint in path:
+        joint.require_serial()
+    movable = [joint for joint in path if not joint.fixed]
+    if not movable:
+        raise tree.error(f"no joint moves between the links '{base}' and '{tip}'")
+    if len(movable) > limit("joints"):
+        raise tree.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(movable))}")
+    X, moving = np.eye(4), []
+    branches: list[TreeJoint] = []
+    # What moves beside the chain and hangs on the base is no load of the arm.
+    standing = list(_welded_links(tree, base, X, []))
+    links = [link for link, _ in standing]
+    for joint in path:
+        X = X @ joint.origin
+        if not joint.fixed:
+            welded = list(_welded_links(tree, joint.child, X, branches))
+            links += [link for link, _ in welded]
+            bodies = tuple(carry(tree.body(link), X_BL) for link, X_BL in welded)
+            X_BJ = X @ homogeneous(np.eye(3), joint.anchor)
+            moving.append(MovingJoint(joint=joint, X_BJ=X_BJ, axis=X[:3, :3] @ joint.axis, bodies=bodies))
+    _refuse_loads(tree, [joint for joint in branches if joint not in movable])
+    X_RB, root = np.eye(4), base
+    while root in tree.parent_joints:
+        root = tree.parent_joints[root].parent
+    for joint in _joint_path(tree, root, base):
+        X_RB = X_RB @ joint.origin
+    solids = [solid.moved(X_BL) for link, X_BL in standing for solid in tree.solids(link)]
+    notes += tuple(tree.left_out(links))
+    return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, base_solids=tuple(solids), notes=notes)
+
+
+def _default_tip(tree: Tree, base: str) -> tuple[str, tuple[str, ...]]:
+    """Return the only link that ends a chain, and notes; one that is fixed to the base ends none.
+
+    Where several ends are fixed to one another, the link that carries all of them is the end: it moves as they do.
+    """
+    ends = []
+    pending = [(base, False)]
+    while pending:
+        link, moves = pending.pop()
+        pending += [(joint.child, moves or not joint.fixed) for joint in reversed(tree.child_joints[link])]
+        if moves and not tree.child_joints[link]:
+            ends.append(link)
+    if not ends:
+        raise tree.error(f"no joint moves a link below '{base}'")
+    if len(ends) == 1:
+        return ends[0], ()
+    carrier = _carrier(tree, base, ends)
+    if carrier is None:
+        raise tree.error(
+            f"the tip link is ambiguous: it could be {listed(ends)}; specify one as tip: "
+            f"{tree.function}(path, tip='{ends[0]}'), or armwright convert {tree.path} --tip {ends[0]} -o arm.toml"
+        )
+    note = f"the tool is '{carrier}', which carries {listed(ends)}; each moves as it does and may be the tip (--tip)"
+    return carrier, (note,)
+
+
+def _carrier(tree: Tree, base: str, ends: list[str]) -> str | None:
+    """Return the last link that all ends hang on, if no joint moves between it and them, else None."""
+    paths = [_joint_path(tree, base, end) for end in ends]
+    common = [row[0] for row in zip(*paths, strict=False) if all(joint is row[0] for joint in row)]
+    rigid = all(joint.fixed for path in paths for joint in path[len(common) :])
+    return common[-1].child if common and rigid else None
+
+
+def _joint_path(tree: Tree, base: str, tip: str) -> list[TreeJoint]:
+    """Return the joints from the base to the tip."""
+    path: list[TreeJoint] = []
+    link = tip
+    while link != base:
+        if link not in tree.parent_joints:
+            raise tree.error(f"link '{tip}' is not below link '{base}'")
+        path.append(tree.parent_joints[link])
+        link = tree.parent_joints[link].parent
+    return path[::-1]
+
+
+def _welded_links(tree: Tree, link: str, X_BL: Array, branches: list[TreeJoint]) -> Iterator[tuple[str, Array]]:
+    """Walk through the links that are fixed to a link and to one another, with their poses in the frame of the base.
+
+    Joints that move and hang on one of them are put into ``branches``, links with shapes that are not read into
+    ``unread``.
+    """
+    pending = [(link, X_BL)]
+    while pending:
+        name, X = pending.pop()
+        yield name, X
+        for joint in tree.child_joints[name]:
+            if joint.fixed:
+                pending.append((joint.child, X @ joint.origin))
+            else:
+                branches.append(joint)
+
+
+def _refuse_loads(tree: Tree, branches: list[TreeJoint]) -> None:
+    """Refuse joints beside the chain that carry something: how that moves, a serial arm does not know."""
+    loaded = [joint for joint in branches if _carries_mass(tree, joint)]
+    if loaded:
+        single, names = len(loaded) == 1, [joint.name for joint in loaded]
+        does = "joint lies beside the chain, moves and has" if single else "joints lie beside the chain, move and have"
+        raise loaded[0].error(
+            f"{len(loaded)} {does} mass to carry: {listed(names)}. An arm has no branches: choose another tip, or "
+            f"lock {'it' if single else 'them'}, at 0 or elsewhere: lock={names} (--lock {','.join(names)})",
+        )
+
+
+def _carries_mass(tree: Tree, joint: TreeJoint) -> bool:
+    pending = [joint.child]
+    while pending:
+        name = pending.pop()
+        body = tree.body(name)
+        if body.mass or body.inertia.any() or body.unknown:
+            return True
+        pending += [child_joint.child for child_joint in tree.child_joints[name]]
+    return False

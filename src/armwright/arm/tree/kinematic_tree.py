@@ -1,0 +1,154 @@
+"""What a file says of links and joints, whatever its format: a tree, with every joint at 0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol, TypeAlias
+
+from armwright.arm.model import Limits, Link, Motor
+from armwright.arrays import Array, number
+from armwright.errors import FileFormatError, InvalidValueError, KindError, shown
+from armwright.spatial.shapes import Solid
+
+# Joints that are held: their names, or their positions by their names [rad] or [m].
+Lock: TypeAlias = Collection[str] | Mapping[str, float]
+
+
+class TreeJoint(Protocol):
+    """A joint of a tree, between the link it hangs on and the link it carries."""
+
+    @property
+    def name(self) -> str:
+        """As in the file."""
+
+    @property
+    def parent(self) -> str:
+        """The link it hangs on."""
+
+    @property
+    def child(self) -> str:
+        """The link it carries."""
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it welds its links together."""
+
+    @property
+    def prismatic(self) -> bool:
+        """Whether it slides."""
+
+    @property
+    def origin(self) -> Array:
+        """Pose (4, 4) of the child in the frame of the parent, the joint at 0."""
+
+    @property
+    def anchor(self) -> Array:
+        """A point (3,) of the axis in the frame of the child [m]."""
+
+    @property
+    def axis(self) -> Array:
+        """Unit vector (3,) in the frame of the child."""
+
+    def limits(self) -> tuple[Limits, list[str]]:
+        """Return its limits, and sentences on what was not taken as it stands."""
+
+    def motor(self) -> tuple[Motor, list[str]]:
+        """Return its drive, and sentences on what was not taken as it stands."""
+
+    def require_serial(self) -> None:
+        """Refuse a joint that is no part of a serial arm.
+
+        Raises:
+            FileFormatError: it is none.
+        """
+
+    def error(self, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of the joint."""
+
+
+class Tree(Protocol):
+    """The links and joints of a file."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    @property
+    def name(self) -> str:
+        """Of the robot."""
+
+    @property
+    def function(self) -> str:
+        """The function that reads such files, in messages."""
+
+    @property
+    def links(self) -> Collection[str]:
+        """Names, in the order of the file."""
+
+    @property
+    def parent_joints(self) -> Mapping[str, TreeJoint]:
+        """By the name of a link: the joint that carries it."""
+
+    @property
+    def child_joints(self) -> Mapping[str, Sequence[TreeJoint]]:
+        """By the name of a link: the joints that hang on it."""
+
+    def default_base(self) -> str:
+        """Return the link that is the base where none is named.
+
+        Raises:
+            FileFormatError: it is not clear which one that is.
+        """
+
+    def body(self, link: str) -> Link:
+        """Return the body of a link, in its frame, with its solids.
+
+        Raises:
+            FileFormatError: the file does not say it as it should.
+        """
+
+    def solids(self, link: str) -> tuple[Solid, ...]:
+        """Return what of a link meets other bodies, in its frame."""
+
+    def left_out(self, links: Sequence[str]) -> list[str]:
+        """Return sentences on what of links is not read, once they have been read."""
+
+    def error(self, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of the whole file."""
+
+
+def listed(names: Sequence[str], most: int = 50) -> str:
+    """Return names for a message, not more than some of them."""
+    more = f" and {len(names) - most:,} more" if len(names) > most else ""
+    return ", ".join(f"'{name}'" for name in names[:most]) + more
+
+
+def locked_positions(lock: Lock) -> dict[str, float]:
+    """Return where joints are held by their names [rad] or [m].
+
+    Raises:
+        KindError: it is one text, or a position is no number.
+    """
+    if isinstance(lock, str):
+        raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
+    positions = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
+    return {name: number(q, f"lock, '{name}'") for name, q in positions.items()}
+
+
+def check_lock(name: str, kind: str, position: float, limits: Limits | None) -> None:
+    """Refuse to hold a joint where it cannot be.
+
+    Args:
+        name: of the joint.
+        kind: as in the file.
+        position: where it is to be held [rad] or [m].
+        limits: of the joint; None of one that has no position.
+
+    Raises:
+        InvalidValueError: it cannot be there.
+    """
+    if position and not (limits and math.isfinite(position) and limits.lower <= position <= limits.upper):
+        ends = f"it goes from {limits.lower:g} to {limits.upper:g}" if limits else f"it is {kind}"
+        raise InvalidValueError(f"lock: joint '{name}' cannot be locked at {position:g} (rad or m): {ends}")

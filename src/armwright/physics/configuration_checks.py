@@ -1,0 +1,96 @@
+"""Whether the bodies of a cell meet at configurations of its arms, of which many are looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.physics.clearance import ClearanceChecker
+from armwright.physics.distances import TOLERANCE
+from armwright.spatial.shapes import box_about
+
+
+class Meeting(NamedTuple):
+    """Two bodies that are too near at a configuration.
+
+    Attributes:
+        number: of the configuration, from 0.
+        bodies: their numbers.
+        distance: between them [m]; below 0 where they overlap.
+    """
+
+    number: int
+    bodies: tuple[int, int]
+    distance: float
+
+
+class ConfigurationChecks:
+    """The bodies of a cell at configurations of its arms."""
+
+    def __init__(self, checker: ClearanceChecker) -> None:
+        """Take the bodies, and which pairs of them may not meet."""
+        self._checker = checker
+        self._pairs = np.array(checker.pairs, dtype=np.intp).reshape(-1, 2)
+        boxes = [box_about(body.solid.shape) for body in checker.bodies]
+        self._boxes = np.array([box for box, _ in boxes]).reshape(-1, 3)
+        self._around = np.array([around for _, around in boxes])
+
+    def first_meeting(self, configurations: Mapping[str, Array], margins: Array) -> Meeting | None:
+        """Return the first of several configurations at which bodies are closer than they may be; None for none.
+
+        Args:
+            configurations: (k, n) of each arm; (n,) of one that stands.
+            margins: (p,) the distance that each pair has to keep [m].
+        """
+        poses = self._poses_at(configurations)
+        nearest = self._least_distances(poses)
+        standing: set[int] = set()
+        for i in np.flatnonzero((nearest < margins).any(axis=1)).tolist():
+            near = np.flatnonzero(nearest[i] < margins)
+            moving = set(self._pairs[near].ravel().tolist()) - standing
+            for body in moving:
+                self._checker.distances.place(body, poses[i, body])
+            standing |= {body for body in moving if self._checker.bodies[body].arm is None}
+            for (a, b), margin in zip(self._pairs[near].tolist(), margins[near].tolist(), strict=True):
+                distance = self._checker.distances.between(a, b, max(margin, TOLERANCE))
+                if distance < margin:
+                    return Meeting(i, (a, b), distance)
+        return None
+
+    def distances_of(self, configurations: Mapping[str, Array], within: float) -> Array:
+        """Return the distances (p,) of all pairs at one configuration (n,) of each arm [m]; ``within`` where more."""
+        poses = self._poses_at(configurations)
+        result = np.full(len(self._pairs), within)
+        for body, pose in enumerate(poses[0]):
+            self._checker.distances.place(body, pose)
+        for k in np.flatnonzero(self._least_distances(poses)[0] < within).tolist():
+            a, b = self._pairs[k].tolist()
+            result[k] = self._checker.distances.between(a, b, within)
+        return result
+
+    def _poses_at(self, configurations: Mapping[str, Array]) -> Array:
+        """Return the poses (k, b, 4, 4) of all bodies at configurations."""
+        frames = {}
+        for name, q in configurations.items():
+            frames[name] = self._checker.arms[name].base @ self._checker.arms[name].arm.link_poses(np.atleast_2d(q))
+        poses = np.empty((max(map(len, frames.values())), len(self._checker.bodies), 4, 4))
+        for number, body in enumerate(self._checker.bodies):
+            carrier = np.eye(4) if body.arm is None else frames[body.arm][:, body.link]
+            poses[:, number] = carrier @ body.solid.pose
+        return poses
+
+    def _least_distances(self, poses: Array) -> Array:
+        """Return lower bounds (k, p) of the distances of pairs: from a ball about one body to a box about the other."""
+        bounds = np.full((len(poses), len(self._pairs)), -np.inf)
+        positions, R = poses[:, :, :3, 3], poses[:, :, :3, :3]
+        for ball, box in (self._pairs.T, self._pairs.T[::-1]):
+            away = positions[:, ball] - positions[:, box]
+            inside = np.einsum("kpi,kpij->kpj", away, R[:, box])
+            beyond = np.maximum(np.abs(inside) - self._boxes[box], 0.0)
+            np.maximum(
+                bounds, np.linalg.norm(beyond, axis=2) - self._around[box] - self._checker.radii[ball], out=bounds
+            )
+        return bounds
