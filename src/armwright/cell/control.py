@@ -16,11 +16,13 @@ class Servo:
     Attributes:
         bandwidth: natural frequency of the errors of each joint [rad/s].
         integral: whether errors that stay are integrated.
+        knows_parts: whether the controller is told of a part in the hand: its mass as the cell file has it.
         law: ``computed torque`` with the model of the arm, or ``pd`` with the weight of the arm taken off.
     """
 
     bandwidth: float = 50.0
     integral: bool = True
+    knows_parts: bool = True
     law: Law = "computed torque"
 
 

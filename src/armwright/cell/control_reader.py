@@ -24,6 +24,7 @@ def read_servo(entry: Table) -> Servo:
     servo = Servo(
         bandwidth=entry.number("bandwidth_rad_per_s", default=50.0, lower=1.0, upper=1000.0),
         integral=entry.flag("integral", default=True),
+        knows_parts=entry.flag("knows_parts", default=True),
         law=_LAWS[entry.choice("law", _LAWS, default="computed torque")],
     )
     entry.refuse_unknown_keys()

@@ -49,8 +49,8 @@ class Contacts:
         self._model = world.model
         self.names: list[str] = []
         self._owners: list[str] = []
-        # The bodies of grippers and parts.
-        self._hand: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
+        # What grips, and parts.
+        self._grips: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
         self._parts: npt.NDArray[np.bool_] = np.zeros(world.model.ngeom, dtype=bool)
         self._pads: dict[str, list[int]] = {name: [] for name in world.cell.arms}
         self._part_geoms: dict[str, list[int]] = {name: [] for name in world.parts}
@@ -75,8 +75,8 @@ class Contacts:
                 self._part_geoms[name].append(number)
             return
         self._owners.append(arm)
-        self._hand[number] = not (what.startswith(("link", "base")))
-        if what.endswith("finger") or what.startswith("lip"):
+        self._grips[number] = what.endswith("finger") or what.startswith("lip")
+        if self._grips[number]:
             self._pads[arm].append(number)
         label = what.partition("/")[0].replace("link", "link ")
         label = "finger" if what.endswith("finger") else "suction cup" if what.startswith("lip") else label
@@ -88,9 +88,10 @@ class Contacts:
         for arm, part in held.items():
             owners[self._part_geoms[part]] = arm
         owned = owners != _UNOWNED
-        # An arm may touch nothing but what is its; grippers may touch parts.
+        # An arm may touch nothing but what is its; fingers that hold nothing may touch parts.
         apart = (owners[:, None] != owners[None, :]) & (owned[:, None] | owned[None, :])
-        reach = self._hand[:, None] & self._parts[None, :]
+        empty = self._grips & ~np.isin(self._owners, list(held))
+        reach = empty[:, None] & self._parts[None, :]
         self._unwanted = apart & ~reach & ~reach.T
         self._holders = owners
 

@@ -109,6 +109,8 @@ class ArmServo:
         forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
         self._dry, self._lean = (forward + backward) / 2, (forward - backward) / 2
         self._offsets = dry_offsets(plant)
+        # What is known of a part in the hand: its mass [kg] at the tool point.
+        self.load = 0.0
         self._sums = np.zeros(arm.n)
         self._effort = arm.limits.effort
         w = settings.bandwidth
@@ -140,6 +142,8 @@ class ArmServo:
                 tau = self._compiled.gravity_efforts(q) + self._compiled.mass_matrix(q).diagonal() * correction
             else:
                 tau = self._compiled.inverse_dynamics(q, qd, reference.qdd + correction)
+                if self.load:
+                    tau = tau + self._load_efforts(q, reference.qdd + correction)
             direction = np.tanh(reference.qd / _MOVING)
             tau = tau + self._dry * direction + self._lean * np.abs(direction)
             # What a motor cannot give is not to be asked for twice.
@@ -147,6 +151,11 @@ class ArmServo:
         tau = np.minimum(np.maximum(tau, -self._effort), self._effort)
         data.ctrl[self.indices.motors] = tau
         return Measured(q, qd, tau)
+
+    def _load_efforts(self, q: Array, qdd: Array) -> Array:
+        """Return what a part in the hand asks for beside the arm (n,); its centripetal acceleration is left out."""
+        J = self._compiled.jacobian(q)[:3]
+        return np.asarray(J.T @ (self.load * (J @ qdd - self.arm.gravity)))
 
     def _read(self, data: Any) -> tuple[Array, Array]:
         """Return positions and speeds as the controller knows them."""

@@ -184,7 +184,13 @@ class PhysicsCell:
         """Let time go by, until now or until something goes wrong."""
         end = math.floor(now / self._cell.period + _TICK_TOLERANCE)
         while self._tick < end:
-            self._step()
+            try:
+                self._step()
+            except InvalidValueError:
+                # Numbers without meaning have come to a servo.
+                if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():
+                    raise
+                return mishaps.unstable(self._now)
             mishap = self._watch()
             if mishap is not None and self._is_news(mishap):
                 return mishap
@@ -246,6 +252,8 @@ class PhysicsCell:
             return mishaps.closed_on_nothing(self._now, arm, hand.expected, distance)
         hand.part, hand.pose, hand.off = part, in_hand(self._data, arm, part), 0
         self._held[arm] = part
+        if self._cell.arms[arm].servo.knows_parts:
+            self._servos[arm].load = self._cell.parts[part].mass
         self._contacts.hold(self._held)
         return None
 
@@ -275,6 +283,7 @@ class PhysicsCell:
     def _let_go(self, arm: str) -> None:
         hand = self._hands[arm]
         hand.part = hand.pose = None
+        self._servos[arm].load = 0.0
         self._held.pop(arm, None)
         self._contacts.hold(self._held)
 
@@ -467,6 +476,9 @@ def drawn_parts(cell: Cell, rng: np.random.Generator) -> dict[str, Part]:
 def _initial_data(world: WorldModel) -> Any:
     import mujoco  # noqa: PLC0415 - only cells with physics need it
 
+    # What MuJoCo warns of is told as a mishap; by itself it would print it, and write a file where the user is.
+    if mujoco.get_mju_user_warning() is None:
+        mujoco.set_mju_user_warning(lambda _: None)
     # What has become meaningless is told, not forgotten.
     world.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     data = mujoco.MjData(world.model)
