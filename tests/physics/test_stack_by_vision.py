@@ -53,17 +53,16 @@ def test_stack(sample: Sample) -> None:
     """Wherever the blocks stand, they end up stacked, within 2 mm, and nothing goes wrong on the way."""
     pytest.importorskip("cv2")
     cell = read_cell(CELL)
-    worst = 0.0
-    cases = sample.cases(100)
-    for rng in cases:
+    aside = []
+    for rng in sample.cases(100):
         world = PhysicsCell(cell, seed=int(rng.integers(2**31)))
         recording = armwright.program.run(PROGRAM, cell=cell, hardware=world)
-        aside, off = stacked(world)
-        worst = max(worst, aside)
+        sideways, off = stacked(world)
+        aside.append(sideways)
         assert errors(recording) == []
         assert off < 1e-3
-        assert aside < 2e-3
-    sample.record("stacks of three blocks", len(cases), 0, worst=worst)
+    sample.record("stacks of three blocks", len(aside), int((np.array(aside) > 2e-3).sum()), worst=max(aside))
+    assert max(aside) < 2e-3
 
 
 @pytest.mark.parametrize(("frame", "error"), [("SECOND", 0.08), ("THIRD", -0.1)])
