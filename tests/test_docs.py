@@ -177,6 +177,11 @@ HEAD = "[arms.ARM_1]\njoint_positions = [0, 0, 0.3, 0, 0, 0]\n"
         (f"{HEAD}[camera]\nqqqqqqqq = 1\n", "camera."),
         (f"{HEAD}[contact]\nqqqqqqqq = 1\n", "contact."),
         (f"{HEAD}[motion]\nqqqqqqqq = 1\n", "motion."),
+        (f"{HEAD}[limits]\nqqqqqqqq = 1\n", "limits."),
+        (f"{HEAD}[arms.ARM_1.servo]\nqqqqqqqq = 1\n", "servo."),
+        (f"{HEAD}[arms.ARM_1.plant]\nmodel = 'stanford'\nqqqqqqqq = 1\n", "plant."),
+        (f"{HEAD}[arms.ARM_1.sensors]\nqqqqqqqq = 1\n", "sensors."),
+        (f"{HEAD}[arms.ARM_1.force]\nqqqqqqqq = 1\n", "force."),
     ],
 )
 def test_every_key_of_a_cell_is_explained(text: str, table: str, tmp_path: Path) -> None:

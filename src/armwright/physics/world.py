@@ -503,6 +503,9 @@ def drawn_pose(X: Array, spread: Spread, rng: np.random.Generator) -> Array:
 def _initial_data(world: WorldModel) -> Any:
     import mujoco  # noqa: PLC0415 - only cells with physics need it
 
+    # What MuJoCo warns of is told as a mishap; by itself it would print it, and write a file where the user is.
+    if mujoco.get_mju_user_warning() is None:
+        mujoco.set_mju_user_warning(lambda _: None)
     # What has become meaningless is told, not forgotten.
     world.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     data = mujoco.MjData(world.model)

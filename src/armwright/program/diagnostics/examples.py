@@ -3,8 +3,8 @@
 ``// std=83`` and ``// strict`` are the options of the command line. ``// cell: arms ARM_1, ARM_2`` tells what a
 program is checked against, and so do ``frames``, ``devices`` and ``visions``; ``// import: parts.toml: CUP, LID on
 CUP`` tells what an IMPORT brings. ``// run in one_arm`` has the program run in a cell that comes with the pages, with
-``// around: via`` and ``// limits: steps 1000`` as on the command line; ``// effort: 60 in joint 2`` makes a joint of
-its arms that weak.
+``// around: via``, ``// limits: steps 1000`` and ``// physics`` as on the command line; ``// effort: 60 in joint 2``
+makes a joint of its arms that weak.
 """
 
 import re
@@ -13,8 +13,10 @@ from pathlib import Path
 
 import attrs
 
+from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Around, Cell, CellArm
 from armwright.cell.reader import read_cell
+from armwright.cell.simulator import Simulator
 from armwright.errors import FileFormatError
 from armwright.program.api import compile as translate, run
 from armwright.program.language.diagnostic import Diagnostic
@@ -30,6 +32,7 @@ _AROUND = re.compile(r"^// around: (via|damped)$", re.MULTILINE)
 _DETOUR_METHODS: Mapping[str, Around] = {"via": "via", "damped": "damped"}
 _EFFORT = re.compile(r"^// effort: (\d+) in joint (\d)$", re.MULTILINE)
 _LIMIT = re.compile(r"^// limits: (steps|depth|time) (\d+)$", re.MULTILINE)
+_PHYSICS = re.compile(r"^// physics$", re.MULTILINE)
 _KNOWN = re.compile(r"^// cell: (arms|frames|devices|visions) (.+)$", re.MULTILINE)
 _IMPORT = re.compile(r"^// import: (\S+): (.+)$", re.MULTILINE)
 _OLD = re.compile(r"^// std=83$", re.MULTILINE)
@@ -54,7 +57,7 @@ def diagnose_example(source: Source) -> tuple[Diagnostic, ...]:
         return compiled.diagnostics
     limits = Limits(**{quantity: int(count) for quantity, count in _LIMIT.findall(source.text)})
     try:
-        recording = run(compiled, limits=limits)
+        recording = run(compiled, limits=limits, hardware=_hardware(source.text))
     except RunError as error:
         return (*compiled.diagnostics, error.diagnostic)
     return (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell))
@@ -72,6 +75,15 @@ def _run_cell(text: str) -> Cell | None:
         arms = {name: _limit_effort(arm, int(number) - 1, float(effort)) for name, arm in cell.arms.items()}
         cell = attrs.evolve(cell, arms=arms)
     return cell
+
+
+def _hardware(text: str) -> HardwareFactory:
+    """Return how the cell is set up in which a program is run."""
+    if not _PHYSICS.search(text):
+        return Simulator
+    from armwright.physics.world import PhysicsCell  # noqa: PLC0415 - few programs need it
+
+    return PhysicsCell
 
 
 def _limit_effort(placed: CellArm, joint: int, effort: float) -> CellArm:
