@@ -61,9 +61,11 @@ def _goals(table: Table, parts: Collection[str], places: Collection[str]) -> dic
     for key in table:
         name = _known_name(table, key, read_name(table, key, goals), parts, "part")
         entry = table.table(key)
-        text = entry.text("at")
+        text, others = entry.text("at"), [other for other in parts if other != name]
         goals[name] = Goal(
-            at=_known_name(entry, "at", read_name(entry, "at", (), text), places, "marker or frame"),
+            at=_known_name(
+                entry, "at", read_name(entry, "at", (), text), [*places, *others], "marker, frame or other part"
+            ),
             distance=entry.number("mm", default=2.0, lower=1e-3, upper=1e4) * 1e-3,
             angle=math.radians(entry.number("deg", default=3.0, lower=1e-3, upper=180.0)),
         )

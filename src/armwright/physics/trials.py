@@ -144,7 +144,7 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
     """
     moving = _come_to_rest(world, cell, now)
     errors = {
-        part: placing_error(world.true_pose(part), goal_pose(cell, part), cell.parts[part]) for part in _goals(cell)
+        part: placing_error(world.true_pose(part), goal_pose(cell, part, world), cell.parts[part]) for part in _goals(cell)
     }
     cause, message = ended_by or _fault(world, cell, moving, errors) or ("", "")
     return Verdict(
@@ -198,10 +198,17 @@ def _moves(world: PhysicsCell, part: str) -> bool:
     return not (speed <= _REST_SPEED and turn <= _REST_TURN)
 
 
-def goal_pose(cell: Cell, part: str) -> Array:
-    """Return the pose (4, 4) in the world at which a part stands upright on the frame or marker of its goal."""
+def goal_pose(cell: Cell, part: str, world: PhysicsCell) -> Array:
+    """Return the pose (4, 4) in the world at which a part stands upright on the frame, marker or part of its goal.
+
+    Another part is where it is in the world now.
+    """
     at = cell.trials.goals[part].at
-    X_WG = cell.markers[at].pose if at in cell.markers else cell.tree().world(at)
+    if at in cell.parts:
+        top = support(cell.parts[at].shape, np.array([0.0, 0.0, 1.0]))
+        X_WG = world.true_pose(at) @ homogeneous(np.eye(3), (0.0, 0.0, top))
+    else:
+        X_WG = cell.markers[at].pose if at in cell.markers else cell.tree().world(at)
     height = support(cell.parts[part].shape, np.array([0.0, 0.0, -1.0]))
     return np.asarray(X_WG @ homogeneous(np.eye(3), (0.0, 0.0, height)))
 
