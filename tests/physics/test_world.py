@@ -79,7 +79,7 @@ def test_placed_by_vision(arm: str, sample: Sample, tmp_path: Path) -> None:
         recording = interpret(code, drawn, world)
         off.append(placing_error(world.true_pose("BLOCK"), goal))
         tips.append(recording.observations.facts["tip"]["ARM_1"])
-        same_trace(drawn, code, recording)
+        same_trace(attrs.evolve(drawn, parts=parts), code, recording)
     distances = np.array(off)[:, 0]
     sample.record(
         f"blocks placed by {arm}", len(off), int((distances > 2e-3).sum()), worst=distances.max(), rejected=rejected

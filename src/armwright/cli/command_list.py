@@ -20,7 +20,7 @@ COMMANDS = {
     "code": "Print the intermediate code of a program, or write it to a file that can be edited and run.",
     "arms": "List the arms of the catalogue.",
     "show": "Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.",
-    "convert": "Write an arm as URDF or as an arm file, and report what the format cannot represent.",
+    "convert": "Write an arm as URDF, as MJCF or as an arm file, or a cell as MJCF, and report what the format cannot represent.",
     "forward": "Print the tool pose for joint positions.",
     "inverse": "Print all solutions of the inverse kinematics of a pose, and whether each is within the joint limits.",
     "jacobian": "Print the Jacobian of the tool point: three linear rows, then three angular, in SI units and radians.",

@@ -95,6 +95,10 @@ def _new(arm: Arm, device: str | None, *, quickly: bool) -> CompiledArm:
     return DeviceArm(arm=arm, device=CudaDevice(device_number(device)))
 
 
+# What an arm looks like is in none of its equations.
+_IN_NO_EQUATION = frozenset({"solids", "base_solids", "collisions"})
+
+
 def _bits(value: object) -> object:
     """Return what two values have in common if no bit of them differs: arms that are equal may differ in -0.0."""
     if isinstance(value, np.ndarray):
@@ -102,8 +106,8 @@ def _bits(value: object) -> object:
     if isinstance(value, tuple):
         return tuple(map(_bits, value))
     if attrs.has(kind := type(value)):
-        # What does not count when values are compared is in no equation either.
-        return kind.__qualname__, *(_bits(getattr(value, field.name)) for field in attrs.fields(kind) if field.eq)
+        names = (field.name for field in attrs.fields(kind) if field.name not in _IN_NO_EQUATION)
+        return kind.__qualname__, *(_bits(getattr(value, name)) for name in names)
     return value.hex() if isinstance(value, float) else value
 
 
