@@ -84,7 +84,7 @@ def test_failures_are_reported_for_people(folder: Path) -> None:
     [
         (("--trials", "2"), "--physics"),
         (("--physics", "--trials", "2", "--trial", "1"), "either --trials or --trial"),
-        (("--physics", "--trials", "0"), "0 is not in the range"),
+        (("--physics", "--trials", "0"), "greater than or equal to 1"),
     ],
 )
 def test_mistakes(folder: Path, arguments: tuple[str, ...], words: str) -> None:

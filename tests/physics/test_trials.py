@@ -1,6 +1,5 @@
 """What is drawn for trials, and the verdict on worlds that are set up to fail or succeed."""
 
-
 import attrs
 import numpy as np
 import pytest

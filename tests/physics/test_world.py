@@ -332,7 +332,7 @@ def test_a_weight_on_the_tool(tmp_path: Path) -> None:
     program = PROGRAM[: PROGRAM.index("  MOVE obj TO goal")] + "  MOVE ARM_1 TO stop WITH DEPARTURE = apo ;\nEND.\n"
     run(cell, program, world)
     arm = cell.arms["ARM_1"].arm
-    rng, now = np.random.default_rng(0), world._now
+    rng, now = np.random.default_rng(0), world.now
     for _ in range(5):
         q = world.sent_configuration("ARM_1", now)
         goal = np.clip(q + rng.uniform(-0.15, 0.15, arm.n) * (1, 1, 0.3, 1, 1, 1), arm.limits.lower, arm.limits.upper)

@@ -144,7 +144,8 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
     """
     moving = _come_to_rest(world, cell, now)
     errors = {
-        part: placing_error(world.true_pose(part), goal_pose(cell, part, world), cell.parts[part]) for part in _goals(cell)
+        part: placing_error(world.true_pose(part), goal_pose(cell, part, world), cell.parts[part])
+        for part in _goals(cell)
     }
     cause, message = ended_by or _fault(world, cell, moving, errors) or ("", "")
     return Verdict(

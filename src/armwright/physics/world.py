@@ -199,7 +199,7 @@ class PhysicsCell:
                 # Numbers without meaning have come to a servo.
                 if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():
                     raise
-                return mishaps.unstable(self._now)
+                return mishaps.unstable(self.now)
             mishap = self._watch()
             if mishap is not None and self._is_news(mishap):
                 self._mishaps = (*self._mishaps, mishap)[-_MAX_MISHAPS:]

@@ -48,5 +48,5 @@ def _histogram(summary: TrialsSummary) -> str:
     axes = plain_axes(figure, "distance from the goal [mm]", "trials")
     axes.bar(edges[:-1] * 1e3, counts, np.diff(edges) * 1e3, align="edge", edgecolor="white")
     axes.set(title=figure_title(figure, f"{summary.program}: placing errors"), xlim=(0.0, float(edges[-1]) * 1e3))
-    axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.locator_params(axis="y", integer=True)
     return svg_text(figure)

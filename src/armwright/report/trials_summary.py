@@ -134,7 +134,7 @@ class TrialsSummary:
             )
         if self.failures:
             number = self.failures[0].number
-            rows.append(f"a trial is repeated alone by --seed {self.seed} --trial NUMBER, as in --trial {number}")
+            rows.append(f"to repeat one alone, with all its files: --seed {self.seed} --trial {number} -o FOLDER")
         return tuple(rows)
 
     def histogram(self) -> tuple[Array, Array]:

@@ -90,6 +90,6 @@ class ProgramTrials:
 
 def judge_run(world: PhysicsCell, case: Case, duration: float, error: RunError | None) -> Verdict:
     """Return the verdict on the world of a program that ended after some time [s], by itself or by an error."""
+    ended_by = None if error is None else (error.diagnostic.code, str(error))
     # As many ticks as arms take to come to rest may have gone by since an error.
-    now = max(duration, world.now)
-    return judge(world, case.cell, now, error and (error.diagnostic.code, str(error)))
+    return judge(world, case.cell, max(duration, world.now), ended_by)
