@@ -53,6 +53,7 @@ CALLS: dict[str, list[str]] = {
     "move": ["joint", "puma560-seed", "poses.toml", "--no-film", "--json"],
     "iso9283": ["measured.csv", "--json"],
     "calibrate": ["puma560-seed", "points.csv", "--folds", "2", "--json"],
+    "calibrate-camera": ["corners.csv", "--size", "640x480", "--squares", "9x7", "--square-mm", "30", "--json"],
     "plan-poses": ["ur5", "-n", "16", "--json"],
     "clearance": [],
     "clearance simulate": ["slider-crank", "--speed-rpm", "300", "--revolutions", "0.05", "--json"],
@@ -76,6 +77,7 @@ GIVEN = {
     "poses.toml": "puma_poses.toml",
     "measured.csv": "measured_poses.csv",
     "points.csv": "puma_points.csv",
+    "corners.csv": "board_corners.csv",
     "rest.csv": "five_bar_rest.csv",
 }
 VALUES = [
