@@ -27,15 +27,20 @@ def public(namespace: str) -> Iterator[tuple[str, Any]]:
             yield from ((f"{name}.{key}", getattr(value, key)) for key in methods)
 
 
+# Models with a field for each thing that a file states.
+MODELS = ("Arm", "Cell")
+
+
 @pytest.mark.parametrize("namespace", NAMESPACES)
 def test_signatures_are_short(namespace: str) -> None:
-    """No signature that ``help`` prints is over 200 characters long."""
+    """No signature that ``help`` prints is over 200 characters long; the names of the fields of a model may be 300."""
     for name, value in public(namespace):
         try:
             signature = str(inspect.signature(value))
         except ValueError:  # some builtin types have none
             continue
-        assert len(signature.replace("self, ", "")) <= 200, f"{namespace}.{name}{signature}"
+        most = 300 if name in MODELS or name.removesuffix(".__init__") in MODELS else 200
+        assert len(signature.replace("self, ", "")) <= most, f"{namespace}.{name}{signature}"
 
 
 def test_shortened_signatures_keep_names_and_annotations() -> None:

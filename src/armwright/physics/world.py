@@ -31,6 +31,7 @@ from armwright.physics.gripper import GripperDrive
 from armwright.physics.measured import Log
 from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
+from armwright.physics.seeing import target_of
 from armwright.physics.servo import ArmServo, Sent, TorqueLaw
 from armwright.physics.vision import camera_in_world, look
 from armwright.physics.world_model import WorldModel, in_hand, part_pose, tool_pose, world_model
@@ -109,8 +110,13 @@ class PhysicsCell:
 
         Raises:
             UnsupportedArmError: masses of an arm are unknown.
-            InvalidValueError: things stand inside each other at the start, or a law is for no arm of the cell.
+            InvalidValueError: things stand inside each other at the start, a camera looks for a part without a marker,
+                or a law is for no arm of the cell.
+            MissingExtraError: a camera takes pictures, and OpenCV is missing.
         """
+        for sight in cell.sights.values():
+            if sight.camera is not None:
+                target_of(cell, sight)
         self._cell, self._believed = cell, Simulator(cell)
         self._seed, self._rng = seed, np.random.default_rng(seed)
         self._world = world_model(cell, drawn_parts(cell, self._rng) if parts is None else parts)
