@@ -29,7 +29,7 @@ class Misread(PhysicsCell):
     misread = False
 
     def locate(self, frame: str, now: float) -> tuple[Array, float]:
-        """Misread a frame once."""
+        """Answer as the camera does, but for that once."""
         X, seconds = super().locate(frame, now)
         if frame == self.frame and not self.misread:
             self.misread = True
@@ -109,9 +109,8 @@ def test_hand_over() -> None:
 def test_law_of_the_page(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """The impedance control of the page runs, and prints what the page says."""
     page = (ROOT / "docs" / "physics" / "physics-cell.md").read_text(encoding="utf-8")
-    code, told = re.findall(
-        r"^```(?:python|text)\n(.*?)^```$", page.partition("## A torque law")[2], re.MULTILINE | re.DOTALL
-    )[:2]
+    section = page.partition("## A torque law")[2]
+    code, told = re.findall(r"^```(?:python|text)\n(.*?)^```$", section, re.MULTILINE | re.DOTALL)[:2]
     monkeypatch.chdir(ROOT)
 
     exec(code, {})
