@@ -199,15 +199,16 @@ def _moves(world: PhysicsCell, part: str) -> bool:
     return not (speed <= _REST_SPEED and turn <= _REST_TURN)
 
 
-def goal_pose(cell: Cell, part: str, world: PhysicsCell) -> Array:
+def goal_pose(cell: Cell, part: str, world: PhysicsCell | None = None) -> Array:
     """Return the pose (4, 4) in the world at which a part stands upright on the frame, marker or part of its goal.
 
-    Another part is where it is in the world now.
+    Another part is where it is in the world now, or where the cell has it at the start.
     """
     at = cell.trials.goals[part].at
     if at in cell.parts:
         top = support(cell.parts[at].shape, np.array([0.0, 0.0, 1.0]))
-        X_WG = world.true_pose(at) @ homogeneous(np.eye(3), (0.0, 0.0, top))
+        X_WP = cell.parts[at].pose if world is None else world.true_pose(at)
+        X_WG = X_WP @ homogeneous(np.eye(3), (0.0, 0.0, top))
     else:
         X_WG = cell.markers[at].pose if at in cell.markers else cell.tree().world(at)
     height = support(cell.parts[part].shape, np.array([0.0, 0.0, -1.0]))
