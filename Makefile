@@ -106,7 +106,7 @@ editor:           ## Build, check and package the VS Code extension (needs npm)
 	cd editors/vscode && npm ci && npm run check && npm run build && npm test && npm run package
 
 fuzz: $(VENV)/test  ## Fuzz everything that reads: changed files, then bytes under watch (hours; TARGET=cell RUNS=1000)
-	for target in $(or $(FILES),arm linkage urdf cell mesh poses iso9283 calibration clearance); do \
+	for target in $(or $(FILES),arm linkage urdf mjcf cell mesh poses iso9283 calibration clearance); do \
 	    $(BIN)/python -W ignore fuzz/files.py $$target $(or $(RUNS),100000) || exit 1; done
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
 	for target in $(or $(TARGET),tokens tree cell code program format); do \
@@ -115,7 +115,7 @@ fuzz: $(VENV)/test  ## Fuzz everything that reads: changed files, then bytes und
 versions:         ## Write constraints.txt from the newest versions of everything, to be tested then
 	rm -rf build/versions && $(PYTHON) -m venv build/versions
 	PIP_CONSTRAINT= build/versions/bin/python -m pip install --quiet --disable-pip-version-check --editable \
-	    '.[test,urdf,docs,bench,online,optimal,sweep,clearance,calibration,cad,lsp]'
+	    '.[test,urdf,docs,bench,online,optimal,sweep,clearance,calibration,cad,physics,planning,lsp]'
 	PIP_CONSTRAINT= build/versions/bin/python -m pip install --quiet --disable-pip-version-check --no-deps 'pybotics>=3.0,<4'
 	sed -n '/^#/p' constraints.txt > build/constraints.txt
 	build/versions/bin/python -m pip --disable-pip-version-check freeze --exclude-editable >> build/constraints.txt
