@@ -20,7 +20,8 @@ MESSAGES = (DOCS / "messages.md").read_text(encoding="utf-8")
 
 def test_every_code_has_a_page() -> None:
     """Whatever is said of a program is explained, and nothing is explained that is never said."""
-    texts = [path.read_text(encoding="utf-8") for path in SOURCES.rglob("*.py")]
+    folders = (SOURCES, SOURCES.parent / "physics")
+    texts = [path.read_text(encoding="utf-8") for folder in folders for path in folder.rglob("*.py")]
 
     said = {code for text in texts for code in re.findall(r'"([EWLR]\d{3})"', text)}
 
