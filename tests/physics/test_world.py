@@ -341,3 +341,22 @@ def test_a_weight_on_the_tool(tmp_path: Path) -> None:
         assert world.advance(now) is None
         force = world.contact_force("ARM_1", now)
         np.testing.assert_allclose(force, (0, 0, -2 * 9.80665), atol=0.01 * 2 * 9.80665)
+
+
+def test_sensors_of_forces_and_efforts(tmp_path: Path) -> None:
+    """A sensor of forces gives one reading in each of its periods; measured efforts have the noise of the file."""
+    entries = "force = { rate_hz = 100, noise_N = 1, bias_N = 0.5 }\nsensors = { effort_noise_pct = 1 }\n"
+    cell = blind(tmp_path, ("gripper = { force_N = 30 }\n", f"gripper = {{ force_N = 30 }}\n{entries}"))
+    world = PhysicsCell(cell, seed=1)
+    readings = []
+    for tick in range(1, 1001):
+        world.advance(tick * cell.period)
+        readings.append(world.contact_force("ARM_1", tick * cell.period))
+
+    changes = np.flatnonzero(np.diff(np.array(readings)[:, 2])) + 2
+    assert (np.diff(changes) == 10).all()
+    np.testing.assert_allclose(np.mean(readings, axis=0), 0.5, atol=0.5)
+    assert 0.8 < np.std(np.array(readings)[::10]) < 1.2
+    tau = world.observations().measured[0].tau[200:]
+    limits = cell.arms["ARM_1"].arm.limits.effort
+    np.testing.assert_allclose(tau.std(axis=0), 0.01 * limits, rtol=0.2)

@@ -52,7 +52,7 @@ class ForceSensor:
     """The sensor of forces between an arm and its tool.
 
     Attributes:
-        noise: standard deviation of each force [N]; that of moments is a tenth of it [N m].
+        noise: standard deviation of each force [N].
         bias: constant error of each force [N].
         rate: readings per second [1/s]; 0 for one at every servo tick.
     """

@@ -92,6 +92,10 @@ class Contacts:
         apart = (owners[:, None] != owners[None, :]) & (owned[:, None] | owned[None, :])
         empty = self._grips & ~np.isin(self._owners, list(held))
         reach = empty[:, None] & self._parts[None, :]
+        # What parts in hands press with by their weight [N].
+        self._carried = np.zeros_like(self._weights)
+        for part in held.values():
+            self._carried[self._part_geoms[part]] = self._weights[self._part_geoms[part]]
         self._unwanted = apart & ~reach & ~reach.T
         self._holders = owners
 
@@ -111,7 +115,7 @@ class Contacts:
             force = self.force(data, number)
             a, b = geoms[number].tolist()
             mine, other = (a, b) if self._holders[a] != _UNOWNED else (b, a)
-            if force - self._weights[[a, b]].max() >= least and (worst is None or force > worst.force):
+            if force - self._carried[[a, b]].max() >= least and (worst is None or force > worst.force):
                 worst = Touch(str(self._holders[mine]), self.names[mine], self.names[other], force)
         return worst
 

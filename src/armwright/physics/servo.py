@@ -113,6 +113,8 @@ class ArmServo:
         self.load = 0.0
         self._sums = np.zeros(arm.n)
         self._effort = arm.limits.effort
+        # Noise is a part of the largest efforts; there is none of those that are not known.
+        self.finite_effort = np.where(np.isfinite(self._effort), self._effort, 0.0)
         w = settings.bandwidth
         self._kp, self._kd = w**2, 2 * w
         self._ki = _INTEGRAL * w**3 if settings.integral else 0.0

@@ -52,8 +52,6 @@ _MAX_PICTURES = 500
 _MAX_MISHAPS = 1000
 # Ticks between poses of the tool that are compared.
 _TIP_TICKS = 10
-# In wrists, the noise of moments by that of forces [m].
-_MOMENT_NOISE = 0.1
 
 
 @attrs.define(eq=False)
@@ -152,7 +150,8 @@ class PhysicsCell:
         self._mishaps: tuple[Mishap, ...] = ()
         # Made for the first picture, and shared by copies.
         self._photographers: list[Photographer] = []
-        self._tare = {name: np.zeros(6) for name in cell.arms}
+        # The latest readings of sensors of forces, with their numbers.
+        self._forces: dict[str, tuple[int, Array]] = {}
         self._tracking = {name: _tracking_limits(cell, name) for name in cell.arms}
         self._settle()
 
@@ -179,7 +178,8 @@ class PhysicsCell:
         mujoco.mj_copyData(other._data, self._world.model, self._data)
         other._servos = {name: servo.copy() for name, servo in self._servos.items()}
         other._hands = {name: hand.copy() for name, hand in self._hands.items()}
-        other._sent, other._held, other._tare = dict(self._sent), dict(self._held), dict(self._tare)
+        other._sent, other._held = dict(self._sent), dict(self._held)
+        other._forces = dict(self._forces)
         other._log, other._rng = self._log.copy(), np.random.default_rng()
         other._rng.bit_generator.state = self._rng.bit_generator.state
         # What is held changes what may be touched.
@@ -230,6 +230,9 @@ class PhysicsCell:
             reference = self._sent[name].at(self._tick)
             measured = servo.drive(data, self.now, reference)
             self._hands[name].drive.step(data)
+            noise = self._cell.arms[name].sensors.effort_noise
+            if noise:
+                measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
             self._log.add(name, self._tick, reference, measured, self._hands[name].drive.opening(data))
         mujoco.mj_step(self._world.model, data, self._world.substeps)
         self._tick += 1
@@ -365,10 +368,14 @@ class PhysicsCell:
     def contact_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
         """Return the force (3,) on the tool of an arm and what it holds, as its sensor reads it [N]."""
         sensor = self._cell.arms[arm].force_sensor
-        force = self._contacts.tool_wrench(self._data, arm)[:3] - self._tare[arm][:3] + sensor.bias
+        reading = math.floor(self.now * sensor.rate) if sensor.rate else self._tick
+        if arm in self._forces and self._forces[arm][0] == reading:
+            return self._forces[arm][1]
+        force = self._contacts.tool_wrench(self._data, arm)[:3] + sensor.bias
         if sensor.noise:
             force = force + self._rng.normal(scale=sensor.noise, size=3)
-        return np.asarray(force)
+        self._forces[arm] = (reading, np.asarray(force))
+        return self._forces[arm][1]
 
     def tool_wrenches(self, arm: str, now: float) -> Array:  # noqa: ARG002 - nobody knows beforehand
         """Return no wrenches (1, 6): planned efforts are those of free motion."""
