@@ -368,7 +368,7 @@ class PhysicsCell:
     def contact_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
         """Return the force (3,) on the tool of an arm and what it holds, as its sensor reads it [N]."""
         sensor = self._cell.arms[arm].force_sensor
-        reading = math.floor(self.now * sensor.rate) if sensor.rate else self._tick
+        reading = math.floor(self.now * sensor.rate + _TICK_TOLERANCE) if sensor.rate else self._tick
         if arm in self._forces and self._forces[arm][0] == reading:
             return self._forces[arm][1]
         force = self._contacts.tool_wrench(self._data, arm)[:3] + sensor.bias
