@@ -9,6 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.physics.geoms import add_geom
+from armwright.physics.graphics import load_mujoco
 from armwright.spatial.shapes import Shape, Solid
 
 # Distances between convex solids are found by iteration, to this [m].
@@ -39,7 +40,7 @@ class Distances:
         Args:
             shapes: of the solids, in the order of their numbers.
         """
-        import mujoco  # noqa: PLC0415 - only cells with several bodies need it
+        mujoco = load_mujoco()
 
         self._mujoco = mujoco
         spec = mujoco.MjSpec()

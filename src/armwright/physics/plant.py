@@ -20,6 +20,7 @@ from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.physics.clearance import Body
 from armwright.physics.geoms import add_geom, place, quaternion
+from armwright.physics.graphics import load_mujoco
 from armwright.spatial.poses import inverse
 
 # What MuJoCo's compiler takes as the least [kg], [kg m²].
@@ -89,7 +90,7 @@ def new_world(gravity: Array, timestep: float) -> Any:
         gravity: (3,) [m/s²].
         timestep: [s].
     """
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
+    mujoco = load_mujoco()
 
     spec = mujoco.MjSpec()
     # Angles of joints are given in radians.
