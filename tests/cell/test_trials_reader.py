@@ -70,7 +70,10 @@ def test_a_frame_may_be_the_place_and_tolerances_have_defaults(tmp_path: Path) -
         ("pose = { BLOCK = { xy = 1 } }", "did you mean 'xy_mm'"),
         ("pose = { BLOCK = { yaw_deg = 181 } }", "0 to 180"),
         ('goal = { SLOT = { at = "BLOCK" } }', "SLOT is no part of the cell"),
-        ('goal = { BLOCK = { at = "SLOTT" } }', "SLOTT is no marker or frame of the cell; did you mean SLOT?"),
+        (
+            'goal = { BLOCK = { at = "SLOTT" } }',
+            "SLOTT is no marker, frame or other part of the cell; did you mean SLOT?",
+        ),
         ("goal = { BLOCK = { mm = 2 } }", "goal, BLOCK, at: missing"),
         ('goal = { BLOCK = { at = "SLOT", mm = 0 } }', "0.001 to 10000"),
         ("noise = { pixel = [0, 1] }", "did you mean 'pixels'"),

@@ -91,7 +91,7 @@ def test_placed_by_vision(arm: str, sample: Sample, tmp_path: Path) -> None:
 
 
 def same_trace(cell: Cell, code: Any, recording: Recording) -> None:
-    """A kinematic cell in which the camera gives the same answers leaves the same trace: kinds, texts and ticks."""
+    """A kinematic cell with the same answers of its camera leaves the same trace: kinds, texts, times to 5 ms."""
     answers: dict[str, list[Array]] = {}
     for effect in recording.effects:
         if effect.kind == "READ":
@@ -102,8 +102,8 @@ def same_trace(cell: Cell, code: Any, recording: Recording) -> None:
     other = interpret(code, kinematic, Simulator(kinematic))
     assert [(e.kind, e.text) for e in other.effects] == [(e.kind, e.text) for e in recording.effects]
     for mine, its in zip(recording.effects, other.effects, strict=True):
-        # What the program computes from measured poses of the hand may take a tick more or less.
-        assert (mine.t0, mine.t1) == pytest.approx((its.t0, its.t1), abs=1.5 * cell.period)
+        # What the program computes from measured poses of the hand may take a few ticks more or less.
+        assert (mine.t0, mine.t1) == pytest.approx((its.t0, its.t1), abs=5.5 * cell.period)
 
 
 # ---- what goes wrong -------------------------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ CELLS = {
     "gearbox": "puma_cell",
     "around": "puma_cell",
     "peg": "peg_cell",
+    "stack_by_vision": "vision_cell",
     "hand_over": "two_arms",
     "hand_over_sideways": "two_arms",
 }
