@@ -33,7 +33,11 @@ def coal_shape(shape: Shape) -> Any:
             raise NotImplementedError
 
 
+def coal_pose(X: Array) -> Any:
+    return coal.Transform3s(np.ascontiguousarray(X[:3, :3]), X[:3, 3])
+
+
 def coal_distance(a: Any, X: Array, b: Any, Y: Array) -> float:
     """The distance of two solids at poses, by coal."""
-    poses = [coal.Transform3s(np.ascontiguousarray(x[:3, :3]), x[:3, 3]) for x in (X, Y)]
-    return float(coal.distance(a, poses[0], b, poses[1], coal.DistanceRequest(), coal.DistanceResult()))
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    return float(coal.distance(a, coal_pose(X), b, coal_pose(Y), request, result))

@@ -18,7 +18,8 @@ from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, Plac
 from armwright.physics.configuration_checks import ConfigurationChecks
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
-from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
+from armwright.spatial.shapes import Box, Capsule, Cylinder, Shape, Solid, Sphere
+from oracles.solids import coal_pose, coal_shape
 
 ARM = "ARM_1"
 
@@ -99,8 +100,8 @@ class Coal:
         self.checker = checker
         self.moving = [body for body in checker.bodies if body.arm]
         standing = [body for body in checker.bodies if body.arm is None]
-        self.standing = [coal.CollisionObject(of_coal(b.solid.shape), transform(b.solid.pose)) for b in standing]
-        self.shapes = [of_coal(body.solid.shape) for body in self.moving]
+        self.standing = [coal.CollisionObject(coal_shape(b.solid.shape), coal_pose(b.solid.pose)) for b in standing]
+        self.shapes = [coal_shape(body.solid.shape) for body in self.moving]
         self.tree = coal.DynamicAABBTreeCollisionManager()
         for body in self.standing:
             self.tree.registerObject(body)
@@ -115,28 +116,10 @@ class Coal:
             hit = False
             for body, shape in zip(self.moving, self.shapes, strict=True):
                 answer = coal.CollisionCallBackDefault()
-                self.tree.collide(coal.CollisionObject(shape, transform(X[body.link] @ body.solid.pose)), answer)
+                self.tree.collide(coal.CollisionObject(shape, coal_pose(X[body.link] @ body.solid.pose)), answer)
                 hit = hit or answer.data.result.isCollision()
             results.append(hit)
         return results
-
-
-def transform(X: Array) -> Any:
-    return coal.Transform3s(np.ascontiguousarray(X[:3, :3]), X[:3, 3])
-
-
-def of_coal(shape: Shape) -> Any:
-    match shape:
-        case Box(size=size):
-            return coal.Box(*size)
-        case Cylinder(radius=radius, length=length):
-            return coal.Cylinder(radius, length)
-        case Capsule(radius=radius, length=length):
-            return coal.Capsule(radius, length)
-        case Sphere(radius=radius):
-            return coal.Sphere(radius)
-        case Mesh():
-            raise NotImplementedError
 
 
 def solved_by_ompl(task: Task, checks: int, seed: int) -> bool:

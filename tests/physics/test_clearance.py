@@ -1,50 +1,17 @@
 """Whether bodies meet on motions, against another library at many configurations of each."""
 
-from typing import Any
-
-import coal
 import numpy as np
 
-from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
 from armwright.motion.quintic_polynomials import quintic
 from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, PlacedArm
-from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
+from armwright.spatial.shapes import Box, Solid, Sphere
 from oracles.arms import random_arm, random_configurations, random_pose
+from oracles.solids import coal_distance, coal_shape, random_shape
 from samples import Sample
 
 # Distances of convex solids are found by iteration.
 ITERATED = 1e-5
-
-
-def random_shape(rng: np.random.Generator) -> Shape:
-    kinds: list[Shape] = [
-        Box(size=rng.uniform(0.002, 0.3, 3)),
-        Cylinder(radius=rng.uniform(0.02, 0.1), length=rng.uniform(0.05, 0.4)),
-        Capsule(radius=rng.uniform(0.02, 0.1), length=rng.uniform(0.05, 0.4)),
-        Sphere(radius=rng.uniform(0.02, 0.15)),
-    ]
-    return kinds[rng.integers(len(kinds))]
-
-
-def of_coal(shape: Shape) -> Any:
-    match shape:
-        case Box(size=size):
-            return coal.Box(*size)
-        case Cylinder(radius=radius, length=length):
-            return coal.Cylinder(radius, length)
-        case Capsule(radius=radius, length=length):
-            return coal.Capsule(radius, length)
-        case Sphere(radius=radius):
-            return coal.Sphere(radius)
-        case Mesh():
-            raise NotImplementedError
-
-
-def distance(a: Any, X: Array, b: Any, Y: Array) -> float:
-    """The distance of two solids at poses, by coal."""
-    poses = [coal.Transform3s(np.ascontiguousarray(x[:3, :3]), x[:3, 3]) for x in (X, Y)]
-    return float(coal.distance(a, poses[0], b, poses[1], coal.DistanceRequest(), coal.DistanceResult()))
 
 
 def test_moves_among_bodies(sample: Sample) -> None:
@@ -70,10 +37,10 @@ def test_moves_among_bodies(sample: Sample) -> None:
 
         contact = ClearanceChecker({"ARM_1": PlacedArm(fast, base)}, bodies, pairs).first_contact({"ARM_1": motion})
 
-        shapes = [of_coal(body.solid.shape) for body in bodies]
+        shapes = [coal_shape(body.solid.shape) for body in bodies]
         frames = base @ fast.link_poses(motion(np.linspace(0, 1, looks)))
         nearest = min(
-            distance(shapes[i], X[bodies[i].link] @ bodies[i].solid.pose, shapes[j], bodies[j].solid.pose)
+            coal_distance(shapes[i], X[bodies[i].link] @ bodies[i].solid.pose, shapes[j], bodies[j].solid.pose)
             for X in frames
             for i, j in pairs
         )

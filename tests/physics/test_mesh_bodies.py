@@ -14,6 +14,7 @@ from armwright.physics.distances import Distances
 from armwright.physics.placed_bodies import CellBodies
 from armwright.spatial.shapes import Mesh, Sphere
 from oracles.arms import random_pose
+from oracles.solids import coal_pose
 from samples import Sample
 
 ARM = "[arms.ARM_1]\nhand = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.25]\n"
@@ -43,7 +44,7 @@ def test_hulls(opened: str, sample: Sample) -> None:
         vertices, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
         vertices.extend(list(hull.vertices))
         faces.extend([coal.Triangle(*map(int, face)) for face in hull.faces])
-        poses = [coal.Transform3s(np.ascontiguousarray(x[:3, :3]), x[:3, 3]) for x in (X, Y)]
+        poses = [coal_pose(X), coal_pose(Y)]
         convex = coal.Convex(vertices, faces)
         expected = coal.distance(
             convex, poses[0], coal.Sphere(radius), poses[1], coal.DistanceRequest(), coal.DistanceResult()

@@ -23,7 +23,7 @@ from armwright.physics.wanted_contacts import PlannedMove
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import Box, farthest
 from oracles.arms import random_configurations, random_pose
-from oracles.solids import coal_shape
+from oracles.solids import coal_pose, coal_shape
 from samples import Sample
 
 # Distances of convex solids are found by iteration [m].
@@ -54,7 +54,7 @@ def meets(arm: Arm, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], q:
         apart = np.linalg.norm(poses[i][:, :3, 3] - poses[j][:, :3, 3], axis=1) - radii[i] - radii[j]
         for k in np.flatnonzero(np.broadcast_to(apart, len(q)) < 2 * RESOLUTION).tolist():
             X, Y = (X[min(k, len(X) - 1)] for X in (poses[i], poses[j]))
-            one, other = (coal.Transform3s(np.ascontiguousarray(it[:3, :3]), it[:3, 3]) for it in (X, Y))
+            one, other = coal_pose(X), coal_pose(Y)
             result.clear()
             if coal.distance(shapes[i], one, shapes[j], other, request, result) < -deeper:
                 return True
