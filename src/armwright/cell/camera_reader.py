@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.entries import read_name, read_pose, read_whole, refuse_too_many, to_pose
+from armwright.cell.entries import read_name, read_pose, refuse_too_many, to_pose
 from armwright.cell.scene import CAMERA, TABLE, Camera, Fixture, Marker, Part, Sight
 from armwright.errors import closest
 from armwright.files.document import Table
@@ -74,7 +74,7 @@ def _camera(entry: Table, name: str, pose: Array, on: str | None) -> Camera:
 
 
 def _lens(entry: Table) -> Lens:
-    width, height = (read_whole(entry, key, *_SIDES) for key in ("width", "height"))
+    width, height = (entry.whole(key, *_SIDES) for key in ("width", "height"))
     if width * height > _MAX_PIXELS:
         raise entry.error("width", f"expected no more than {_MAX_PIXELS:,} pixels, got {width} times {height}")
     distortion = entry.vector("distortion", 5, default=np.zeros(5))

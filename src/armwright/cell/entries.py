@@ -54,18 +54,6 @@ def to_pose(table: Table, key: str, numbers: Array, index: int | None = None) ->
     return homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
 
 
-def read_whole(table: Table, key: str, least: int, most: int, *, default: int | None = None) -> int:
-    """Return a whole number from ``least`` to ``most``; the default where the key is missing."""
-    number = (
-        table.number(key, lower=least, upper=most)
-        if default is None
-        else table.number(key, default=default, lower=least, upper=most)
-    )
-    if number != round(number):
-        raise table.error(key, f"expected a whole number, got {number:g}")
-    return round(number)
-
-
 def refuse_too_many(table: Table, bound: str) -> None:
     """Refuse a table with more keys than a limit."""
     got = sum(1 for _ in table)

@@ -64,6 +64,11 @@ class CellArm:
     sensors: Sensors = attrs.field(factory=Sensors)
     force_sensor: ForceSensor = attrs.field(factory=ForceSensor)
 
+    @property
+    def gripper_or_usual(self) -> Gripper:
+        """What it holds parts with; the usual one where nothing is known of it."""
+        return self.gripper or Gripper()
+
     def __attrs_post_init__(self) -> None:
         """Refuse a start of another number of joints."""
         if self.start.shape != (self.arm.n,):

@@ -9,7 +9,6 @@ import numpy as np
 
 from armwright.arrays import Array, read_only
 from armwright.cell.model import Cell
-from armwright.cell.scene import Gripper
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Shape, support
 
@@ -51,7 +50,7 @@ class PartPoses:
         self._tracks = {
             name: PartTrack(times=(0.0,), arms=(None,), poses=(part.pose,)) for name, part in cell.parts.items()
         }
-        self._openings = {name: _gripper(cell, name).opening for name in cell.arms}
+        self._openings = {name: arm.gripper_or_usual.opening for name, arm in cell.arms.items()}
 
     def copy(self) -> PartPoses:
         """Return the same state; changes of one of them do not change the other."""
@@ -98,7 +97,7 @@ class PartPoses:
             tool: (4, 4) pose of its tool in the world.
             hands: (4, 4) pose of each hand in the world.
         """
-        within, nearest = _gripper(self._cell, arm).opening / 2, None
+        within, nearest = self._cell.arms[arm].gripper_or_usual.opening / 2, None
         for name, part in self._cell.parts.items():
             grasp = self.in_world(name, hands) @ part.grasp
             distance = float(np.linalg.norm(grasp[:3, 3] - tool[:3, 3]))
@@ -116,7 +115,7 @@ class PartPoses:
             width: to which they close where nothing is between them [m]; 0 when left out.
         """
         part = self.graspable(arm, hands[arm], hands)
-        self._openings[arm] = min(width or 0.0, _gripper(self._cell, arm).opening)
+        self._openings[arm] = min(width or 0.0, self._cell.arms[arm].gripper_or_usual.opening)
         if part is not None:
             X_HP = inverse(hands[arm]) @ self.in_world(part, hands)
             self._put(part, arm, X_HP, now)
@@ -135,7 +134,7 @@ class PartPoses:
         parts = self.held_by(arm)
         for part in parts:
             self._put(part, None, self.in_world(part, hands), now)
-        opening = _gripper(self._cell, arm).opening
+        opening = self._cell.arms[arm].gripper_or_usual.opening
         self._openings[arm] = opening if width is None else min(width, opening)
         return parts
 
@@ -153,11 +152,6 @@ class PartPoses:
             arms=(*track.arms[:kept], arm),
             poses=(*track.poses[:kept], read_only(pose)),
         )
-
-
-def _gripper(cell: Cell, arm: str) -> Gripper:
-    """Return the gripper of an arm; the usual one where nothing is known of it."""
-    return cell.arms[arm].gripper or Gripper()
 
 
 def _width_across(shape: Shape, X_HP: Array) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from armwright.arm.solid_entries import shape_in
-from armwright.cell.entries import read_name, read_pose, read_whole, refuse_too_many
+from armwright.cell.entries import read_name, read_pose, refuse_too_many
 from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, Spread, table
 from armwright.errors import counted
 from armwright.files.document import Table
@@ -112,7 +112,7 @@ def read_parts(parts: Table) -> dict[str, Part]:
             ),
             grasp=read_pose(entry, "grasp", np.eye(4)),
             marker=marker,
-            symmetry=read_whole(entry, "symmetry", 1, _MAX_SYMMETRY, default=1),
+            symmetry=entry.whole("symmetry", 1, _MAX_SYMMETRY, default=1),
         )
         entry.refuse_unknown_keys()
     return result
@@ -133,7 +133,7 @@ def _part_shape(entry: Table) -> Shape:
 
 def _marker(entry: Table) -> Marker:
     marker = Marker(
-        number=read_whole(entry, "id", 0, _MARKERS - 1),
+        number=entry.whole("id", 0, _MARKERS - 1),
         size=entry.number("size_mm", lower=1.0, upper=1e4) * 1e-3,
         pose=read_pose(entry, "at"),
     )

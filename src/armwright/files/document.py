@@ -126,7 +126,7 @@ class Table:
             raise self.error(key, f"expected a number above 0, got {value:g}")
         return value
 
-    def whole(self, key: str, lower: int, upper: int, default: Any = _MISSING) -> int:
+    def whole(self, key: str, lower: float, upper: float = math.inf, default: Any = _MISSING) -> int:
         """Return a whole number from ``lower`` to ``upper``.
 
         Raises:

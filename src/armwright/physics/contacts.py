@@ -140,13 +140,6 @@ class Contacts:
         needed = min(len(self._pads[arm]), LIP_TOUCHES)
         return min((part for part, count in touches.items() if count >= needed), default=None)
 
-    def touches(self, data: Any, part: str) -> list[str]:
-        """Return what a part touches."""
-        numbers, pairs = self._part_geoms[part], data.contact.geom
-        mine = np.isin(pairs, numbers)
-        others = {*pairs[mine[:, 0] & ~mine[:, 1], 1].tolist(), *pairs[mine[:, 1] & ~mine[:, 0], 0].tolist()}
-        return sorted({self.names[other] for other in others})
-
     def touching_arms(self, data: Any, part: str) -> tuple[str, ...]:
         """Return the arms whose links or grippers touch a part."""
         pairs = data.contact.geom

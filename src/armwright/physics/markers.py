@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.scene import Marker
 from armwright.extras import import_extra
+from armwright.physics.geoms import place
 from armwright.physics.graphics import load_mujoco
 
 # The sides of the black square in cells of the pattern, and of the white margin around it.
@@ -90,7 +91,7 @@ def add_marker(spec: Any, body: Any, marker: Marker, name: str) -> None:
         userface=np.array(front + back + rim, dtype=np.int32).ravel(),
         usertexcoord=np.array([(0, 0), (1, 0), (1, 1), (0, 1)] * 2, dtype=np.float64).ravel(),
     )
-    pose = {"pos": marker.pose[:3, 3], "quat": _quaternion(mujoco, marker.pose)}
+    pose = place(marker.pose)
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_MESH,
@@ -103,9 +104,3 @@ def add_marker(spec: Any, body: Any, marker: Marker, name: str) -> None:
         **pose,
     )
     body.add_site(name=name, group=_INVISIBLE, **pose)
-
-
-def _quaternion(mujoco: Any, X: Array) -> Array:
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, X[:3, :3].ravel())
-    return quaternion

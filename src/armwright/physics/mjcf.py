@@ -15,7 +15,6 @@ from armwright.arm.model import Arm
 from armwright.arm.names import distinct_names, refuse_names_beyond_xml
 from armwright.arm.positions import known_arm
 from armwright.cell.model import Cell
-from armwright.cell.scene import Gripper
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.physics.cell_bodies import arm_bodies, has_solids
 from armwright.physics.mjcf_text import spec_text
@@ -126,7 +125,7 @@ def _add_start(spec: Any, cell: Cell) -> None:
     q, control = np.array(model.qpos0), np.zeros(model.nu)
     for name, cell_arm in cell.arms.items():
         q[arm_indices(model, name, cell_arm.arm.n).positions] = cell_arm.start
-        gripper = cell_arm.gripper or Gripper()
+        gripper = cell_arm.gripper_or_usual
         for side in ("left", "right") if gripper.kind == "fingers" else ():
             q[model.joint(f"{name}/{side}").qposadr[0]] = gripper.opening / 2
             control[model.actuator(f"{name}/{side}").id] = gripper.opening / 2

@@ -14,6 +14,7 @@ from armwright.arrays import Array
 from armwright.cell.scene import Camera
 from armwright.errors import MissingExtraError
 from armwright.files.output import write_file
+from armwright.physics.geoms import quaternion
 from armwright.physics.graphics import graphics, load_mujoco
 from armwright.physics.markers import opencv
 from armwright.spatial.lens import Lens
@@ -37,15 +38,12 @@ _MOST_GEOMETRIES = 100_000
 
 def add_camera(body: Any, camera: Camera) -> None:
     """Add a camera to a body of a MuJoCo specification: to the world, or to the tool of the arm that carries it."""
-    mujoco = load_mujoco()
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, (camera.pose[:3, :3] @ _MUJOCO_AXES).ravel())
     # What other programs draw of the world; pictures are taken with the lens itself.
     fovy = 2 * np.arctan(camera.lens.height / 2 / camera.lens.focal[1])
     body.add_camera(
         name=camera.name,
         pos=camera.pose[:3, 3],
-        quat=quaternion,
+        quat=quaternion(camera.pose[:3, :3] @ _MUJOCO_AXES),
         fovy=np.degrees(fovy),
         resolution=(camera.lens.width, camera.lens.height),
     )

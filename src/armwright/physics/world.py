@@ -20,7 +20,7 @@ from armwright.cell.hardware import DeviceError, Mishap, PeakContact
 from armwright.cell.model import Cell
 from armwright.cell.observations import MeasuredStream, Observations, Picture
 from armwright.cell.part_poses import PartPoses
-from armwright.cell.scene import Gripper, Part, Spread
+from armwright.cell.scene import Part, Spread
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError, closest
 from armwright.kinematics.forward_kinematics import forward
@@ -136,7 +136,7 @@ class PhysicsCell:
                 laws.pop(name, None),
             )
             self._servos[name].start(self._data)
-            self._hands[name] = _Hand(GripperDrive(model, name, arm.gripper or Gripper()))
+            self._hands[name] = _Hand(GripperDrive(model, name, arm.gripper_or_usual))
             self._hands[name].drive.start(self._data)
             self._sent[name] = Sent(hold(arm.start, 0.0), 0, period)
         for name in laws:

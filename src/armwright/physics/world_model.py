@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell
-from armwright.cell.scene import Gripper, Part
+from armwright.cell.scene import Part
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.geoms import add_geom, place, quaternion
 from armwright.physics.gripper import add_gripper, grip
@@ -97,7 +97,7 @@ def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantA
         affinity = _ALL - bit - _HAND
         bits = {"contype": bit, "conaffinity": affinity, "rgba": _ARM}
         arm = cell_arm.plant or cell_arm.arm
-        gripper = cell_arm.gripper or Gripper()
+        gripper = cell_arm.gripper_or_usual
         plant = add_arm(spec, name, arm, cell_arm.base, arm_bodies(name, arm, gripper), **bits)
         hand = {"contype": bit | _HAND, "conaffinity": affinity, "rgba": _GRIPPER}
         add_gripper(spec, name, plant.tool, gripper, spec.option.timestep, **hand)
@@ -108,7 +108,7 @@ def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantA
         _add_part(spec, part, _PARTS[number % len(_PARTS)])
     for name, cell_arm in cell.arms.items():
         for label in (label for part in parts.values() for label, _ in _pieces(part.name, Solid(shape=part.shape))):
-            grip(spec, name, cell_arm.gripper or Gripper(), label)
+            grip(spec, name, cell_arm.gripper_or_usual, label)
     _add_plate(spec, cell)
     _add_cameras(spec, cell, {plant.name: plant.tool for plant in plants})
     return spec, tuple(plants)

@@ -55,7 +55,7 @@ class Arrays:
 
     def count(self, table: Table, key: str) -> int:
         """Return how many elements the array has whose number is under a key."""
-        return _whole(self._accessor(table, key), "count")
+        return self._accessor(table, key).whole("count", 0)
 
     def read(self, table: Table, key: str, kind: str) -> Array:
         """Return an array, (count, size), as floating-point numbers.
@@ -78,8 +78,8 @@ class Arrays:
         dtype = np.dtype(kinds[int(code)])
         view = self._views[index_in(accessor, "bufferView", len(self._views))]
         data = self._view(view)
-        stride = _whole(view, "byteStride") if "byteStride" in view else dtype.itemsize * size
-        start, count = _whole(accessor, "byteOffset", 0), _whole(accessor, "count")
+        stride = view.whole("byteStride", 0) if "byteStride" in view else dtype.itemsize * size
+        start, count = accessor.whole("byteOffset", 0, default=0), accessor.whole("count", 0)
         end = start + stride * (count - 1) + dtype.itemsize * size if count else start
         if end > len(data) or stride < dtype.itemsize * size:
             raise accessor.error(
@@ -97,7 +97,7 @@ class Arrays:
     def _view(self, view: Table) -> memoryview:
         """Return the bytes of a part of a buffer."""
         data = self._buffer(index_in(view, "buffer", len(self._buffers)))
-        start, length = _whole(view, "byteOffset", 0), _whole(view, "byteLength")
+        start, length = view.whole("byteOffset", 0, default=0), view.whole("byteLength", 0)
         if start + length > len(data):
             raise view.error("byteLength", f"{start + length:,} bytes go beyond the {len(data):,} of the buffer")
         return memoryview(data)[start : start + length]
@@ -106,7 +106,7 @@ class Arrays:
         if number not in self._data:
             buffer = self._buffers[number]
             data = self._content(buffer)
-            if len(data) < _whole(buffer, "byteLength"):
+            if len(data) < buffer.whole("byteLength", 0):
                 raise buffer.error("byteLength", f"got {len(data):,} bytes, fewer than announced")
             self._data[number] = data
             total = sum(map(len, self._data.values()))
@@ -137,11 +137,3 @@ class Arrays:
             return read_bytes(file_below(self._path.parent, unquote(uri)), "mesh_mb")
         except FileFormatError as error:
             raise buffer.error("uri", str(error)) from error
-
-
-def _whole(table: Table, key: str, default: int | None = None) -> int:
-    """Return a whole number from 0."""
-    number = table.number(key, lower=0.0) if default is None else table.number(key, default=default, lower=0.0)
-    if number != int(number):
-        raise table.error(key, f"expected a whole number, got {number:g}")
-    return int(number)
