@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.physics.gripper import LIP_TOUCHES
-from armwright.physics.world_model import FLOOR, PIECE, PLATE, WorldModel
+from armwright.physics.world_model import PIECE, PLATE, WorldModel
 
 # Parts, fixtures and arms that overlap by more at the start stand inside one another [m].
 OVERLAP = 1e-3
@@ -153,26 +153,21 @@ class Contacts:
         for number in range(data.ncon):
             a, b = data.contact.geom[number].tolist()
             depth = -float(data.contact.dist[number])
-            if depth > OVERLAP and not {self.names[a], self.names[b]} & {FLOOR}:
+            if depth > OVERLAP:
                 found.append(Overlap(self.names[a], self.names[b], depth))
         return found
 
-    def tool_wrench(self, data: Any, arm: str) -> Array:
-        """Return force [N] and moment [N m] (6,) on the tool of an arm, without the weight of the tool.
+    def tool_force(self, data: Any, arm: str) -> Array:
+        """Return the force (3,) on the tool of an arm along the axes of the world, without the weight of the tool [N].
 
-        Along the axes of the world, at the tool point: as a sensor between the arm and its tool reads them.
+        As a sensor between the arm and its tool reads it.
         """
         import mujoco  # noqa: PLC0415 - only cells with several bodies need it
 
         mujoco.mj_rnePostConstraint(self._model, data)
         tool = self._tools[arm]
-        moment, force = data.cfrc_int[tool, :3], data.cfrc_int[tool, 3:]
-        point = data.xpos[tool]
-        about = data.subtree_com[self._model.body_rootid[tool]]
         weight = self._model.body_subtreemass[tool] * self._model.opt.gravity
-        pull = -force - weight
-        turn = -(moment + np.cross(about - point, force)) - np.cross(data.subtree_com[tool] - point, weight)
-        return np.concatenate([pull, turn])
+        return np.asarray(-data.cfrc_int[tool, 3:] - weight)
 
     def plate_depth(self, data: Any) -> float:
         """Return how deep the plane that yields is pressed [m]."""

@@ -6,12 +6,12 @@ that is limited, so what they hold slides when its weight and inertia exceed wha
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array
 from armwright.cell.scene import Gripper
 from armwright.physics.geoms import add_geom
 from armwright.physics.hand_solids import gripper_solids
@@ -226,11 +226,4 @@ class GripperDrive:
 
     def copy(self) -> GripperDrive:
         """Return a drive in the same state."""
-        other = object.__new__(GripperDrive)
-        other.__dict__.update(self.__dict__)
-        return other
-
-    @property
-    def state(self) -> Array:
-        """What changes, as numbers."""
-        return np.array([self._from, self._to, self._tick, self._ticks])
+        return copy.copy(self)

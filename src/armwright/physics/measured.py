@@ -26,12 +26,12 @@ class Log:
     def __init__(self, cell: Cell, world: WorldModel) -> None:
         """Begin with nothing."""
         self._cell, self._parts = cell, tuple(world.parts)
-        self._full: dict[str, tuple[Array, ...]] = dict.fromkeys(cell.arms, ())
+        self._full: dict[str, list[Array]] = {name: [] for name in cell.arms}
         self._rows = {name: np.empty((_BLOCK, 4 * arm.arm.n + 1)) for name, arm in cell.arms.items()}
         self._count = 0
         self._every = max(1, round(_PARTS / cell.period))
-        self._tracks: dict[str, tuple[tuple[float, Array], ...]] = {
-            name: ((0.0, part.pose),) for name, part in world.parts.items()
+        self._tracks: dict[str, list[tuple[float, Array]]] = {
+            name: [(0.0, part.pose)] for name, part in world.parts.items()
         }
         self.worst_slip = dict.fromkeys(cell.arms, 0.0)
 
@@ -39,7 +39,8 @@ class Log:
         """Return the same records; what is added to one does not change the other."""
         other = object.__new__(Log)
         other.__dict__.update(self.__dict__)
-        other._full, other._tracks = dict(self._full), dict(self._tracks)
+        other._full = {name: list(blocks) for name, blocks in self._full.items()}
+        other._tracks = {name: list(track) for name, track in self._tracks.items()}
         other._rows = {name: rows.copy() for name, rows in self._rows.items()}
         other.worst_slip = dict(self.worst_slip)
         return other
@@ -51,7 +52,7 @@ class Log:
         row[:n], row[n : 2 * n], row[2 * n : 3 * n] = measured.q, measured.qd, measured.tau
         row[3 * n : 4 * n], row[-1] = reference.q, opening
         if tick % _BLOCK == _BLOCK - 1:
-            self._full[arm] = (*self._full[arm], self._rows[arm])
+            self._full[arm].append(self._rows[arm])
             self._rows[arm] = np.empty_like(self._rows[arm])
         self._count = tick + 1
 
@@ -62,7 +63,7 @@ class Log:
         for name in self._parts:
             X = part_pose(data, name)
             if np.abs(X - self._tracks[name][-1][1]).max() > _STILL:
-                self._tracks[name] = (*self._tracks[name], (tick * self._cell.period, X))
+                self._tracks[name].append((tick * self._cell.period, X))
 
     def add_slip(self, arm: str, slip: float) -> None:
         """Record how far a part has moved in the hand [m]."""

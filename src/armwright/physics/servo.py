@@ -107,7 +107,7 @@ class ArmServo:
         smooth = tuple(attrs.evolve(motor, coulomb_forward=0.0, coulomb_backward=0.0) for motor in arm.motors)
         self._compiled = compile_arm(attrs.evolve(arm, motors=smooth), quickly=True)
         forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
-        self._dry, self._lean = (forward + backward) / 2, (forward - backward) / 2
+        self._dry, self._lean = (forward + backward) / 2, -dry_offsets(arm)
         self._offsets = dry_offsets(plant)
         # What is known of a part in the hand: its mass [kg] at the tool point.
         self.load = 0.0

@@ -7,6 +7,7 @@ parts are.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -182,9 +183,7 @@ class PhysicsCell:
         other._forces = dict(self._forces)
         other._log, other._rng = self._log.copy(), np.random.default_rng()
         other._rng.bit_generator.state = self._rng.bit_generator.state
-        # What is held changes what may be touched.
-        other._contacts = Contacts(self._world)
-        other._contacts.hold(other._held)
+        other._contacts = copy.copy(self._contacts)
         return other
 
     # ---- time ----------------------------------------------------------------------------------------------------
@@ -193,14 +192,7 @@ class PhysicsCell:
         """Let time go by, until now or until something goes wrong."""
         end = math.floor(now / self._cell.period + _TICK_TOLERANCE)
         while self._tick < end:
-            try:
-                self._step()
-            except InvalidValueError:
-                # Numbers without meaning have come to a servo.
-                if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():
-                    raise
-                return mishaps.unstable(self.now)
-            mishap = self._watch()
+            mishap = self._step() or self._watch()
             if mishap is not None and self._is_news(mishap):
                 self._mishaps = (*self._mishaps, mishap)[-_MAX_MISHAPS:]
                 return mishap
@@ -221,14 +213,19 @@ class PhysicsCell:
         """The time up to which the world has gone [s]."""
         return self._tick * self._cell.period
 
-    def _step(self) -> None:
-        """Let one period of the servo go by."""
+    def _step(self) -> Mishap | None:
+        """Let one period of the servo go by; return that this cannot be, if numbers without meaning come to a servo."""
         import mujoco  # noqa: PLC0415 - only cells with physics need it
 
         data = self._data
         for name, servo in self._servos.items():
             reference = self._sent[name].at(self._tick)
-            measured = servo.drive(data, self.now, reference)
+            try:
+                measured = servo.drive(data, self.now, reference)
+            except InvalidValueError:
+                if np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all():
+                    raise
+                return mishaps.unstable(self.now)
             self._hands[name].drive.step(data)
             noise = self._cell.arms[name].sensors.effort_noise
             if noise:
@@ -237,6 +234,7 @@ class PhysicsCell:
         mujoco.mj_step(self._world.model, data, self._world.substeps)
         self._tick += 1
         self._log.add_parts(self._tick, data)
+        return None
 
     # ---- mishaps -------------------------------------------------------------------------------------------------
 
@@ -289,9 +287,8 @@ class PhysicsCell:
             return None
         part, gripper = hand.part, hand.drive.gripper
         self._let_go(arm)
-        friction = max(gripper.friction, 0.0)
         pads = 2 if gripper.kind == "fingers" else 1
-        holds = pads * friction * gripper.force / STANDARD_GRAVITY
+        holds = pads * gripper.friction * gripper.force / STANDARD_GRAVITY
         return mishaps.lost(self.now, arm, part, holds, self._world.parts[part].mass)
 
     def _let_go(self, arm: str) -> None:
@@ -371,7 +368,7 @@ class PhysicsCell:
         reading = math.floor(self.now * sensor.rate + _TICK_TOLERANCE) if sensor.rate else self._tick
         if arm in self._forces and self._forces[arm][0] == reading:
             return self._forces[arm][1]
-        force = self._contacts.tool_wrench(self._data, arm)[:3] + sensor.bias
+        force = self._contacts.tool_force(self._data, arm) + sensor.bias
         if sensor.noise:
             force = force + self._rng.normal(scale=sensor.noise, size=3)
         self._forces[arm] = (reading, np.asarray(force))
