@@ -15,9 +15,9 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.calibration.board import Board, BoardView, BoardViews, board_views
-from armwright.calibration.columns import joint_columns
+from armwright.calibration.columns import position_columns
 from armwright.errors import FileFormatError, TooFewError, closest
-from armwright.files.column_names import ANGLE, LENGTH, NUMBER, Column, Schema
+from armwright.files.column_names import NUMBER, Column, Schema
 from armwright.files.document import Document, Table
 from armwright.files.limits import limit, limit_message
 from armwright.files.pictures import ENDINGS
@@ -129,16 +129,8 @@ def read_picture_joints(
     Raises:
         FileFormatError: the file is missing, or no such table; a picture is there twice.
     """
-    names = joint_columns(arm)
-    joints = [
-        Column(
-            name=name,
-            quantity=ANGLE if joint.revolute else LENGTH,
-            synonyms=(name, f"q{i}", joint.name),
-            explanation=f"{arm.joint_label(i - 1)} of {arm.name} is {joint.kind}",
-        )
-        for i, (name, joint) in enumerate(zip(names, arm.joints, strict=True), 1)
-    ]
+    joints = position_columns(arm)
+    names = [column.name for column in joints]
     picture = Column(name="picture", synonyms=("name", "file", "image"))
     header = read_header(path, Schema(columns=(picture, *joints)), columns=columns, units=units or {})
     count = len(header.columns_present(names))

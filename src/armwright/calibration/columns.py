@@ -25,9 +25,9 @@ def joint_columns(arm: Arm) -> list[str]:
     return [f"joint_{i + 1}" for i in range(arm.n)]
 
 
-def measured_columns(arm: Arm) -> Schema:
-    """Return the columns that measurements of an arm may have. Joints also have the names of their URDF."""
-    joints = [
+def position_columns(arm: Arm) -> list[Column]:
+    """Return the columns of the joint positions, in the order of the arm. Joints also have the names of their URDF."""
+    return [
         Column(
             name=name,
             quantity=ANGLE if joint.revolute else LENGTH,
@@ -36,6 +36,11 @@ def measured_columns(arm: Arm) -> Schema:
         )
         for i, (name, joint) in enumerate(zip(joint_columns(arm), arm.joints, strict=True), 1)
     ]
+
+
+def measured_columns(arm: Arm) -> Schema:
+    """Return the columns that measurements of an arm may have."""
+    joints = position_columns(arm)
     points = [Column(name=name, quantity=LENGTH, group="coordinates") for name in POINTS]
     group = "nominal coordinates and deviations"
     deviations = [
