@@ -11,7 +11,7 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.report.run_summary import RunSummary
-from physics.cluttered import of_coal, transform
+from oracles.solids import coal_pose, coal_shape
 from program.running import failure, run
 
 ARM = """
@@ -63,13 +63,13 @@ def test_past_a_wall(tmp_path: Path) -> None:
     assert (np.abs(recording.streams[0].qd) <= limits.speed * (1 + 1e-9)).all()
     assert (np.abs(recording.streams[0].qdd) <= limits.acceleration * (1 + 1e-9)).all()
     wall = cell.fixtures["WALL"]
-    barrier, placed = of_coal(wall.shape), transform(wall.pose)
+    barrier, placed = coal_shape(wall.shape), coal_pose(wall.pose)
     for X in link_poses(arm, q[::5]):
         for number, solids in enumerate(guessed_solids(arm), 1):
             for solid in solids[: 0 if number == arm.n else None]:
                 Y = X[number] @ solid.pose
                 request, result = coal.CollisionRequest(), coal.CollisionResult()
-                assert not coal.collide(barrier, placed, of_coal(solid.shape), transform(Y), request, result)
+                assert not coal.collide(barrier, placed, coal_shape(solid.shape), coal_pose(Y), request, result)
 
 
 def test_in_a_given_time(tmp_path: Path) -> None:
