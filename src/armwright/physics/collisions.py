@@ -19,6 +19,7 @@ from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics.cell_bodies import has_solids
 from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, Closest, PlacedArm, Window
+from armwright.physics.configuration_checks import ConfigurationChecks
 from armwright.physics.joint_space import Margins
 from armwright.physics.placed_bodies import CellBodies, Role
 from armwright.physics.planner import PlannedPath, plan_path
@@ -173,6 +174,21 @@ class CellCollisions:
             guessed={name: (float(r.max()), float(r.min())) for name, r in radii.items()},
             left_out=tuple(dict.fromkeys((bodies[i].name, bodies[j].name) for i, j in sorted(self._left_out))),
         )
+
+    def at_configurations(self, parts: PartPoses) -> ConfigurationChecks:
+        """Return what tells how near the bodies are at configurations, while the parts stay where they are.
+
+        What grips may touch parts.
+        """
+        bodies, roles = self._bodies.arranged(parts), self._bodies.roles
+        pairs = [
+            (i, j)
+            for i, j in self._bodies.pairs(bodies)
+            if (i, j) not in self._left_out
+            and not (roles[i].grips and roles[j].part)
+            and not (roles[j].grips and roles[i].part)
+        ]
+        return ConfigurationChecks(self._checker.rearranged(bodies, pairs))
 
     def check(
         self,

@@ -27,6 +27,18 @@ class Meeting(NamedTuple):
     distance: float
 
 
+class NearBodies(NamedTuple):
+    """The two bodies that are nearest to one another.
+
+    Attributes:
+        names: of both.
+        distance: between them [m]; below 0 where they overlap.
+    """
+
+    names: tuple[str, str]
+    distance: float
+
+
 class ConfigurationChecks:
     """The bodies of a cell at configurations of its arms."""
 
@@ -59,6 +71,34 @@ class ConfigurationChecks:
                 if distance < margin:
                     return Meeting(i, (a, b), distance)
         return None
+
+    def nearest(self, configurations: Mapping[str, Array], within: float) -> NearBodies | None:
+        """Return the two bodies that are nearest at one configuration (n,) of each arm; None where none are so near.
+
+        Args:
+            configurations: of each arm.
+            within: distance [m].
+        """
+        if not len(self._pairs):
+            return None
+        poses = self._poses_at(configurations)
+        bounds = self._least_distances(poses)[0]
+        found, least = None, within
+        placed: set[int] = set()
+        for k in np.argsort(bounds).tolist():
+            if bounds[k] >= least:
+                break
+            pair = self._pairs[k].tolist()
+            for body in {*pair} - placed:
+                self._checker.distances.place(body, poses[0, body])
+                placed.add(body)
+            distance = self._checker.distances.between(*pair, max(least, TOLERANCE))
+            if distance < least:
+                least, found = distance, pair
+        if found is None:
+            return None
+        one, other = (self._checker.bodies[number].name for number in found)
+        return NearBodies((one, other), least)
 
     def distances_of(self, configurations: Mapping[str, Array], within: float) -> Array:
         """Return the distances (p,) of all pairs at one configuration (n,) of each arm [m]; ``within`` where more."""

@@ -1,0 +1,1 @@
+from .live_arm import LiveArm as LiveArm

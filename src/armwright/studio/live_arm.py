@@ -1,0 +1,266 @@
+"""An arm that is moved by hand: where it is, where it can go, and what is wrong with that."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.model import CellArm
+from armwright.compiled.arm import CompiledArm, planning_arm
+from armwright.errors import ArmwrightError
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.branches import BRANCHES
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.solution import violations_of
+from armwright.kinematics.inverse_kinematics.solve import label
+from armwright.kinematics.jacobians import jacobian
+from armwright.kinematics.manipulability_index import scaled_rows
+from armwright.kinematics.singularity_analysis import singularities
+from armwright.spatial.poses import inverse
+from armwright.spatial.rotations import rotation_vector
+
+# A solution is one if its tool is as near to the pose [m], [rad].
+_MET = 1e-6
+# Joints do not leap while a tool is dragged: a step changes none by more [rad], [m].
+_LEAP_ANGLE, _LEAP_LENGTH = math.radians(30.0), 0.1
+# Nearer to a limit than this a joint is called near it [rad], [m].
+_NEAR_ANGLE, _NEAR_LENGTH = math.radians(5.0), 0.01
+# Below this part of the largest, a singular value of the Jacobian is called small.
+_SMALL = 0.03
+# Below this part the arm is said to be at a singularity.
+_AT_SINGULARITY = 1e-3
+# Joints that have at least this part in a motion that does not move the tool are named.
+_PART_OF_IDLE = 0.1
+# Steps of the numeric solution, and the damping in them [m].
+_STEPS, _DAMPING = 40, 0.02
+
+Level: TypeAlias = Literal["note", "warning", "error"]
+
+
+class UnreachableError(ArmwrightError, ValueError):
+    """The tool cannot be brought to a pose from where the arm is; the arm stays."""
+
+
+class Solution(NamedTuple):
+    """A configuration that brings the tool to where it is.
+
+    Attributes:
+        q: (n,) joint positions.
+        label: such as ``left, up, no-flip``.
+        fault: why it cannot be taken; empty where it can.
+        here: whether the arm is in it.
+    """
+
+    q: Array
+    label: str
+    fault: str
+    here: bool
+
+
+class Warning(NamedTuple):  # noqa: A001 - what it is called on the page
+    """What is to be said of a configuration.
+
+    Attributes:
+        kind: ``limit``, ``singular``, ``collision`` or ``reach``.
+        level: how bad it is.
+        text: in words.
+        joints: numbers of the joints concerned, from 1.
+    """
+
+    kind: Literal["limit", "singular", "collision", "reach"]
+    level: Level
+    text: str
+    joints: tuple[int, ...] = ()
+
+
+class LiveArm:
+    """An arm of a cell, at a configuration that is changed by hand.
+
+    Attributes:
+        name: of the arm in the cell.
+        placed: the arm and its place.
+        q: (n,) joint positions.
+    """
+
+    def __init__(self, name: str, placed: CellArm) -> None:
+        """Take an arm, at the start of its cell."""
+        self.name, self.placed = name, placed
+        self.q = np.array(placed.start)
+        limits = placed.arm.limits
+        self.lower, self.upper = limits.lower, limits.upper
+        revolute = np.array([joint.revolute for joint in placed.arm.joints])
+        self._leap = np.where(revolute, _LEAP_ANGLE, _LEAP_LENGTH)
+        self._near = np.where(revolute, _NEAR_ANGLE, _NEAR_LENGTH)
+        self._geometry = find_geometry(placed.arm)
+
+    @cached_property
+    def equations(self) -> CompiledArm | None:
+        """The compiled arm; None where nothing can be compiled."""
+        compiled = planning_arm(self.placed.arm)
+        return compiled if isinstance(compiled, CompiledArm) else None
+
+    def warm_up(self) -> None:
+        """Compile what moving the arm needs."""
+        self.tool_at(self.q)
+        self._jacobian(self.q)
+        if self._geometry is not None:
+            self.solutions()
+
+    # ---- where it is ---------------------------------------------------------------------------------------------
+
+    def tool_at(self, q: Array) -> Array:
+        """Return the pose (4, 4) of the tool in the world at joint positions (n,)."""
+        X_BT = forward(self.placed.arm, q) if self.equations is None else self.equations.forward(q)
+        return np.asarray(self.placed.base @ X_BT)
+
+    @property
+    def tool(self) -> Array:
+        """The pose (4, 4) of the tool in the world."""
+        return self.tool_at(self.q)
+
+    def solutions(self) -> list[Solution]:
+        """Return all configurations that bring the tool to where it is; of an arm without a closed form the present."""
+        if self._geometry is None or self.equations is None:
+            return [Solution(self.q, "numeric", "", here=True)]
+        rows, signs = self._branches(self.tool)
+        here = int(np.abs(rows - self.q).max(axis=1).argmin()) if len(rows) else -1
+        return [
+            Solution(
+                q,
+                label(self._geometry, BRANCHES[sign], np.array(self._geometry.angles(q.tolist()))),
+                "; ".join(map(str, violations_of(self.placed.arm, q.tolist()))),
+                here=i == here,
+            )
+            for i, (q, sign) in enumerate(zip(rows, signs, strict=True))
+        ]
+
+    def _branches(self, X_WT: Array) -> tuple[Array, list[int]]:
+        """Return the configurations (k, n) that bring the tool to a pose, and the numbers of their branches."""
+        assert self.equations is not None  # noqa: S101 - asked for only then
+        X_BT = inverse(self.placed.base) @ X_WT
+        q, _ = self.equations.inverse_branches(X_BT, self.q)
+        met = self._is_met(self.equations.forward(q), X_BT)
+        rows: list[Array] = []
+        numbers: list[int] = []
+        for number in np.flatnonzero(met).tolist():
+            if not any(np.abs(q[number] - row).max() < _MET for row in rows):
+                rows.append(self._turned(q[number]))
+                numbers.append(number)
+        return np.array(rows).reshape(-1, self.placed.arm.n), numbers
+
+    def _turned(self, q: Array) -> Array:
+        """Return a configuration with every angle turned by whole revolutions into its limits, if that is possible."""
+        below, above = q < self.lower, q > self.upper
+        turn = 2 * math.pi * (below.astype(float) - above)
+        better = (below | above) & (q + turn >= self.lower) & (q + turn <= self.upper) & self._revolute
+        return np.where(better, q + turn, q)
+
+    @cached_property
+    def _revolute(self) -> Array:
+        return np.array([joint.revolute for joint in self.placed.arm.joints])
+
+    def _is_met(self, X: Array, goal: Array) -> Array:
+        """Whether poses (..., 4, 4) are a goal."""
+        return np.asarray(np.abs(X - goal).max(axis=(-2, -1)) < _MET)
+
+    # ---- moving --------------------------------------------------------------------------------------------------
+
+    def set_joints(self, q: Array) -> None:
+        """Bring the joints to positions (n,), as far as their limits allow."""
+        self.q = np.clip(q, self.lower, self.upper)
+
+    def move_tool(self, X_WT: Array, *, leaping: bool = False) -> None:
+        """Bring the tool to a pose (4, 4) in the world.
+
+        Args:
+            X_WT: the pose.
+            leaping: whether joints may turn far for it, as for a goal that is typed; dragging goes on steadily.
+
+        Raises:
+            UnreachableError: no configuration within the limits does that, or only one far from the present.
+        """
+        q = self._nearest(X_WT)
+        far = np.abs(q - self.q) > self._leap
+        if far.any() and not leaping:
+            joints = ", ".join(str(i + 1) for i in np.flatnonzero(far))
+            raise UnreachableError(
+                f"{self.name} would have to change its branch there: joint {joints} would leap; choose a solution"
+            )
+        self.q = q
+
+    def _nearest(self, X_WT: Array) -> Array:
+        if self._geometry is None or self.equations is None:
+            return self._numeric(X_WT)
+        rows, _ = self._branches(X_WT)
+        if not len(rows):
+            raise UnreachableError(f"out of reach of {self.name}")
+        allowed = ((rows >= self.lower - 1e-9) & (rows <= self.upper + 1e-9)).all(axis=1)
+        distances = np.abs(rows - self.q).max(axis=1)
+        if not allowed.any():
+            nearest = rows[distances.argmin()]
+            raise UnreachableError("; ".join(map(str, violations_of(self.placed.arm, nearest.tolist()))))
+        return np.asarray(np.clip(rows[np.where(allowed, distances, np.inf).argmin()], self.lower, self.upper))
+
+    def _numeric(self, X_WT: Array) -> Array:
+        """Return the configuration to which damped steps lead from the present one."""
+        X_BT, q = inverse(self.placed.base) @ X_WT, self.q
+        for _ in range(_STEPS):
+            X = inverse(self.placed.base) @ self.tool_at(q)
+            error = np.concatenate([X_BT[:3, 3] - X[:3, 3], rotation_vector(X_BT[:3, :3] @ X[:3, :3].T)])
+            if np.abs(error).max() < _MET / 10:
+                return q
+            J = self._jacobian(q)
+            step = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * min(1.0, float(error @ error)) * np.eye(6), error)
+            q = np.clip(q + step, self.lower, self.upper)
+        raise UnreachableError(f"{self.name} finds no way there: out of reach, or beyond a limit")
+
+    def _jacobian(self, q: Array) -> Array:
+        return np.asarray(jacobian(self.placed.arm, q) if self.equations is None else self.equations.jacobian(q))
+
+    # ---- what is wrong -------------------------------------------------------------------------------------------
+
+    def warnings(self) -> list[Warning]:
+        """Return what is to be said of the present configuration: joints near their limits, singular directions."""
+        found = []
+        near = (self.q - self.lower < self._near) | (self.upper - self.q < self._near)
+        for i in np.flatnonzero(near).tolist():
+            found.append(Warning("limit", "warning", self._limit_text(i), (i + 1,)))
+        U, sigma, Vt = np.linalg.svd(scaled_rows(self._jacobian(self.q), 1.0))
+        if sigma[-1] < _SMALL * sigma[0]:
+            found.append(self._singular(float(sigma[-1] / sigma[0]), U[:, len(sigma) - 1], Vt[len(sigma) - 1]))
+        return found
+
+    def _limit_text(self, i: int) -> str:
+        joint, q = self.placed.arm.joints[i], self.q[i]
+        left = min(q - self.lower[i], self.upper[i] - q)
+        amount = f"{math.degrees(left):.1f}°" if joint.revolute else f"{left * 1e3:.1f} mm"
+        return f"joint {i + 1} is {amount} from its limit" if left > 0 else f"joint {i + 1} is at its limit"
+
+    def _singular(self, ratio: float, lost: Array, idle: Array) -> Warning:
+        """Return what is said near a singularity.
+
+        Args:
+            ratio: of the smallest singular value to the largest.
+            lost: (6,) the twist that is hardly made.
+            idle: (n,) the joint motion that hardly moves the tool.
+        """
+        factors = singularities(self.placed.arm, self.q).factors
+        nearest = min(factors, key=lambda factor: abs(factor.value) / factor.scale)
+        cause = "" if nearest.name.startswith("singular value") else f" of the {nearest.name}"
+        near = "at" if ratio < _AT_SINGULARITY else "near"
+        joints = tuple(i + 1 for i in np.flatnonzero(np.abs(idle) > _PART_OF_IDLE).tolist())
+        text = f"{near} a singularity{cause}: the tool {_direction_text(lost)}"
+        return Warning("singular", "error" if near == "at" else "warning", text, joints)
+
+
+def _direction_text(twist: Array) -> str:
+    """Return what a tool cannot do along a twist (6,), axes of the base."""
+    linear, angular = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
+    what, axis = ("hardly moves along", twist[:3]) if linear >= angular else ("hardly turns about", twist[3:])
+    axis = axis / np.linalg.norm(axis)
+    axis = axis * np.sign(axis[np.abs(axis).argmax()])
+    return "{} ({:.2f}, {:.2f}, {:.2f}) of its base".format(what, *(axis + 0.0))

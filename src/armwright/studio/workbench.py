@@ -1,0 +1,234 @@
+"""What all pages of a studio show: a cell with its arms where they have been moved by hand, and what is wrong there."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.model import Cell, base_name
+from armwright.cell.part_poses import PartPoses
+from armwright.errors import UnknownNameError
+from armwright.physics.collisions import CellCollisions
+from armwright.physics.configuration_checks import ConfigurationChecks, NearBodies
+from armwright.spatial.poses import from_noap, homogeneous, to_noap
+from armwright.spatial.rotations import rotation_from_vector
+from armwright.studio.live_arm import LiveArm, Solution, UnreachableError, Warning
+
+# Full speed of jogging: of angles [rad/s], of lengths [m/s].
+_TURNING, _SLIDING = math.radians(45.0), 0.25
+# Bodies nearer than this are told [m].
+_NEAR = 0.05
+# Changes that can be taken back at most.
+_MOST_UNDONE = 200
+# Changes that follow one another within this time are one [s].
+_ONE_GESTURE = 0.5
+
+
+class Workbench:
+    """A cell whose arms are moved by hand.
+
+    Attributes:
+        cell: the cell.
+        arms: its arms, by name.
+        ready: whether what moving needs has been compiled.
+        refusal: why the latest command was not done; empty where it was.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        """Take a cell, with its arms at their starts."""
+        self.cell = cell
+        self.arms = {name: LiveArm(name, arm) for name, arm in cell.arms.items()}
+        self.ready, self.refusal = False, ""
+        self._parts = PartPoses(cell)
+        self._checks: ConfigurationChecks | None = None
+        self._undo: list[tuple[str, Array]] = []
+        self._gesture = ("", -math.inf)
+
+    def warm_up(self) -> None:
+        """Compile what moving needs; takes up to seconds, where nothing is kept from earlier."""
+        for arm in self.arms.values():
+            arm.warm_up()
+        if self.cell.collisions_matter:
+            self.nearest()
+        self.ready = True
+
+    def arm(self, name: str) -> LiveArm:
+        """Return an arm by its name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        if name not in self.arms:
+            raise UnknownNameError("arm", name, self.arms)
+        return self.arms[name]
+
+    # ---- moving --------------------------------------------------------------------------------------------------
+
+    def set_joint(self, name: str, joint: int, value: float, now: float) -> None:
+        """Bring a joint, from 1, to a position [rad] or [m], as far as its limits allow."""
+        arm = self.arm(name)
+        if not 1 <= joint <= len(arm.q):
+            raise UnreachableError(f"{name} has joints 1 to {len(arm.q)}, got {joint}")
+        q = arm.q.copy()
+        q[joint - 1] = value
+        self._changing(arm, f"joint {joint}", now)
+        arm.set_joints(q)
+
+    def set_joints(self, name: str, q: tuple[float, ...], now: float) -> None:
+        """Bring all joints of an arm to positions."""
+        arm = self.arm(name)
+        if len(q) != len(arm.q):
+            raise UnreachableError(f"{name} has {len(arm.q)} joints, got {len(q)} numbers")
+        self._changing(arm, "joints", now)
+        arm.set_joints(np.array(q))
+
+    def move_tool(self, name: str, pose: tuple[float, ...], now: float, *, leaping: bool) -> None:
+        """Bring the tool of an arm to a pose in the world."""
+        arm = self.arm(name)
+        X = from_noap(pose)
+        self._changing(arm, "tool", now)
+        arm.move_tool(X, leaping=leaping)
+
+    def jog(self, name: str, frame: str, axis: int, step: float, now: float) -> None:
+        """Move an arm by a part of its full jogging speed times a time.
+
+        Args:
+            name: of the arm.
+            frame: ``JOINT``, or whose axes are meant: ``BASE``, ``TOOL``, ``WORLD`` or a frame.
+            axis: from 0: a joint; or x, y, z, then the rotations about them, through the tool.
+            step: share of the full speed times time [s], with its sign.
+            now: the time [s].
+        """
+        arm = self.arm(name)
+        if frame == "JOINT":
+            if not 0 <= axis < len(arm.q):
+                raise UnreachableError(f"{name} has {len(arm.q)} joints, got number {axis + 1}")
+            revolute = arm.placed.arm.joints[axis].revolute
+            value = arm.q[axis] + step * (_TURNING if revolute else _SLIDING)
+            if not arm.lower[axis] <= value <= arm.upper[axis] and np.isclose(
+                arm.q[axis], np.clip(value, arm.lower[axis], arm.upper[axis])
+            ):
+                raise UnreachableError(f"joint {axis + 1} is at its limit")
+            self.set_joint(name, axis + 1, float(value), now)
+            return
+        if not 0 <= axis < 6:  # noqa: PLR2004 - axes and rotations
+            raise UnreachableError(f"axes are numbered from 0 to 5, got {axis}")
+        X, along = arm.tool, self._axes(arm, frame)[:, axis % 3]
+        self._changing(arm, f"jog {frame} {axis}", now)
+        if axis < 3:  # noqa: PLR2004 - the axes
+            X = homogeneous(X[:3, :3], X[:3, 3] + step * _SLIDING * along)
+        else:
+            X = homogeneous(rotation_from_vector(step * _TURNING * along) @ X[:3, :3], X[:3, 3])
+        arm.move_tool(X)
+
+    def _axes(self, arm: LiveArm, frame: str) -> Array:
+        """Return the axes (3, 3) of a frame, in its columns."""
+        if frame == "WORLD":
+            return np.eye(3)
+        if frame == "TOOL":
+            return arm.tool[:3, :3]
+        if frame == "BASE":
+            return arm.placed.base[:3, :3]
+        poses = self.frame_poses()
+        if frame not in poses:
+            raise UnknownNameError("frame", frame, ["BASE", "TOOL", "WORLD", *poses])
+        return poses[frame][:3, :3]
+
+    def take_solution(self, name: str, number: int, now: float) -> None:
+        """Take another configuration that brings the tool to where it is, by its number, from 0."""
+        arm = self.arm(name)
+        solutions = arm.solutions()
+        if not 0 <= number < len(solutions):
+            raise UnreachableError(f"there are solutions 0 to {len(solutions) - 1}, got {number}")
+        if solutions[number].fault:
+            raise UnreachableError(solutions[number].fault)
+        self._changing(arm, "solution", now)
+        arm.set_joints(solutions[number].q)
+
+    def grip(self, name: str, *, open_it: bool, now: float) -> None:
+        """Open or close the gripper of an arm; it takes the part that is between its fingers."""
+        self.arm(name)
+        hands = {each: arm.tool for each, arm in self.arms.items()}
+        (self._parts.open if open_it else self._parts.close)(name, hands, now)
+        self._checks = None
+
+    def _changing(self, arm: LiveArm, gesture: str, now: float) -> None:
+        """Keep where an arm is, to return to it, unless it is still moved by the same gesture."""
+        what, latest = self._gesture
+        if what != f"{arm.name} {gesture}" or now - latest > _ONE_GESTURE:
+            self._undo = [*self._undo, (arm.name, arm.q)][-_MOST_UNDONE:]
+        self._gesture = f"{arm.name} {gesture}", now
+
+    def undo(self) -> None:
+        """Bring the arm that was moved last to where it was before."""
+        if not self._undo:
+            raise UnreachableError("there is nothing to take back")
+        name, q = self._undo.pop()
+        self.arms[name].q, self._gesture = q, ("", -math.inf)
+
+    # ---- what is shown -------------------------------------------------------------------------------------------
+
+    def frame_poses(self) -> dict[str, Array]:
+        """Return the poses (4, 4) of the frames of the cell in the world, by name."""
+        tree, hidden = self.cell.tree(), {"WORLD", *self.arms, *map(base_name, self.arms)}
+        for name, arm in self.arms.items():
+            tree = tree.set_pose(name, arm.tool)
+        return {name: tree.world(name) for name in tree if name not in hidden and tree.has_value(name)}
+
+    @cached_property
+    def _collisions(self) -> CellCollisions:
+        return CellCollisions(self.cell)
+
+    def nearest(self) -> NearBodies | None:
+        """Return the two bodies that are nearest to one another; None where nothing is near, or nothing can meet."""
+        if self._checks is None:
+            self._checks = self._collisions.at_configurations(self._parts)
+        return self._checks.nearest({name: arm.q for name, arm in self.arms.items()}, _NEAR)
+
+    def state(self) -> dict[str, Any]:
+        """Return what a page shows, as plain data."""
+        return {
+            "ready": self.ready,
+            "refusal": self.refusal,
+            "arms": {name: self._arm_state(arm) for name, arm in self.arms.items()},
+            "parts": {name: self._part_state(name) for name in self.cell.parts},
+            "frames": {name: _rounded(to_noap(X)) for name, X in self.frame_poses().items()},
+            "near": self._near_state(),
+            "undo": len(self._undo),
+        }
+
+    def _arm_state(self, arm: LiveArm) -> dict[str, Any]:
+        opening = self.cell.arms[arm.name].gripper_or_usual.opening
+        state: dict[str, Any] = {
+            "q": _rounded(arm.q),
+            "grip": round(self._parts.opening(arm.name) / opening, 4),
+            "holds": list(self._parts.held_by(arm.name)),
+        }
+        if self.ready:
+            state["tool"] = _rounded(to_noap(arm.tool))
+            state["solutions"] = [_solution_state(it) for it in arm.solutions()]
+            state["warnings"] = [_warning_state(it) for it in arm.warnings()]
+        return state
+
+    def _part_state(self, name: str) -> dict[str, Any]:
+        return {"arm": self._parts.carrier(name), "pose": _rounded(to_noap(self._parts.pose(name)))}
+
+    def _near_state(self) -> dict[str, Any] | None:
+        near = self.nearest() if self.ready and self.cell.collisions_matter else None
+        return None if near is None else {"distance": round(near.distance, 6), "bodies": list(near.names)}
+
+
+def _solution_state(it: Solution) -> dict[str, Any]:
+    return {"label": it.label, "fault": it.fault, "here": it.here}
+
+
+def _warning_state(it: Warning) -> dict[str, Any]:
+    return {"kind": it.kind, "level": it.level, "text": it.text, "joints": list(it.joints)}
+
+
+def _rounded(array: Array) -> list[float]:
+    return (np.round(array, 7) + 0.0).tolist()  # type: ignore[no-any-return] # adding 0 turns -0 into 0
