@@ -134,7 +134,7 @@ Command: TypeAlias = (
     | AskForControl
     | AnswerRequest
 )
-# By the word in a message; every page may send some of them, the others only the page that has control.
+# By the word in a message.
 _COMMANDS: dict[str, type[Any]] = {
     "got": Got,
     "joint": SetJoint,
@@ -148,7 +148,6 @@ _COMMANDS: dict[str, type[Any]] = {
     "ask": AskForControl,
     "answer": AnswerRequest,
 }
-OPEN_TO_ALL = (Got, AskForControl)
 
 
 def read_message(text: str | bytes) -> Command:

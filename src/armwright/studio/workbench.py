@@ -35,14 +35,13 @@ class Workbench:
         cell: the cell.
         arms: its arms, by name.
         ready: whether what moving needs has been compiled.
-        refusal: why the latest command was not done; empty where it was.
     """
 
     def __init__(self, cell: Cell) -> None:
         """Take a cell, with its arms at their starts."""
         self.cell = cell
         self.arms = {name: LiveArm(name, arm) for name, arm in cell.arms.items()}
-        self.ready, self.refusal = False, ""
+        self.ready = False
         self._parts = PartPoses(cell)
         self._checks: ConfigurationChecks | None = None
         self._undo: list[tuple[str, Array]] = []
@@ -193,7 +192,6 @@ class Workbench:
         """Return what a page shows, as plain data."""
         return {
             "ready": self.ready,
-            "refusal": self.refusal,
             "arms": {name: self._arm_state(arm) for name, arm in self.arms.items()},
             "parts": {name: self._part_state(name) for name in self.cell.parts},
             "frames": {name: _rounded(to_noap(X)) for name, X in self.frame_poses().items()},

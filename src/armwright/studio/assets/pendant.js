@@ -1,0 +1,151 @@
+// The pendant: joints, jogging, gripper, solutions.
+
+const HELD_AGAIN = 90; // a jog is kept going by a message so often [ms]
+const TURN = 2 * Math.PI;
+const holding = { timer: null, button: null };
+
+const chosenArm = () => data.arms[now.arm];
+const armState = () => live.state?.arms[chosenArm().name];
+
+// A button that moves something as long as it is held, by pointer or by key; `message` is sent while it is.
+function holdButton(text, label, message) {
+  const button = make("button", { type: "button", className: "hold", textContent: text, ariaLabel: label, title: label });
+  const start = (event) => {
+    if (!mine() || holding.button) return;
+    event.preventDefault();
+    button.focus({ preventScroll: true });
+    holding.button = button;
+    button.classList.add("held");
+    const go = () => send({ do: "jog", arm: chosenArm().name, share: share(), ...message() }, "jog");
+    go();
+    holding.timer = setInterval(go, HELD_AGAIN);
+  };
+  button.addEventListener("pointerdown", (event) => {
+    if (event.button === 0) start(event);
+  });
+  button.addEventListener("keydown", (event) => {
+    if ((event.key === " " || event.key === "Enter") && !event.repeat) start(event);
+    if (event.key === " " || event.key === "Enter") event.preventDefault();
+  });
+  for (const end of ["pointerup", "pointercancel", "pointerleave", "keyup", "blur"]) button.addEventListener(end, letGo);
+  return button;
+}
+
+function letGo() {
+  if (!holding.button) return;
+  clearInterval(holding.timer);
+  holding.button.classList.remove("held");
+  Object.assign(holding, { timer: null, button: null });
+  live.queue.delete("jog");
+  sendNow({ do: "halt" });
+}
+
+// Slow speeds have most of the slider.
+function share() {
+  return Math.max(0.01, (Number(byId("share").value) / 100) ** 2.5);
+}
+
+function sliderRow(joint, j) {
+  const factor = unitFactor(QUANTITIES[0], joint);
+  const [low, high] = [joint.lower ?? (joint.kind === "revolute" ? -TURN : -1), joint.upper ?? (joint.kind === "revolute" ? TURN : 1)];
+  const id = `joint-${j + 1}`;
+  const slider = make("input", { type: "range", id, min: low, max: high, step: (high - low) / 2000 });
+  const typed = make("input", { type: "text", inputMode: "decimal", ariaLabel: `Joint ${j + 1} in ${QUANTITIES[0].units[joint.kind]}` });
+  const set = (value) => send({ do: "joint", arm: chosenArm().name, joint: j + 1, value }, `joint ${j}`);
+  slider.addEventListener("input", () => set(Number(slider.value)));
+  typed.addEventListener("change", () => {
+    const value = Number(typed.value.replace("−", "-").replace(",", "."));
+    if (Number.isFinite(value) && typed.value.trim()) set(value / factor);
+    typed.blur();
+  });
+  const way = (sign) => () => ({ frame: "JOINT", axis: j, way: sign });
+  return make(
+    "div",
+    { className: "slider" },
+    make("label", { htmlFor: id, textContent: `J${j + 1}`, title: `${quantityText(QUANTITIES[0], joint, low)} to ${quantityText(QUANTITIES[0], joint, high)}` }),
+    holdButton("−", `Joint ${j + 1} down`, way(-1)),
+    slider,
+    holdButton("+", `Joint ${j + 1} up`, way(1)),
+    make("span", { className: "value" }, typed, QUANTITIES[0].units[joint.kind]),
+  );
+}
+
+function fillPendant() {
+  byId("sliders").replaceChildren(...chosenArm().joints.map(sliderRow));
+  const frames = byId("jog-frame");
+  const before = frames.value || "TOOL";
+  frames.replaceChildren(
+    ...["TOOL", "BASE", "WORLD", ...data.animation.frames.map(({ name }) => name)].map((name) =>
+      make("option", { value: name, textContent: ["TOOL", "BASE", "WORLD"].includes(name) ? name.toLowerCase() : name }),
+    ),
+  );
+  frames.value = before;
+  const names = ["x", "y", "z", "about x", "about y", "about z"];
+  byId("jog").replaceChildren(
+    ...[1, -1].flatMap((sign) =>
+      names.map((name, axis) =>
+        holdButton(`${sign > 0 ? "+" : "−"}${name.replace("about ", "r")}`, `${axis < 3 ? "Move" : "Turn"} ${sign > 0 ? "up" : "down"} ${axis < 3 ? "along " : ""}${name}`, () => ({
+          frame: frames.value,
+          axis,
+          way: sign,
+        })),
+      ),
+    ),
+  );
+}
+
+function showPendant(state) {
+  const it = state?.arms[chosenArm().name];
+  if (!it) return;
+  const near = new Set((it.warnings ?? []).filter(({ kind }) => kind === "limit").flatMap(({ joints }) => joints));
+  [...byId("sliders").children].forEach((row, j) => {
+    const [slider, typed] = [row.querySelector("input[type=range]"), row.querySelector("input[type=text]")];
+    const joint = chosenArm().joints[j];
+    slider.value = it.q[j];
+    slider.setAttribute("aria-valuetext", quantityText(QUANTITIES[0], joint, it.q[j]));
+    if (document.activeElement !== typed) typed.value = number(it.q[j] * unitFactor(QUANTITIES[0], joint), 2);
+    row.classList.toggle("near", near.has(j + 1));
+  });
+  byId("hand-text").textContent = it.tool ? `tool at ${placeText(it.tool.slice(9))} mm` : "";
+  byId("grip-text").textContent = it.holds.length ? `holds ${it.holds.join(", ")}` : it.grip > 0.99 ? "open" : it.grip < 0.01 ? "closed" : `${number(100 * it.grip, 0)} % open`;
+  showSolutions(it.solutions ?? []);
+}
+
+function showSolutions(solutions) {
+  const list = byId("solutions");
+  const allowed = solutions.filter(({ fault }) => !fault).length;
+  byId("solutions-text").textContent = solutions.length ? `${allowed} of ${solutions.length} within the limits` : "";
+  while (list.children.length > solutions.length) list.lastChild.remove();
+  while (list.children.length < solutions.length) {
+    const number = list.children.length;
+    const button = make("button", { type: "button" }, make("span"), make("small"));
+    button.addEventListener("click", () => send({ do: "solution", arm: chosenArm().name, number }));
+    list.append(make("li", {}, button));
+  }
+  solutions.forEach(({ label, fault, here }, i) => {
+    const button = list.children[i].firstChild;
+    button.firstChild.textContent = label;
+    button.lastChild.textContent = fault;
+    button.disabled = Boolean(fault);
+    button.ariaPressed = String(here);
+  });
+}
+
+function startPendant() {
+  fillPendant();
+  const speed = () => {
+    byId("share-text").textContent = `${number(100 * share(), share() < 0.1 ? 1 : 0)} %`;
+  };
+  byId("share").addEventListener("input", speed);
+  speed();
+  byId("open").addEventListener("click", () => send({ do: "grip", arm: chosenArm().name, open: true }));
+  byId("close").addEventListener("click", () => send({ do: "grip", arm: chosenArm().name, open: false }));
+  byId("undo").addEventListener("click", () => send({ do: "undo" }));
+  byId("jog-frame").addEventListener("change", drawSoon);
+  // What is held stops when the page is no longer looked at.
+  window.addEventListener("blur", letGo);
+  window.addEventListener("pagehide", letGo);
+  document.addEventListener("visibilitychange", () => {
+    if (document.hidden) letGo();
+  });
+}

@@ -1,0 +1,73 @@
+"""The page of a studio: one HTML file with its style, its scripts and what it shows first."""
+
+from __future__ import annotations
+
+import html
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from armwright.report.animation import Animation, FrameTrack, MovedPart
+from armwright.report.arm_figure import arm_figure
+from armwright.report.markup import asset, json_text
+from armwright.report.run_scene import fixture_bodies, placed_arms
+from armwright.report.shape_table import ShapeTable
+from armwright.report.stick_figure import arm_record
+from armwright.spatial.poses import to_noap
+from armwright.studio.workbench import Workbench
+from armwright.version import __version__
+
+# Of the pages of results, and then those of the studio.
+_SHARED_SCRIPTS = ("basics.js", "scene.js", "poses.js", "camera.js", "meshes.js", "surface.js", "labels.js", "view.js")
+_SCRIPTS = ("live.js", "gizmo.js", "pendant.js", "studio.js")
+
+
+def studio_page(workbench: Workbench, token: str, policy: str) -> str:
+    """Return the page.
+
+    Args:
+        workbench: what it shows.
+        token: with which it connects to its server.
+        policy: what the page may do, as of Content-Security-Policy.
+    """
+    script = "\n".join([*map(asset, _SHARED_SCRIPTS), *map(_asset, _SCRIPTS)])
+    return Template(_asset("studio.html")).substitute(
+        title=html.escape(f"{workbench.cell.name} - armwright studio"),
+        name=html.escape(workbench.cell.name),
+        policy=html.escape(policy),
+        style="\n".join([asset("page.css"), asset("film.css"), asset("run.css"), _asset("studio.css")]),
+        data=json_text({**_shown_first(workbench), "token": token}),
+        script=script,
+    )
+
+
+def _asset(name: str) -> str:
+    return (files("armwright.studio") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _shown_first(workbench: Workbench) -> dict[str, Any]:
+    cell, shapes, now = workbench.cell, ShapeTable(), np.zeros(1)
+    placed = placed_arms(cell)
+    figures = {
+        name: arm_figure(name, placed[name], arm.q[None], np.ones(1), shapes) for name, arm in workbench.arms.items()
+    }
+    parts = [
+        MovedPart(name=name, shape=shapes.number(part.shape), times=[0.0], arms=[None], poses=[to_noap(part.pose)])
+        for name, part in cell.parts.items()
+    ]
+    frames = [FrameTrack(name=name, poses=to_noap(X)[None]) for name, X in workbench.frame_poses().items()]
+    fixtures = fixture_bodies(cell, shapes)
+    animation = Animation(
+        fps=60.0, t=now, arms=figures, frames=frames, fixtures=fixtures, parts=parts, shapes=shapes.as_data()
+    )
+    still = {name: (now, arm.q[None], *[np.zeros_like(arm.q)[None]] * 3) for name, arm in workbench.arms.items()}
+    return {
+        "duration": 0,
+        "stages": [],
+        "effects": [],
+        "arms": [arm_record(name, cell.arms[name].arm, still[name], cell.arms[name].base) for name in cell.arms],
+        "animation": animation,
+        "version": __version__,
+    }
