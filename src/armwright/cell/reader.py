@@ -67,7 +67,23 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     path = file_path(path)
     if is_assembly(path):
         raise FileFormatError(path, None, "", "expected a cell file; an assembly is for IMPORT")
-    top = Document.read(path).root
+    return _cell(Document.read(path).root, path, arms_needed=arms_needed)
+
+
+def parse_cell(path: Path, text: str) -> Cell:
+    """Return the cell that a TOML file would hold with a text in it.
+
+    Args:
+        path: of the file; others are found from its folder.
+        text: of it.
+
+    Raises:
+        FileFormatError: the text is invalid; the message has file, line and key.
+    """
+    return _cell(Document.parse(path, text, is_json=False).root, path, arms_needed=True)
+
+
+def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")

@@ -1,0 +1,191 @@
+"""The cell file of a studio: frames taught into it, its comments kept, the change shown before it is written."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD
+from armwright.cell.model import Cell
+from armwright.cell.reader import parse_cell, read_cell
+from armwright.errors import ArmwrightError, UnknownNameError
+from armwright.extras import import_extra
+from armwright.files.inputs import read_text
+from armwright.files.output import write_file
+from armwright.spatial.poses import inverse, to_noap
+
+# Decimals of rotations, and of positions [m].
+_DECIMALS = np.repeat((9, 7), (9, 3))
+# Changes that can be taken back at most.
+_MOST_UNDONE = 200
+_FRAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+
+
+class TeachingError(ArmwrightError, ValueError):
+    """A change of a cell file that cannot be made; the file stays as it is."""
+
+
+class CellFile:
+    """The text of a cell file, changed by teaching and written when that is asked for.
+
+    Attributes:
+        path: of the file.
+        text: with the changes.
+        cell: as the text describes it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read a file.
+
+        Raises:
+            FileFormatError: it is no cell file.
+        """
+        self.path, self.cell = path, read_cell(path)
+        self.text = self._saved = read_text(path)
+        self._before: list[str] = []
+
+    @property
+    def changed(self) -> bool:
+        """Whether the text differs from the file."""
+        return self.text != self._saved
+
+    # ---- changes -------------------------------------------------------------------------------------------------
+
+    def teach(self, name: str, X_WF: Array, on: str = WORLD, X_WP: Array | None = None) -> None:
+        """Add a frame, or give it another pose.
+
+        Args:
+            name: of the frame.
+            X_WF: (4, 4) its pose in the world.
+            on: the frame that it hangs on.
+            X_WP: (4, 4) the pose of that frame in the world; the world itself when left out.
+
+        Raises:
+            TeachingError: the name is none, or the cell would be wrong.
+        """
+        self._check_name(name)
+        document = self._parsed()
+        frames = self._frames(document)
+        key = self._key(frames, name) or name.upper()
+        pose = _toml_pose(to_noap(X_WF if X_WP is None else inverse(X_WP) @ X_WF))
+        frames[key] = _value(pose if on == WORLD else f'{{ on = "{on}", at = {pose} }}')
+        self._take(document)
+
+    def rename(self, name: str, new: str) -> None:
+        """Give a frame another name; frames that hang on it follow.
+
+        Raises:
+            TeachingError: the name is none or taken, or the cell would be wrong.
+        """
+        self._check_name(new)
+        document = self._parsed()
+        frames = self._frames(document)
+        key = self._known(frames, name)
+        if new.upper() != key.upper() and self._key(frames, new) is not None:
+            raise TeachingError(f"there is a frame {new.upper()} already")
+        items = [(new.upper() if old == key else old, frames[old]) for old in list(frames)]
+        for old in list(frames):
+            del frames[old]
+        for old, value in items:
+            if hasattr(value, "get") and str(value.get("on", "")).upper() == key.upper():
+                value["on"] = new.upper()
+            frames[old] = value
+        self._take(document)
+
+    def forget(self, name: str) -> None:
+        """Take a frame out.
+
+        Raises:
+            TeachingError: there is none, or another one hangs on it.
+        """
+        document = self._parsed()
+        frames = self._frames(document)
+        del frames[self._known(frames, name)]
+        self._take(document)
+
+    def undo(self) -> None:
+        """Take back the latest change.
+
+        Raises:
+            TeachingError: there is none.
+        """
+        if not self._before:
+            raise TeachingError("nothing has been taught that could be taken back")
+        self.text = self._before.pop()
+        self.cell = parse_cell(self.path, self.text)
+
+    def difference(self) -> str:
+        """Return what saving would change in the file, as a unified diff; empty where it is nothing."""
+        lines = (text.splitlines(keepends=True) for text in (self._saved, self.text))
+        return "".join(difflib.unified_diff(*lines, fromfile=self.path.name, tofile=f"{self.path.name}, taught"))
+
+    def save(self) -> None:
+        """Write the text to the file.
+
+        Raises:
+            TeachingError: somebody else has changed the file meanwhile.
+            OutputError: it cannot be written.
+        """
+        if self.path.exists() and read_text(self.path) != self._saved:
+            raise TeachingError(f"{self.path.name} has been changed by another program; nothing is written over it")
+        write_file(self.path, self.text, back=True)
+        self._saved = self.text
+
+    # ---- the document --------------------------------------------------------------------------------------------
+
+    def _parsed(self) -> Any:
+        if self.path.suffix.lower() == ".json":
+            raise TeachingError(f"frames are taught into TOML files, and {self.path.name} is JSON")
+        return import_extra("tomlkit", "teaching", "studio").parse(self.text)
+
+    def _frames(self, document: Any) -> Any:
+        tomlkit = import_extra("tomlkit", "teaching", "studio")
+        if "frames" not in document:
+            document["frames"] = tomlkit.table()
+        return document["frames"]
+
+    @staticmethod
+    def _key(frames: Any, name: str) -> str | None:
+        return next((key for key in frames if key.upper() == name.upper()), None)
+
+    def _known(self, frames: Any, name: str) -> str:
+        key = self._key(frames, name)
+        if key is None:
+            raise UnknownNameError("frame", name, list(frames))
+        return key
+
+    @staticmethod
+    def _check_name(name: str) -> None:
+        if not _FRAME.match(name):
+            raise TeachingError(f"a frame has a name of letters, digits and _ that begins with a letter, got {name!r}")
+
+    def _take(self, document: Any) -> None:
+        """Take a changed document, if it is a cell."""
+        text = document.as_string()
+        try:
+            cell = parse_cell(self.path, text)
+        except ArmwrightError as error:
+            raise TeachingError(str(error)) from error
+        self._before = [*self._before, self.text][-_MOST_UNDONE:]
+        self.text, self.cell = text, cell
+
+
+def _toml_pose(noap: Array) -> str:
+    """Return the text of a pose: twelve numbers, column by column."""
+    numbers = [_number_text(value, int(digits)) for value, digits in zip(noap, _DECIMALS, strict=True)]
+    return "[" + ",  ".join(", ".join(numbers[i : i + 3]) for i in range(0, 12, 3)) + "]"
+
+
+def _number_text(value: float, digits: int) -> str:
+    rounded = round(float(value), digits) + 0.0
+    return str(int(rounded)) if rounded == int(rounded) else f"{rounded:.{digits}f}".rstrip("0")
+
+
+def _value(text: str) -> Any:
+    """Return a value of TOML from its text."""
+    return import_extra("tomlkit", "teaching", "studio").value(text)

@@ -1,0 +1,193 @@
+"""A run of a program, shown at the pace of a clock while the program itself runs ahead."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.frames import FrameTree
+from armwright.cell.hardware import HardwareFactory
+from armwright.cell.model import Cell
+from armwright.cell.part_poses import PartTrack
+from armwright.program.bytecode.instructions import Code
+from armwright.program.debugger.debugger import Command, Debugger
+from armwright.program.debugger.stop_reason import Stop
+from armwright.program.vm.recording import Effect, Recording
+
+# A run is computed for so long at a time [s], and so far ahead of what is shown [s].
+_SLICE, _AHEAD = 0.008, 1.0
+# Lines of the trace that a page gets.
+_TRACE = 300
+
+Way: TypeAlias = Literal["continue", "next", "in", "out", "stage", "tick", "back"]
+
+
+class ProgramRun:
+    """A program that runs, or stands, in a cell.
+
+    Attributes:
+        debugger: the run itself, which may be ahead of what is shown.
+        time: what is shown [s].
+        playing: whether the time that is shown goes on.
+        rate: how fast, 1 being real time.
+    """
+
+    def __init__(self, code: Code, cell: Cell, hardware: HardwareFactory, lines: Iterable[int]) -> None:
+        """Load a program.
+
+        Args:
+            code: translated against the cell.
+            cell: it runs in.
+            hardware: how the cell is set up.
+            lines: of the breakpoints.
+        """
+        self.debugger = Debugger(code, cell, hardware=hardware)
+        self.time, self.playing, self.rate = 0.0, False, 1.0
+        for line in lines:
+            self.debugger.add_breakpoint(line)
+        self._cell = cell
+        self._backwards = False
+
+    def begin(self, *, stop_on_entry: bool) -> None:
+        """Let it begin: to run, or to stand in front of the first statement."""
+        self.debugger.begin(stop_on_entry=stop_on_entry)
+        self.playing = True
+
+    def go(self, way: Way) -> None:
+        """Go on, or a step on or back.
+
+        Raises:
+            DebuggerError: the program is over.
+        """
+        debugger = self.debugger
+        if debugger.running or self.time < self.end - 1e-9:
+            if way == "continue":
+                self.playing = True
+                return
+            # A step goes on from where the program stands, not from what is shown.
+            debugger.pause()
+            self.time = self.end
+        process = debugger.stop.path if debugger.stop is not None else ()
+        command: Command = way
+        debugger.resume(command, process)
+        self._backwards = way == "back"
+        self.playing = True
+
+    def pause(self) -> None:
+        """Stop the time that is shown."""
+        self.playing = False
+
+    def tick(self, seconds: float) -> bool:
+        """Let time go by [s]; return whether anything has changed."""
+        debugger = self.debugger
+        if debugger.running and (self._backwards or self.end < self.time + _AHEAD):
+            debugger.run_slice(_SLICE)
+        if self._backwards:
+            if not debugger.running:
+                self._backwards, self.time, self.playing = False, self.end, False
+            return True
+        if not self.playing:
+            return debugger.running
+        before = self.time
+        self.time = min(self.time + seconds * self.rate, self.end)
+        if self.time >= self.end and not debugger.running:
+            self.playing = False
+            return True
+        return self.time != before
+
+    @property
+    def end(self) -> float:
+        """How far the program has come [s]."""
+        return self.debugger.time
+
+    @property
+    def stop(self) -> Stop | None:
+        """Why it stands; None while it runs, or is still shown on the way to where it stands."""
+        return self.debugger.stop if not self.debugger.running and self.time >= self.end - 1e-9 else None
+
+    # ---- what is shown -------------------------------------------------------------------------------------------
+
+    def configuration(self, arm: str) -> Array:
+        """Return the joint positions (n,) of an arm at the time that is shown, as they were planned."""
+        segments = self.debugger.machine.state.segments[arm]
+        i = bisect_right(segments, self.time + 1e-9, key=lambda segment: segment.t0) - 1
+        if i < 0:
+            return np.array(self._cell.arms[arm].start)
+        segment = segments[i]
+        return np.asarray(segment.trajectory(min(max(self.time - segment.t0, 0.0), segment.duration)))
+
+    def tree(self) -> FrameTree:
+        """Return the frame tree at the time that is shown."""
+        trees = self.debugger.machine.state.trees
+        i = bisect_right(trees, self.time + 1e-9, key=lambda entry: entry[0]) - 1
+        return trees[max(i, 0)][1]
+
+    def parts(self) -> dict[str, tuple[str | None, Array]]:
+        """Return for each part the arm that holds it, and its pose on that hand or in the world."""
+        tracks: dict[str, PartTrack] = {
+            **self.debugger.machine.hardware.part_poses().tracks,
+            **self.debugger.machine.hardware.observations().parts,
+        }
+        return {name: track.at(self.time + 1e-9) for name, track in tracks.items()}
+
+    def opening(self, arm: str) -> float:
+        """Return how far the fingers of an arm are open, 0 to 1, at the time that is shown."""
+        share = 1.0
+        for effect in self.debugger.machine.state.effects:
+            if effect.arm == arm and effect.kind in {"OPEN", "GRASP"} and effect.t0 <= self.time:
+                share = 1.0 if effect.kind == "OPEN" else 0.0
+        return share
+
+    def lines(self) -> list[dict[str, Any]]:
+        """Return in which line each process is, as plain data: its name, the arm that it moves, the line."""
+        machine = self.debugger.machine
+        if self.stop is not None:
+            stands = [(process, self.debugger.stack(process.path)[0]) for process in self.debugger.processes]
+            return [
+                {
+                    "process": frame.title,
+                    "arm": None if process.motion is None else process.motion.arm,
+                    "line": machine.code.source.line(frame.span.start),
+                }
+                for process, frame in stands
+            ]
+        latest: dict[str, Effect] = {}
+        for effect in machine.state.effects:
+            if effect.t0 <= self.time + 1e-9:
+                latest[effect.process] = effect
+        return [
+            {"process": name, "arm": effect.arm, "line": machine.code.source.line(effect.span.start)}
+            for name, effect in latest.items()
+        ]
+
+    def state(self) -> dict[str, Any]:
+        """Return what a page shows of the run, as plain data."""
+        stop = self.stop
+        source = self.debugger.machine.code.source
+        trace = [effect for effect in self.debugger.machine.state.effects if effect.t0 <= self.time + 1e-9]
+        trace.sort(key=lambda effect: effect.order)
+        return {
+            "time": round(self.time, 4),
+            "end": round(self.end, 4),
+            "playing": self.playing,
+            "running": self.debugger.running,
+            "lines": self.lines(),
+            "ended": stop is not None and stop.has_ended,
+            "reason": "" if stop is None else stop.reason,
+            "text": "" if stop is None or stop.diagnostic is None else stop.diagnostic.message,
+            "trace": [
+                {"t": round(effect.t0, 4), "line": source.line(effect.span.start), "text": effect.text}
+                for effect in trace[-_TRACE:]
+            ],
+        }
+
+    def recording(self) -> Recording:
+        """Return all that the program has done so far."""
+        stop = self.debugger.stop
+        if stop is not None and stop.recording is not None:
+            return stop.recording()
+        return self.debugger.machine.recording()
