@@ -52,6 +52,24 @@ class PartPoses:
         }
         self._openings = {name: arm.gripper_or_usual.opening for name, arm in cell.arms.items()}
 
+    @classmethod
+    def arranged(
+        cls, cell: Cell, parts: Mapping[str, tuple[str | None, Array]], openings: Mapping[str, float]
+    ) -> PartPoses:
+        """Return parts that are where they are said to be.
+
+        Args:
+            cell: the cell.
+            parts: for each part the arm that holds it, and its pose (4, 4) on that hand; None and in the world.
+            openings: distance between the fingers of each arm [m].
+        """
+        other = cls(cell)
+        other._tracks = {
+            name: PartTrack(times=(0.0,), arms=(arm,), poses=(read_only(X),)) for name, (arm, X) in parts.items()
+        }
+        other._openings = dict(openings)
+        return other
+
     def copy(self) -> PartPoses:
         """Return the same state; changes of one of them do not change the other."""
         other = PartPoses(self._cell)

@@ -121,6 +121,149 @@ class AnswerRequest:
     give: bool
 
 
+@attrs.frozen(kw_only=True)
+class Teach:
+    """Add a frame to the cell file where the tool is, or give it that pose.
+
+    Attributes:
+        arm: name of the arm.
+        name: of the frame.
+        on: the frame that it hangs on.
+    """
+
+    arm: str
+    name: str
+    on: str = "WORLD"
+
+
+@attrs.frozen(kw_only=True)
+class Rename:
+    """Give a frame of the cell file another name."""
+
+    name: str
+    to: str
+
+
+@attrs.frozen(kw_only=True)
+class Forget:
+    """Take a frame out of the cell file."""
+
+    name: str
+
+
+@attrs.frozen(kw_only=True)
+class Unteach:
+    """Take back the latest change of the cell file."""
+
+
+@attrs.frozen(kw_only=True)
+class Save:
+    """Write the cell file or the program."""
+
+    what: Literal["cell", "program"]
+
+
+@attrs.frozen(kw_only=True)
+class GoTo:
+    """Bring the tool of an arm to a frame."""
+
+    arm: str
+    frame: str
+
+
+@attrs.frozen(kw_only=True)
+class SetText:
+    """Take another text of the program.
+
+    Attributes:
+        text: the text.
+        version: of the text that it was made from.
+    """
+
+    text: str
+    version: int
+
+
+@attrs.frozen(kw_only=True)
+class InsertMove:
+    """Teach a frame where the tool is, and insert a MOVE to it into the program.
+
+    Attributes:
+        arm: name of the arm.
+        frame: name of the frame.
+        line: behind which the MOVE is inserted, from 0.
+        straight: whether along a straight line.
+        speed: 100 being normal.
+    """
+
+    arm: str
+    frame: str
+    line: int
+    straight: bool = False
+    speed: float = 100.0
+
+
+@attrs.frozen(kw_only=True)
+class TouchUp:
+    """Give the goal of the MOVE in a line the pose of the tool."""
+
+    line: int
+
+
+@attrs.frozen(kw_only=True)
+class Break:
+    """Set or remove a breakpoint."""
+
+    line: int
+    on: bool
+
+
+@attrs.frozen(kw_only=True)
+class Run:
+    """Run the program.
+
+    Attributes:
+        line: only from the statement in this line on, from where the arms are; 0 for all, from the start of the cell.
+        only: whether only that statement is run.
+        physics: whether in a world with physics.
+        entry: whether it stands in front of the first statement.
+    """
+
+    line: int = 0
+    only: bool = False
+    physics: bool = False
+    entry: bool = False
+
+
+@attrs.frozen(kw_only=True)
+class Go:
+    """Go on with a run, or a step on or back."""
+
+    way: Literal["continue", "next", "in", "out", "stage", "tick", "back"]
+
+
+@attrs.frozen(kw_only=True)
+class Pause:
+    """Let a run stand."""
+
+
+@attrs.frozen(kw_only=True)
+class Stop:
+    """End a run; the arms stay where they are."""
+
+
+@attrs.frozen(kw_only=True)
+class Reset:
+    """Put arms and parts to where they are at the start of the cell."""
+
+
+@attrs.frozen(kw_only=True)
+class Pace:
+    """How fast a run is shown, 1 being real time."""
+
+    rate: float
+
+
 Command: TypeAlias = (
     Got
     | SetJoint
@@ -133,6 +276,22 @@ Command: TypeAlias = (
     | Undo
     | AskForControl
     | AnswerRequest
+    | Teach
+    | Rename
+    | Forget
+    | Unteach
+    | Save
+    | GoTo
+    | SetText
+    | InsertMove
+    | TouchUp
+    | Break
+    | Run
+    | Go
+    | Pause
+    | Stop
+    | Reset
+    | Pace
 )
 # By the word in a message.
 _COMMANDS: dict[str, type[Any]] = {
@@ -147,6 +306,22 @@ _COMMANDS: dict[str, type[Any]] = {
     "undo": Undo,
     "ask": AskForControl,
     "answer": AnswerRequest,
+    "teach": Teach,
+    "rename": Rename,
+    "forget": Forget,
+    "unteach": Unteach,
+    "save": Save,
+    "go to": GoTo,
+    "text": SetText,
+    "insert": InsertMove,
+    "touch up": TouchUp,
+    "break": Break,
+    "run": Run,
+    "go": Go,
+    "pause": Pause,
+    "stop": Stop,
+    "reset": Reset,
+    "pace": Pace,
 }
 
 
@@ -199,7 +374,7 @@ def _checked(name: str, value: Any, kind: Any) -> Any:
         return _number(name, value)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         raise MessageError(f"{name}: expected {kind.__name__}, got {shown(value)}")
-    if kind is str and len(value) > _LONGEST_NAME:
+    if kind is str and len(value) > _LONGEST_NAME and not name.endswith(".text"):
         raise MessageError(f"{name}: longer than {_LONGEST_NAME} characters")
     if kind is int and abs(value) > _LARGEST:
         raise MessageError(f"{name}: beyond {_LARGEST:.0f}, got {shown(value)}")

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES
+from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.report.animation import Animation, FrameTrack, MovedPart
 from armwright.report.arm_figure import arm_figure
 from armwright.report.markup import asset, json_text
@@ -21,7 +23,7 @@ from armwright.version import __version__
 
 # Of the pages of results, and then those of the studio.
 _SHARED_SCRIPTS = ("basics.js", "scene.js", "poses.js", "camera.js", "meshes.js", "surface.js", "labels.js", "view.js")
-_SCRIPTS = ("live.js", "gizmo.js", "pendant.js", "studio.js")
+_SCRIPTS = ("live.js", "gizmo.js", "pendant.js", "teaching.js", "editor.js", "running.js", "studio.js")
 
 
 def studio_page(workbench: Workbench, token: str, policy: str) -> str:
@@ -70,4 +72,10 @@ def _shown_first(workbench: Workbench) -> dict[str, Any]:
         "arms": [arm_record(name, cell.arms[name].arm, still[name], cell.arms[name].base) for name in cell.arms],
         "animation": animation,
         "version": __version__,
+        "words": {
+            "declaration": sorted(DECLARATIONS),
+            "type": sorted(TYPES),
+            "keyword": sorted(KEYWORDS | OPERATORS),
+            "function": sorted(FUNCTIONS),
+        },
     }

@@ -47,10 +47,16 @@ class ProgramRun:
         """
         self.debugger = Debugger(code, cell, hardware=hardware)
         self.time, self.playing, self.rate = 0.0, False, 1.0
-        for line in lines:
-            self.debugger.add_breakpoint(line)
+        self.set_breakpoints(lines)
         self._cell = cell
         self._backwards = False
+
+    def set_breakpoints(self, lines: Iterable[int]) -> None:
+        """Stop at these lines, and at no others."""
+        for one in list(self.debugger.execution.breakpoints):
+            self.debugger.remove_breakpoint(one.number)
+        for line in lines:
+            self.debugger.add_breakpoint(line)
 
     def begin(self, *, stop_on_entry: bool) -> None:
         """Let it begin: to run, or to stand in front of the first statement."""

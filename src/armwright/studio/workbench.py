@@ -6,6 +6,7 @@ import math
 from functools import cached_property
 from typing import Any
 
+import attrs
 import numpy as np
 
 from armwright.arrays import Array
@@ -16,6 +17,7 @@ from armwright.physics.collisions import CellCollisions
 from armwright.physics.configuration_checks import ConfigurationChecks, NearBodies
 from armwright.spatial.poses import from_noap, homogeneous, to_noap
 from armwright.spatial.rotations import rotation_from_vector
+from armwright.studio.program_run import ProgramRun
 from armwright.studio.live_arm import LiveArm, Solution, UnreachableError, Warning
 
 # Full speed of jogging: of angles [rad/s], of lengths [m/s].
@@ -43,7 +45,10 @@ class Workbench:
         self.arms = {name: LiveArm(name, arm) for name, arm in cell.arms.items()}
         self.ready = False
         self._parts = PartPoses(cell)
+        self._tree = cell.tree()
         self._checks: ConfigurationChecks | None = None
+        # What was shown last of a run: parts and openings.
+        self._followed: object = None
         self._undo: list[tuple[str, Array]] = []
         self._gesture = ("", -math.inf)
 
@@ -169,11 +174,42 @@ class Workbench:
         name, q = self._undo.pop()
         self.arms[name].q, self._gesture = q, ("", -math.inf)
 
+    def follow(self, run: ProgramRun) -> None:
+        """Show what a run shows: its arms, parts and frames."""
+        for name, arm in self.arms.items():
+            arm.q = run.configuration(name)
+        self._tree, parts = run.tree(), run.parts()
+        widths = {name: arm.gripper_or_usual.opening for name, arm in self.cell.arms.items()}
+        openings = {name: run.opening(name) * width for name, width in widths.items()}
+        key = tuple((carrier, X.tobytes()) for carrier, X in parts.values()), tuple(openings.values())
+        if key != self._followed:
+            self._followed, self._checks = key, None
+            self._parts = PartPoses.arranged(self.cell, parts, openings)
+
+    def reset(self) -> None:
+        """Put arms, parts and frames to where they are at the start of the cell."""
+        for arm in self.arms.values():
+            arm.q = np.array(arm.placed.start)
+        self._parts, self._tree, self._checks, self._followed = PartPoses(self.cell), self.cell.tree(), None, None
+
+    def cell_as_shown(self) -> Cell:
+        """Return the cell with arms and parts where they are shown."""
+        hands = {name: arm.tool for name, arm in self.arms.items()}
+        arms = {name: attrs.evolve(it, start=self.arms[name].q) for name, it in self.cell.arms.items()}
+        parts = {
+            name: attrs.evolve(it, pose=self._parts.in_world(name, hands)) for name, it in self.cell.parts.items()
+        }
+        return attrs.evolve(self.cell, arms=arms, parts=parts)
+
+    def take_frames(self, cell: Cell) -> None:
+        """Take the frames of a cell that differs in nothing else."""
+        self.cell, self._tree = cell, cell.tree()
+
     # ---- what is shown -------------------------------------------------------------------------------------------
 
     def frame_poses(self) -> dict[str, Array]:
         """Return the poses (4, 4) of the frames of the cell in the world, by name."""
-        tree, hidden = self.cell.tree(), {"WORLD", *self.arms, *map(base_name, self.arms)}
+        tree, hidden = self._tree, {"WORLD", *self.arms, *map(base_name, self.arms)}
         for name, arm in self.arms.items():
             tree = tree.set_pose(name, arm.tool)
         return {name: tree.world(name) for name in tree if name not in hidden and tree.has_value(name)}

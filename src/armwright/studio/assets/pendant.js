@@ -70,16 +70,21 @@ function sliderRow(joint, j) {
   );
 }
 
-function fillPendant() {
-  byId("sliders").replaceChildren(...chosenArm().joints.map(sliderRow));
+// The frames along whose axes the tool can be moved.
+function fillFrames() {
   const frames = byId("jog-frame");
-  const before = frames.value || "TOOL";
+  const names = ["TOOL", "BASE", "WORLD", ...data.animation.frames.map(({ name }) => name)];
+  const before = names.includes(frames.value) ? frames.value : "TOOL";
   frames.replaceChildren(
-    ...["TOOL", "BASE", "WORLD", ...data.animation.frames.map(({ name }) => name)].map((name) =>
-      make("option", { value: name, textContent: ["TOOL", "BASE", "WORLD"].includes(name) ? name.toLowerCase() : name }),
-    ),
+    ...names.map((name, i) => make("option", { value: name, textContent: i < 3 ? name.toLowerCase() : name })),
   );
   frames.value = before;
+}
+
+function fillPendant() {
+  byId("sliders").replaceChildren(...chosenArm().joints.map(sliderRow));
+  fillFrames();
+  const frames = byId("jog-frame");
   const names = ["x", "y", "z", "about x", "about y", "about z"];
   byId("jog").replaceChildren(
     ...[1, -1].flatMap((sign) =>

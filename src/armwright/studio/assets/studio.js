@@ -71,7 +71,8 @@ function showLink(state) {
   button.hidden = !state || live.lost || (state.control.mine && !state.control.asked);
   button.textContent = state?.control.mine ? "Hand over" : state?.control.asking ? "Asked" : "Ask for control";
   button.disabled = Boolean(state?.control.asking);
-  for (const control of document.querySelectorAll("#side input, #side .hold, #open, #close")) control.disabled = !mine();
+  for (const control of document.querySelectorAll("#panel-move input, .hold, #open, #close, #panel-teach button, #panel-teach input"))
+    control.disabled = !mine();
 }
 
 function takeArm(i) {
@@ -99,6 +100,9 @@ function start() {
   startGizmo();
   startView();
   startPendant();
+  startTeaching();
+  startEditor();
+  startRunning();
   if (data.arms.length > 1)
     byId("arms").append(
       ...data.arms.map(({ name }, i) => {
@@ -116,6 +120,9 @@ function start() {
       applyState(state);
       showWarnings(state);
       showPendant(state);
+      showTeaching(state);
+      showEditor(state);
+      showRun(state);
     }
     showLink(state);
     drawSoon();

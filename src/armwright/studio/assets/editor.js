@@ -1,0 +1,153 @@
+// The editor: a text field over its coloured text, with breakpoints, problems, and the lines that run.
+
+const TYPED = 120; // a text is sent so long after the last key [ms]
+const editor = { version: 0, timer: null, lines: 0, problems: [], running: "" };
+const WORDS = new Map(Object.entries(data.words).flatMap(([kind, words]) => words.map((word) => [word, kind])));
+const TOKEN = /(\{[^}]*\}?|\/\/[^\n]*)|("[^"\n]*"?)|(ARM[-_]\d+)|([A-Za-z_]\w*)|(\d+(?:\.\d+)?(?:E[+-]?\d+)?)/gi;
+
+function colouredText(text) {
+  const pieces = [];
+  let last = 0;
+  for (const match of text.matchAll(TOKEN)) {
+    const [token, comment, string, arm, word] = match;
+    const kind = comment ? "comment" : string ? "string" : arm ? "arm" : word ? WORDS.get(word.toUpperCase()) : "number";
+    pieces.push({ from: last, to: match.index, kind: "" }, { from: match.index, to: match.index + token.length, kind: kind ?? "" });
+    last = match.index + token.length;
+  }
+  pieces.push({ from: last, to: text.length, kind: "" });
+  return pieces;
+}
+
+// The pieces again, cut where a problem begins and ends.
+function withProblems(pieces) {
+  const cuts = editor.problems.flatMap(({ start, end }) => [start, Math.max(end, start + 1)]);
+  return pieces.flatMap((piece) => {
+    const inside = [...new Set(cuts.filter((cut) => cut > piece.from && cut < piece.to))].sort((a, b) => a - b);
+    const edges = [piece.from, ...inside, piece.to];
+    return edges.slice(1).map((to, i) => {
+      const problem = editor.problems.find(({ start, end }) => edges[i] >= start && edges[i] < Math.max(end, start + 1));
+      return { from: edges[i], to, kind: piece.kind, problem };
+    });
+  });
+}
+
+function paintText() {
+  const text = byId("text").value;
+  const pieces = withProblems(colouredText(text)).filter(({ from, to }) => to > from);
+  byId("colours").replaceChildren(
+    ...pieces.map(({ from, to, kind, problem }) => {
+      const part = text.slice(from, to);
+      return kind || problem ? make("span", { className: `${kind} ${problem ? `wavy ${problem.severity}` : ""}`, textContent: part }) : part;
+    }),
+    "\n",
+  );
+  const lines = text.split("\n").length;
+  if (lines !== editor.lines) fillGutter(lines);
+}
+
+function fillGutter(lines) {
+  editor.lines = lines;
+  const gutter = byId("gutter");
+  while (gutter.children.length > lines) gutter.lastChild.remove();
+  while (gutter.children.length < lines) {
+    const line = gutter.children.length + 1;
+    const button = make("button", { type: "button", textContent: line, ariaLabel: `Breakpoint in line ${line}`, tabIndex: -1 });
+    button.ariaPressed = "false";
+    button.addEventListener("click", () => send({ do: "break", line, on: button.ariaPressed !== "true" }));
+    gutter.append(button);
+  }
+}
+
+function sendText() {
+  clearTimeout(editor.timer);
+  editor.timer = null;
+  send({ do: "text", text: byId("text").value, version: editor.version }, "text");
+  editor.version++;
+}
+
+function showEditor(state) {
+  const { program, run } = state;
+  if (program.source !== undefined && (program.version !== editor.version || !editor.timer)) {
+    const field = byId("text");
+    if (field.value !== program.source) {
+      const at = field.selectionStart;
+      field.value = program.source;
+      field.setSelectionRange(at, at);
+    }
+    editor.version = program.version;
+  }
+  if (program.version === editor.version && !editor.timer) editor.problems = program.diagnostics;
+  byId("program-name").textContent = program.name + (program.changed ? ", not saved" : "");
+  byId("save-program").disabled = !mine() || !program.changed;
+  byId("text").readOnly = Boolean(run) || !mine();
+  const breakpoints = new Set(program.breakpoints);
+  const key = JSON.stringify([program.version, program.diagnostics, byId("text").value.length]);
+  if (key !== editor.key) {
+    editor.key = key;
+    paintText();
+    showProblems(program.diagnostics);
+  }
+  const running = new Map((run?.lines ?? []).map((it) => [it.line, it]));
+  [...byId("gutter").children].forEach((button, i) => {
+    button.ariaPressed = String(breakpoints.has(i + 1));
+    const it = running.get(i + 1);
+    button.classList.toggle("now", Boolean(it));
+    button.style.setProperty("--hue", it ? armColour(Math.max(0, data.arms.findIndex(({ name }) => name === it.arm))) : "");
+    button.title = it ? it.process : "";
+  });
+}
+
+function showProblems(diagnostics) {
+  byId("problems").replaceChildren(
+    ...diagnostics.map((it) => {
+      const go = make("button", { type: "button", className: it.severity }, make("b", { textContent: `${it.code} line ${it.line}` }), ` ${it.text}`, ...it.helps.map((help) => make("small", { textContent: help })));
+      go.addEventListener("click", () => {
+        byId("text").focus();
+        byId("text").setSelectionRange(it.start, it.end);
+      });
+      const item = make("li", {}, go);
+      if (it.fixes.length) {
+        const fix = make("button", { type: "button", textContent: "Fix" });
+        fix.addEventListener("click", () => applyFixes(it.fixes));
+        item.append(fix);
+      }
+      return item;
+    }),
+  );
+}
+
+function applyFixes(fixes) {
+  let text = byId("text").value;
+  for (const fix of [...fixes].sort((a, b) => b.start - a.start)) text = text.slice(0, fix.start) + fix.text + text.slice(fix.end);
+  byId("text").value = text;
+  sendText();
+  paintText();
+}
+
+function startEditor() {
+  const field = byId("text");
+  field.addEventListener("input", () => {
+    editor.problems = [];
+    paintText();
+    clearTimeout(editor.timer);
+    editor.timer = setTimeout(sendText, TYPED);
+  });
+  field.addEventListener("keydown", (event) => {
+    if (event.key === "Tab" && !event.shiftKey && !field.readOnly) {
+      event.preventDefault();
+      field.setRangeText("  ", field.selectionStart, field.selectionEnd, "end");
+      field.dispatchEvent(new Event("input"));
+    }
+    if (event.key === "Escape") byId("run").focus();
+  });
+  const follow = () => {
+    byId("colours").scrollTop = byId("gutter").scrollTop = field.scrollTop;
+    byId("colours").scrollLeft = field.scrollLeft;
+  };
+  field.addEventListener("scroll", follow);
+  byId("save-program").addEventListener("click", () => {
+    if (editor.timer) sendText();
+    send({ do: "save", what: "program" });
+  });
+  paintText();
+}

@@ -1,0 +1,80 @@
+// Running: the buttons of a run, its time, its trace.
+
+function runMessage(extra = {}) {
+  if (editor.timer) sendText();
+  return { do: "run", physics: byId("physics").checked, ...extra };
+}
+
+function startRun() {
+  send(live.state.run ? { do: "go", way: "continue" } : runMessage());
+}
+
+function step(way) {
+  send(live.state.run ? { do: "go", way } : runMessage({ entry: true }));
+}
+
+function showRun(state) {
+  const { run, program } = state;
+  const off = !mine();
+  byId("run").textContent = run ? "Go on" : "Run";
+  byId("run").disabled = off || (run ? run.ended || run.playing : !program.runs);
+  byId("pause").disabled = off || !run?.playing;
+  byId("step").disabled = off || Boolean(run?.ended) || (!run && !program.runs);
+  byId("back").disabled = off || !run;
+  byId("stop").disabled = off || !run;
+  byId("physics").disabled = off || Boolean(run);
+  const texts = { end: "ended", failed: "failed", breakpoint: "stands at a breakpoint", entry: "stands at its beginning", step: "stands", start: "stands at its beginning", exception: "stands at an error", pause: "stands" };
+  const what = run && (run.playing ? "runs" : (texts[run.reason] ?? "stands"));
+  byId("run-text").textContent = run ? `${number(run.time, 2)} s, ${what}${run.text ? `: ${run.text}` : ""}` : "";
+  byId("run-text").classList.toggle("bad", Boolean(run?.text));
+  showTrace(run?.trace ?? null);
+}
+
+function showTrace(trace) {
+  if (!trace) return;
+  const list = byId("trace");
+  const key = `${trace.length} ${trace.at(-1)?.t}`;
+  if (list.dataset.key === key) return;
+  list.dataset.key = key;
+  list.replaceChildren(
+    ...trace.map(({ t, line, text }) => make("li", {}, make("time", { textContent: `${number(t, 2)} s` }), make("span", { className: "quiet", textContent: `line ${line}` }), make("span", { textContent: text }))),
+  );
+  list.lastChild?.scrollIntoView({ block: "nearest" });
+}
+
+function startRunning() {
+  byId("run").addEventListener("click", startRun);
+  byId("pause").addEventListener("click", () => send({ do: "pause" }));
+  byId("step").addEventListener("click", () => step("next"));
+  byId("back").addEventListener("click", () => send({ do: "go", way: "back" }));
+  byId("stop").addEventListener("click", () => send({ do: "stop" }));
+  byId("pace").addEventListener("change", (event) => {
+    if (live.state.run) send({ do: "pace", rate: Number(event.target.value) });
+  });
+  document.addEventListener("keydown", (event) => {
+    const typing = event.target.matches("textarea, input[type=text], input[type=number]");
+    const keys = { F5: () => (event.shiftKey ? send({ do: "stop" }) : startRun()), F10: () => (event.shiftKey ? send({ do: "go", way: "back" }) : step("next")) };
+    if (event.key === " " && !typing && !event.target.matches("button, select, input") && live.state?.run?.playing) keys[" "] = () => send({ do: "pause" });
+    if (!keys[event.key] || !mine()) return;
+    event.preventDefault();
+    keys[event.key]();
+  });
+  const tabs = [...document.querySelectorAll("[role=tab]")];
+  const choose = (tab) => {
+    for (const one of tabs) {
+      one.ariaSelected = String(one === tab);
+      one.tabIndex = one === tab ? 0 : -1;
+      byId(one.getAttribute("aria-controls")).hidden = one !== tab;
+    }
+  };
+  tabs.forEach((tab, i) => {
+    tab.addEventListener("click", () => choose(tab));
+    tab.addEventListener("keydown", (event) => {
+      const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!way) return;
+      const next = tabs[(i + way + tabs.length) % tabs.length];
+      choose(next);
+      next.focus();
+    });
+  });
+}
