@@ -13,6 +13,7 @@ COMMANDS = {
     "check": "Check RLO programs without running them.",
     "explain": "Explain the code of a diagnostic: what it means, what to do, a wrong program and a correct one.",
     "repl": "Enter RLO interactively: each statement is executed in a simulated cell, and can be undone.",
+    "studio": "Move arms by hand, teach frames, write and run programs, in a browser.",
     "debug": "Run an RLO program step by step, forwards and backwards.",
     "fmt": "Format RLO programs: one statement per line, indented, keywords in upper case, comments preserved.",
     "fix": "Correct the mistakes in RLO programs that have a certain correction, such as a missing `;` or `=`.",

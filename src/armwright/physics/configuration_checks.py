@@ -83,18 +83,18 @@ class ConfigurationChecks:
             return None
         poses = self._poses_at(configurations)
         bounds = self._least_distances(poses)[0]
-        found, least = None, within
-        placed: set[int] = set()
+        found: tuple[int, int] | None = None
+        least, placed = within, set[int]()
         for k in np.argsort(bounds).tolist():
             if bounds[k] >= least:
                 break
-            pair = self._pairs[k].tolist()
-            for body in {*pair} - placed:
+            a, b = self._pairs[k].tolist()
+            for body in {a, b} - placed:
                 self._checker.distances.place(body, poses[0, body])
                 placed.add(body)
-            distance = self._checker.distances.between(*pair, max(least, TOLERANCE))
+            distance = self._checker.distances.between(a, b, max(least, TOLERANCE))
             if distance < least:
-                least, found = distance, pair
+                least, found = distance, (a, b)
         if found is None:
             return None
         one, other = (self._checker.bodies[number].name for number in found)

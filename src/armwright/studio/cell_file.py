@@ -11,7 +11,6 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
-from armwright.cell.model import Cell
 from armwright.cell.reader import parse_cell, read_cell
 from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.extras import import_extra
@@ -121,8 +120,8 @@ class CellFile:
 
     def difference(self) -> str:
         """Return what saving would change in the file, as a unified diff; empty where it is nothing."""
-        lines = (text.splitlines(keepends=True) for text in (self._saved, self.text))
-        return "".join(difflib.unified_diff(*lines, fromfile=self.path.name, tofile=f"{self.path.name}, taught"))
+        before, after = (text.splitlines(keepends=True) for text in (self._saved, self.text))
+        return "".join(difflib.unified_diff(before, after, self.path.name, f"{self.path.name}, taught"))
 
     def save(self) -> None:
         """Write the text to the file.

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, Flags
 from armwright.cell.model import CellArm
 from armwright.compiled.arm import CompiledArm, planning_arm
 from armwright.errors import ArmwrightError
@@ -61,7 +61,7 @@ class Solution(NamedTuple):
     here: bool
 
 
-class Warning(NamedTuple):  # noqa: A001 - what it is called on the page
+class Remark(NamedTuple):
     """What is to be said of a configuration.
 
     Attributes:
@@ -160,7 +160,7 @@ class LiveArm:
         return np.where(better, q + turn, q)
 
     @cached_property
-    def _revolute(self) -> Array:
+    def _revolute(self) -> Flags:
         return np.array([joint.revolute for joint in self.placed.arm.joints])
 
     def _is_met(self, X: Array, goal: Array) -> Array:
@@ -223,12 +223,10 @@ class LiveArm:
 
     # ---- what is wrong -------------------------------------------------------------------------------------------
 
-    def warnings(self) -> list[Warning]:
+    def remarks(self) -> list[Remark]:
         """Return what is to be said of the present configuration: joints near their limits, singular directions."""
-        found = []
         near = (self.q - self.lower < self._near) | (self.upper - self.q < self._near)
-        for i in np.flatnonzero(near).tolist():
-            found.append(Warning("limit", "warning", self._limit_text(i), (i + 1,)))
+        found = [Remark("limit", "warning", self._limit_text(i), (i + 1,)) for i in np.flatnonzero(near).tolist()]
         U, sigma, Vt = np.linalg.svd(scaled_rows(self._jacobian(self.q), 1.0))
         if sigma[-1] < _SMALL * sigma[0]:
             found.append(self._singular(float(sigma[-1] / sigma[0]), U[:, len(sigma) - 1], Vt[len(sigma) - 1]))
@@ -240,7 +238,7 @@ class LiveArm:
         amount = f"{math.degrees(left):.1f}°" if joint.revolute else f"{left * 1e3:.1f} mm"
         return f"joint {i + 1} is {amount} from its limit" if left > 0 else f"joint {i + 1} is at its limit"
 
-    def _singular(self, ratio: float, lost: Array, idle: Array) -> Warning:
+    def _singular(self, ratio: float, lost: Array, idle: Array) -> Remark:
         """Return what is said near a singularity.
 
         Args:
@@ -254,7 +252,7 @@ class LiveArm:
         near = "at" if ratio < _AT_SINGULARITY else "near"
         joints = tuple(i + 1 for i in np.flatnonzero(np.abs(idle) > _PART_OF_IDLE).tolist())
         text = f"{near} a singularity{cause}: the tool {_direction_text(lost)}"
-        return Warning("singular", "error" if near == "at" else "warning", text, joints)
+        return Remark("singular", "error" if near == "at" else "warning", text, joints)
 
 
 def _direction_text(twist: Array) -> str:

@@ -64,7 +64,8 @@ def _shown_first(workbench: Workbench) -> dict[str, Any]:
     animation = Animation(
         fps=60.0, t=now, arms=figures, frames=frames, fixtures=fixtures, parts=parts, shapes=shapes.as_data()
     )
-    still = {name: (now, arm.q[None], *[np.zeros_like(arm.q)[None]] * 3) for name, arm in workbench.arms.items()}
+    rest = {name: np.zeros((1, len(arm.q))) for name, arm in workbench.arms.items()}
+    still = {name: (now, arm.q[None], rest[name], rest[name], rest[name]) for name, arm in workbench.arms.items()}
     return {
         "duration": 0,
         "stages": [],

@@ -132,6 +132,10 @@ class ProgramRun:
         i = bisect_right(trees, self.time + 1e-9, key=lambda entry: entry[0]) - 1
         return trees[max(i, 0)][1]
 
+    def spelled(self, frame: str) -> str:
+        """Return a frame as the program spells it."""
+        return self.debugger.code.spelled(frame)
+
     def parts(self) -> dict[str, tuple[str | None, Array]]:
         """Return for each part the arm that holds it, and its pose on that hand or in the world."""
         tracks: dict[str, PartTrack] = {

@@ -85,6 +85,17 @@ class ProgramText:
 
     # ---- teaching ------------------------------------------------------------------------------------------------
 
+    def require_statements(self) -> None:
+        """Begin an empty program, and refuse one whose statements are not known.
+
+        Raises:
+            ProgramTextError: it has errors of syntax.
+        """
+        if not self.text.strip():
+            self.replace("BEGIN\nEND.\n")
+        if any(it.code.startswith("E1") for it in self.compiled.diagnostics):
+            raise ProgramTextError("the program has errors of syntax; correct them before a MOVE is inserted")
+
     def insert_move(self, line: int, arm: str, frame: str, *, straight: bool, speed: float) -> None:
         """Insert a MOVE behind a line.
 
@@ -98,11 +109,11 @@ class ProgramText:
         Raises:
             ProgramTextError: the program has errors of syntax, so that its statements are not known.
         """
-        if not self.text.strip():
-            self.replace("BEGIN\nEND.\n")
-        if any(it.code.startswith("E1") for it in self.compiled.diagnostics):
-            raise ProgramTextError("the program has errors of syntax; correct them before a MOVE is inserted")
-        clauses = [*(["STRAIGHTLY"] if straight else []), *([f"WITH SPEED = {speed:g}"] if speed != _NORMAL_SPEED else [])]
+        self.require_statements()
+        clauses = [
+            *(["STRAIGHTLY"] if straight else []),
+            *([f"WITH SPEED = {speed:g}"] if speed != _NORMAL_SPEED else []),
+        ]
         offset, indent = self._place_behind(line)
         statement = f"{indent}MOVE {' '.join([arm, 'TO', frame, ', '.join(clauses)]).rstrip()} ;\n"
         self.replace(self.text[:offset] + statement + self.text[offset:])
@@ -142,7 +153,9 @@ class ProgramText:
         """
         moved = self._move_in(line).moved
         if not isinstance(moved, ArmName):
-            raise ProgramTextError(f"the MOVE in line {line} moves what an arm holds; touch up its frame by teaching it")
+            raise ProgramTextError(
+                f"the MOVE in line {line} moves what an arm holds; touch up its frame by teaching it"
+            )
         return moved.key
 
     def _move_in(self, line: int) -> Move:

@@ -17,9 +17,9 @@ from urllib.parse import parse_qs, urlsplit
 import attrs
 
 from armwright.extras import import_extra
-from armwright.studio.commands import Studio
 from armwright.studio.messages import MAX_MESSAGE
 from armwright.studio.page import studio_page
+from armwright.studio.studio import Studio
 
 HOST = "127.0.0.1"
 # Bytes of the secret in the address.
@@ -28,11 +28,13 @@ _TOKEN_BYTES = 24
 _PATIENCE = 1.0
 # Jogging goes on in steps of this [s].
 _TICK = 1 / 60
+# After a longer pause of the machine it does not leap [s].
+_LONGEST_TICK = 0.1
 # Pages at once at most.
 _MOST_PAGES = 8
 _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:; "
-    "media-src blob:; connect-src {origin} {socket}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    "media-src blob:; connect-src {origin} {socket}; base-uri 'none'; form-action 'none'"
 )
 
 
@@ -80,37 +82,46 @@ class Server:
         from websockets.datastructures import Headers  # noqa: PLC0415 - of the extra
         from websockets.http11 import Response  # noqa: PLC0415
 
-        def refused(status: http.HTTPStatus, text: str) -> Any:
+        refusal = self._refusal(request)
+        if refusal is not None:
+            status, text = refusal
             return connection.respond(status, text + "\n")
-
-        hosts = {f"{HOST}:{self._port}", f"localhost:{self._port}"}
-        if request.headers.get_all("Host") not in [[host] for host in hosts]:
-            return refused(http.HTTPStatus.MISDIRECTED_REQUEST, "this server answers under its own address only")
-        url = urlsplit(request.path)
-        if url.path == "/live":
-            if request.headers.get("Origin") not in {f"http://{host}" for host in hosts}:
-                return refused(http.HTTPStatus.FORBIDDEN, "only the page of this server may connect")
-            offered = request.headers.get("Sec-WebSocket-Protocol", "").split(",")
-            if not any(self._knows(name.strip().removeprefix("armwright.")) for name in offered):
-                return refused(http.HTTPStatus.FORBIDDEN, "the token is not that of this server")
+        if urlsplit(request.path).path == "/live":
             return None
-        if url.path != "/":
-            return refused(http.HTTPStatus.NOT_FOUND, "there is nothing here")
-        if not self._knows(parse_qs(url.query).get("token", [""])[0]):
-            return refused(http.HTTPStatus.FORBIDDEN, "open the address that armwright printed")
         host = request.headers["Host"]
         policy = _POLICY.format(origin=f"http://{host}", socket=f"ws://{host}")
         body = studio_page(self.studio.workbench, self._token, policy).encode()
-        headers = Headers({
-            "Content-Type": "text/html; charset=utf-8",
-            "Content-Length": str(len(body)),
-            "Content-Security-Policy": policy,
-            "Cache-Control": "no-store",
-            "Referrer-Policy": "no-referrer",
-            "X-Content-Type-Options": "nosniff",
-            "X-Frame-Options": "DENY",
-        })
+        headers = Headers(
+            {
+                "Content-Type": "text/html; charset=utf-8",
+                "Content-Length": str(len(body)),
+                "Content-Security-Policy": policy + "; frame-ancestors 'none'",
+                "Cache-Control": "no-store",
+                "Referrer-Policy": "no-referrer",
+                "X-Content-Type-Options": "nosniff",
+                "X-Frame-Options": "DENY",
+            }
+        )
         return Response(http.HTTPStatus.OK, "OK", headers, body)
+
+    def _refusal(self, request: Any) -> tuple[http.HTTPStatus, str] | None:
+        """Return why a request is refused; None where it is not."""
+        hosts = {f"{HOST}:{self._port}", f"localhost:{self._port}"}
+        url, headers = urlsplit(request.path), request.headers
+        # A page of another name that leads here would be of another origin, and yet read the answer.
+        if headers.get_all("Host") not in [[host] for host in hosts]:
+            return http.HTTPStatus.MISDIRECTED_REQUEST, "this server answers under its own address only"
+        if url.path == "/live":
+            offered = headers.get("Sec-WebSocket-Protocol", "").split(",")
+            if headers.get("Origin") not in {f"http://{host}" for host in hosts}:
+                return http.HTTPStatus.FORBIDDEN, "only the page of this server may connect"
+            if not any(self._knows(name.strip().removeprefix("armwright.")) for name in offered):
+                return http.HTTPStatus.FORBIDDEN, "the token is not that of this server"
+        elif url.path != "/":
+            return http.HTTPStatus.NOT_FOUND, "there is nothing here"
+        elif not self._knows(parse_qs(url.query).get("token", [""])[0]):
+            return http.HTTPStatus.FORBIDDEN, "open the address that armwright printed"
+        return None
 
     def _knows(self, token: str) -> bool:
         return secrets.compare_digest(token.encode(), self._token.encode())
@@ -168,10 +179,13 @@ class Server:
 
     async def _tick(self) -> None:
         """Let what moves by itself go on."""
+        before = time.monotonic()
         while True:
             await asyncio.sleep(_TICK)
-            if self.studio.tick(time.monotonic(), _TICK):
+            now = time.monotonic()
+            if self.studio.tick(now, min(now - before, _LONGEST_TICK)):
                 self._changed()
+            before = now
 
     # ---- running -------------------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -17,8 +18,8 @@ from armwright.physics.collisions import CellCollisions
 from armwright.physics.configuration_checks import ConfigurationChecks, NearBodies
 from armwright.spatial.poses import from_noap, homogeneous, to_noap
 from armwright.spatial.rotations import rotation_from_vector
+from armwright.studio.live_arm import LiveArm, Remark, Solution, UnreachableError
 from armwright.studio.program_run import ProgramRun
-from armwright.studio.live_arm import LiveArm, Solution, UnreachableError, Warning
 
 # Full speed of jogging: of angles [rad/s], of lengths [m/s].
 _TURNING, _SLIDING = math.radians(45.0), 0.25
@@ -46,6 +47,8 @@ class Workbench:
         self.ready = False
         self._parts = PartPoses(cell)
         self._tree = cell.tree()
+        # How the program that is shown spells a frame.
+        self._spelled: Callable[[str], str] = str
         self._checks: ConfigurationChecks | None = None
         # What was shown last of a run: parts and openings.
         self._followed: object = None
@@ -119,11 +122,11 @@ class Workbench:
                 raise UnreachableError(f"joint {axis + 1} is at its limit")
             self.set_joint(name, axis + 1, float(value), now)
             return
-        if not 0 <= axis < 6:  # noqa: PLR2004 - axes and rotations
+        if not 0 <= axis < 6:
             raise UnreachableError(f"axes are numbered from 0 to 5, got {axis}")
         X, along = arm.tool, self._axes(arm, frame)[:, axis % 3]
         self._changing(arm, f"jog {frame} {axis}", now)
-        if axis < 3:  # noqa: PLR2004 - the axes
+        if axis < 3:
             X = homogeneous(X[:3, :3], X[:3, 3] + step * _SLIDING * along)
         else:
             X = homogeneous(rotation_from_vector(step * _TURNING * along) @ X[:3, :3], X[:3, 3])
@@ -141,6 +144,15 @@ class Workbench:
         if frame not in poses:
             raise UnknownNameError("frame", frame, ["BASE", "TOOL", "WORLD", *poses])
         return poses[frame][:3, :3]
+
+    def go_to(self, name: str, frame: str, now: float) -> None:
+        """Bring the tool of an arm to a frame."""
+        poses = self.frame_poses()
+        if frame not in poses:
+            raise UnknownNameError("frame", frame, poses)
+        arm = self.arm(name)
+        self._changing(arm, f"go to {frame}", now)
+        arm.move_tool(poses[frame], leaping=True)
 
     def take_solution(self, name: str, number: int, now: float) -> None:
         """Take another configuration that brings the tool to where it is, by its number, from 0."""
@@ -178,7 +190,7 @@ class Workbench:
         """Show what a run shows: its arms, parts and frames."""
         for name, arm in self.arms.items():
             arm.q = run.configuration(name)
-        self._tree, parts = run.tree(), run.parts()
+        self._tree, self._spelled, parts = run.tree(), run.spelled, run.parts()
         widths = {name: arm.gripper_or_usual.opening for name, arm in self.cell.arms.items()}
         openings = {name: run.opening(name) * width for name, width in widths.items()}
         key = tuple((carrier, X.tobytes()) for carrier, X in parts.values()), tuple(openings.values())
@@ -190,20 +202,19 @@ class Workbench:
         """Put arms, parts and frames to where they are at the start of the cell."""
         for arm in self.arms.values():
             arm.q = np.array(arm.placed.start)
-        self._parts, self._tree, self._checks, self._followed = PartPoses(self.cell), self.cell.tree(), None, None
+        self._parts, self._tree, self._spelled = PartPoses(self.cell), self.cell.tree(), str
+        self._checks = self._followed = None
 
     def cell_as_shown(self) -> Cell:
         """Return the cell with arms and parts where they are shown."""
         hands = {name: arm.tool for name, arm in self.arms.items()}
         arms = {name: attrs.evolve(it, start=self.arms[name].q) for name, it in self.cell.arms.items()}
-        parts = {
-            name: attrs.evolve(it, pose=self._parts.in_world(name, hands)) for name, it in self.cell.parts.items()
-        }
+        parts = {name: attrs.evolve(it, pose=self._parts.in_world(name, hands)) for name, it in self.cell.parts.items()}
         return attrs.evolve(self.cell, arms=arms, parts=parts)
 
     def take_frames(self, cell: Cell) -> None:
         """Take the frames of a cell that differs in nothing else."""
-        self.cell, self._tree = cell, cell.tree()
+        self.cell, self._tree, self._spelled = cell, cell.tree(), str
 
     # ---- what is shown -------------------------------------------------------------------------------------------
 
@@ -212,7 +223,7 @@ class Workbench:
         tree, hidden = self._tree, {"WORLD", *self.arms, *map(base_name, self.arms)}
         for name, arm in self.arms.items():
             tree = tree.set_pose(name, arm.tool)
-        return {name: tree.world(name) for name in tree if name not in hidden and tree.has_value(name)}
+        return {self._spelled(name): tree.world(name) for name in tree if name not in hidden and tree.has_value(name)}
 
     @cached_property
     def _collisions(self) -> CellCollisions:
@@ -245,7 +256,7 @@ class Workbench:
         if self.ready:
             state["tool"] = _rounded(to_noap(arm.tool))
             state["solutions"] = [_solution_state(it) for it in arm.solutions()]
-            state["warnings"] = [_warning_state(it) for it in arm.warnings()]
+            state["warnings"] = [_remark_state(it) for it in arm.remarks()]
         return state
 
     def _part_state(self, name: str) -> dict[str, Any]:
@@ -260,7 +271,7 @@ def _solution_state(it: Solution) -> dict[str, Any]:
     return {"label": it.label, "fault": it.fault, "here": it.here}
 
 
-def _warning_state(it: Warning) -> dict[str, Any]:
+def _remark_state(it: Remark) -> dict[str, Any]:
     return {"kind": it.kind, "level": it.level, "text": it.text, "joints": list(it.joints)}
 
 

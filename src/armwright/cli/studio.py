@@ -1,0 +1,106 @@
+"""``armwright studio``: the workbench in a browser."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from typer import Argument, Option
+
+from armwright.cli.options import usage_error
+
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm
+    from armwright.arrays import Array
+    from armwright.cell.model import Cell
+    from armwright.studio.cell_file import CellFile
+
+_EMPTY = """name = "{name}"
+
+[arms.ARM_1]
+model = "{model}"
+joint_positions = [{start}]
+
+[frames]
+"""
+
+
+def studio(
+    cell: Annotated[str, Argument(help="A cell file, or an arm of the catalogue.", show_default=False)] = "puma560",
+    program: Annotated[
+        Path | None, Argument(help="A program; it is made when it is saved.", show_default=False)
+    ] = None,
+    new: Annotated[Path | None, Option(help="Begin a cell file with the arm in it.", show_default=False)] = None,
+    port: Annotated[int, Option(min=0, max=65535, help="Port on the loopback interface; 0 for any.")] = 0,
+    open_browser: Annotated[bool, Option("--open", help="Open the address in a browser.")] = False,
+) -> None:
+    """Move arms by hand, teach frames, write and run programs, in a browser.
+
+    The command prints the address of the page, which only programs of this computer can reach and only those can use
+    who know the address. Ctrl-C ends it. Nothing but the cell file and the program is written, when that is asked for.
+
+    **Example:** `armwright studio examples/vision_cell.toml examples/stack_by_vision.rlo`
+    """
+    from armwright.studio.project import Project
+    from armwright.studio.server import serve
+    from armwright.studio.studio import Studio
+    from armwright.studio.workbench import Workbench
+
+    shown, file = _cell(cell, new)
+    try:
+        served = Studio(Project(Workbench(shown), file, program))
+        serve(served, lambda address: _announce(address, open_it=open_browser), port)
+    except OSError as error:
+        raise usage_error("--port", f"port {port} cannot be listened on: {error.strerror or error}") from error
+
+
+def _announce(address: str, *, open_it: bool) -> None:
+    typer.echo(address)
+    if open_it:
+        import webbrowser
+
+        webbrowser.open(address)
+
+
+def _cell(name: str, new: Path | None) -> "tuple[Cell, CellFile | None]":
+    """Return the cell to show, and the file that frames are taught into."""
+    from armwright.arm.load import is_path, load_arm
+    from armwright.cell.model import Cell, CellArm
+    from armwright.files.output import write_file
+    from armwright.studio.cell_file import CellFile
+
+    is_cell = is_path(name) and Path(name).suffix.lower() in {".toml", ".json"} and _has_arms(Path(name))
+    if is_cell and new is None:
+        file = CellFile(Path(name))
+        return file.cell, file
+    if is_cell:
+        raise usage_error("--new", f"expected an arm to begin a cell with, got the cell {name}")
+    arm = load_arm(name)
+    start = _bent(arm)
+    if new is None:
+        return Cell(name=arm.name, arms={"ARM_1": CellArm(arm=arm, start=start)}), None
+    if new.exists():
+        raise usage_error("--new", f"{new} exists already; open it by: armwright studio {new}")
+    numbers = ", ".join(f"{value:.6g}" for value in start)
+    write_file(new, _EMPTY.format(name=new.stem.replace("_", " "), model=name, start=numbers))
+    file = CellFile(new)
+    return file.cell, file
+
+
+def _bent(arm: "Arm") -> "Array":
+    """Return joint positions at which an arm is seen well: near the middle of its limits, but not stretched."""
+    import numpy as np
+
+    from armwright.kinematics.inverse_kinematics.revolutions import mid_range
+    from armwright.kinematics.manipulability_index import manipulability
+
+    middle, limits = mid_range(arm), arm.limits
+    span = np.minimum(np.where(np.isfinite(limits.upper - limits.lower), limits.upper - limits.lower, np.inf), 3.0)
+    tried = [middle, *(middle + span * np.random.default_rng(0).uniform(-0.35, 0.35, (60, arm.n)))]
+    return max(tried, key=lambda q: float(manipulability(arm, q)))
+
+
+def _has_arms(path: Path) -> bool:
+    """Whether a file is a cell file, and not that of an arm."""
+    from armwright.files.document import Document
+
+    return "arms" in Document.read(path).root

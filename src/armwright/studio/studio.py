@@ -1,0 +1,210 @@
+"""A studio: does what pages ask for, and tells them what to show."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from armwright.errors import ArmwrightError
+from armwright.studio import messages as m
+from armwright.studio.control import Control
+from armwright.studio.messages import MessageError, read_message
+from armwright.studio.project import Project
+
+# Jogging stops so long after the latest message that keeps it going [s].
+_JOG_TIMEOUT = 0.25
+# How fast a run can be shown, 1 being real time.
+_RATES = (0.05, 8.0)
+# What has to wait until a run has ended.
+_NOT_IN_A_RUN = (
+    m.SetJoint,
+    m.SetJoints,
+    m.MoveTool,
+    m.Jog,
+    m.TakeSolution,
+    m.Grip,
+    m.Undo,
+    m.GoTo,
+    m.SetText,
+    m.InsertMove,
+    m.TouchUp,
+    m.Run,
+    m.Reset,
+)
+
+
+class Studio:
+    """A workbench and a project, commanded by pages.
+
+    Attributes:
+        workbench: the arms.
+        project: the files.
+        control: which page commands.
+    """
+
+    def __init__(self, project: Project) -> None:
+        """Take a project that no page commands yet."""
+        self.project, self.workbench, self.control = project, project.workbench, Control()
+        # The version of the program that each page has, and why its latest command was not done.
+        self._versions: dict[int, int] = {}
+        self._refusals: dict[int, str] = {}
+        # What is being jogged, and until when.
+        self._jog: m.Jog | None = None
+        self._jog_until = -math.inf
+
+    def page_opened(self, page: int) -> None:
+        """Take note of a page."""
+        self.control.open(page)
+
+    def page_closed(self, page: int) -> None:
+        """Take note that a page is closed or lost: what it jogged stops."""
+        if page == self.control.page:
+            self._jog = None
+        self.control.close(page)
+        self._versions.pop(page, None)
+        self._refusals.pop(page, None)
+
+    def receive(self, text: str | bytes, page: int, now: float) -> bool:
+        """Do what a page asks for; return whether anything may have changed.
+
+        Args:
+            text: its message.
+            page: its number.
+            now: the time [s].
+        """
+        try:
+            command = read_message(text)
+            if isinstance(command, m.Got):
+                return False
+            self._check(command, page)
+            self._do_moving(command, page, now)
+            self._do_teaching(command)
+            self._do_running(command, page)
+            self._refusals.pop(page, None)
+        except ArmwrightError as error:
+            self._refusals[page] = str(error)
+        return True
+
+    def _check(self, command: m.Command, page: int) -> None:
+        if page != self.control.page and not isinstance(command, m.AskForControl):
+            raise MessageError("another page has control; ask for it")
+        if self.project.run is not None and isinstance(command, _NOT_IN_A_RUN):
+            raise MessageError("the program runs; stop it first")
+        if not self.workbench.ready:
+            raise MessageError("the equations of the arm are being compiled; a moment, please")
+
+    def _do_moving(self, command: m.Command, page: int, now: float) -> None:  # noqa: C901 - a line for each
+        bench = self.workbench
+        match command:
+            case m.SetJoint():
+                bench.set_joint(command.arm, command.joint, command.value, now)
+            case m.SetJoints():
+                bench.set_joints(command.arm, command.q, now)
+            case m.MoveTool():
+                bench.move_tool(command.arm, command.pose, now, leaping=command.leaping)
+            case m.GoTo():
+                bench.go_to(command.arm, command.frame, now)
+            case m.TakeSolution():
+                bench.take_solution(command.arm, command.number, now)
+            case m.Jog():
+                bench.arm(command.arm)
+                if not 0 < command.share <= 1:
+                    raise MessageError(f"jog.share: expected above 0 to 1, got {command.share:g}")
+                self._jog, self._jog_until = command, now + _JOG_TIMEOUT
+            case m.Halt():
+                self._jog = None
+            case m.Grip():
+                bench.grip(command.arm, open_it=command.open, now=now)
+            case m.Undo():
+                bench.undo()
+            case m.Reset():
+                bench.reset()
+            case m.AskForControl():
+                self.control.ask(page, now)
+            case m.AnswerRequest():
+                self._jog = None
+                self.control.answer(give=command.give)
+
+    def _do_teaching(self, command: m.Command) -> None:
+        project = self.project
+        match command:
+            case m.Teach():
+                project.teach(command.arm, command.name, command.on)
+            case m.Rename():
+                project.rename(command.name, command.to)
+            case m.Forget():
+                project.forget(command.name)
+            case m.Unteach():
+                project.take_back()
+            case m.Save():
+                project.save(command.what)
+            case m.InsertMove():
+                straight, speed = command.straight, command.speed
+                project.insert_move(command.arm, command.frame, command.line, straight=straight, speed=speed)
+            case m.TouchUp():
+                project.touch_up(command.line)
+
+    def _do_running(self, command: m.Command, page: int) -> None:
+        project = self.project
+        match command:
+            case m.SetText():
+                project.set_text(command.text, command.version)
+                # The page has it: it is not sent back.
+                self._versions[page] = project.program.version
+            case m.Break():
+                project.set_breakpoint(command.line, on=command.on)
+            case m.Run():
+                project.start(command.line, only=command.only, physics=command.physics, entry=command.entry)
+            case m.Go():
+                project.running().go(command.way)
+            case m.Pause():
+                project.running().pause()
+            case m.Stop():
+                project.stop()
+            case m.Pace():
+                least, most = _RATES
+                if not least <= command.rate <= most:
+                    raise MessageError(f"pace.rate: expected {least} to {most}, got {command.rate:g}")
+                project.running().rate = command.rate
+
+    def tick(self, now: float, seconds: float) -> bool:
+        """Let what moves by itself go on for a time [s]; return whether anything has changed."""
+        handed_over = self.control.tick(now)
+        if handed_over or now > self._jog_until:
+            self._jog = None
+        changed = self._tick_run(seconds) or handed_over
+        if self._jog is None:
+            return changed
+        jog = self._jog
+        try:
+            self.workbench.jog(jog.arm, jog.frame, jog.axis, jog.way * jog.share * seconds, now)
+        except ArmwrightError as error:
+            self._refuse(error)
+        return True
+
+    def _tick_run(self, seconds: float) -> bool:
+        try:
+            return self.project.tick(seconds)
+        except ArmwrightError as error:
+            self.project.run = None
+            self._refuse(error)
+            return True
+
+    def _refuse(self, error: ArmwrightError) -> None:
+        """Tell the page that commands why what it began does not go on."""
+        if self.control.page is not None:
+            self._refusals[self.control.page] = str(error)
+
+    def state(self, page: int) -> dict[str, Any]:
+        """Return what a page shows, as plain data; with the text of the program where it has another one."""
+        state = {
+            **self.workbench.state(),
+            **self.project.state(),
+            "refusal": self._refusals.get(page, ""),
+            "control": self.control.state(page),
+        }
+        program = self.project.program
+        if self._versions.get(page) != program.version:
+            self._versions[page] = program.version
+            state["program"]["source"] = program.text
+        return state
