@@ -13,13 +13,13 @@ from armwright.cell.model import CellArm
 from armwright.compiled.arm import CompiledArm, planning_arm
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.kinematics.inverse_kinematics.branches import BRANCHES
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.kinematics.inverse_kinematics.solve import label
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.manipulability_index import scaled_rows
-from armwright.kinematics.singularity_analysis import singularities
+from armwright.kinematics.singularity_analysis import determinant_factors, singularities
 from armwright.spatial.poses import inverse
 from armwright.spatial.rotations import rotation_vector
 
@@ -126,31 +126,30 @@ class LiveArm:
         """Return all configurations that bring the tool to where it is; of an arm without a closed form the present."""
         if self._geometry is None or self.equations is None:
             return [Solution(self.q, "numeric", "", here=True)]
-        rows, signs = self._branches(self.tool)
+        rows = self._branches(self.tool)
         here = int(np.abs(rows - self.q).max(axis=1).argmin()) if len(rows) else -1
         return [
             Solution(
                 q,
-                label(self._geometry, BRANCHES[sign], np.array(self._geometry.angles(q.tolist()))),
+                _label(self._geometry, q),
                 "; ".join(map(str, violations_of(self.placed.arm, q.tolist()))),
                 here=i == here,
             )
-            for i, (q, sign) in enumerate(zip(rows, signs, strict=True))
+            for i, q in enumerate(rows)
         ]
 
-    def _branches(self, X_WT: Array) -> tuple[Array, list[int]]:
-        """Return the configurations (k, n) that bring the tool to a pose, and the numbers of their branches."""
+    def _branches(self, X_WT: Array) -> Array:
+        """Return the configurations (k, n) that bring the tool to a pose."""
         assert self.equations is not None  # noqa: S101 - asked for only then
         X_BT = inverse(self.placed.base) @ X_WT
         q, _ = self.equations.inverse_branches(X_BT, self.q)
-        met = self._is_met(self.equations.forward(q), X_BT)
         rows: list[Array] = []
-        numbers: list[int] = []
-        for number in np.flatnonzero(met).tolist():
-            if not any(np.abs(q[number] - row).max() < _MET for row in rows):
-                rows.append(self._turned(q[number]))
-                numbers.append(number)
-        return np.array(rows).reshape(-1, self.placed.arm.n), numbers
+        for number in np.flatnonzero(self._is_met(self.equations.forward(q), X_BT)).tolist():
+            row = self._turned(q[number])
+            # A branch that a pose does not have repeats another.
+            if not any(np.abs(row - other).max() < _MET for other in rows):
+                rows.append(row)
+        return np.array(rows).reshape(-1, self.placed.arm.n)
 
     def _turned(self, q: Array) -> Array:
         """Return a configuration with every angle turned by whole revolutions into its limits, if that is possible."""
@@ -195,7 +194,7 @@ class LiveArm:
     def _nearest(self, X_WT: Array) -> Array:
         if self._geometry is None or self.equations is None:
             return self._numeric(X_WT)
-        rows, _ = self._branches(X_WT)
+        rows = self._branches(X_WT)
         if not len(rows):
             raise UnreachableError(f"out of reach of {self.name}")
         allowed = ((rows >= self.lower - 1e-9) & (rows <= self.upper + 1e-9)).all(axis=1)
@@ -253,6 +252,18 @@ class LiveArm:
         joints = tuple(i + 1 for i in np.flatnonzero(np.abs(idle) > _PART_OF_IDLE).tolist())
         text = f"{near} a singularity{cause}: the tool {_direction_text(lost)}"
         return Remark("singular", "error" if near == "at" else "warning", text, joints)
+
+
+def _label(geometry: ClosedFormGeometry, q: Array) -> str:
+    """Return the name of the branch that a configuration (n,) is in.
+
+    Branches meet where a factor of the determinant of the Jacobian vanishes: its signs tell them apart.
+    """
+    angles = geometry.angles(q.tolist())
+    side, second, flip = (1 if factor >= 0 else -1 for factor in determinant_factors(geometry, angles))
+    # The factor of an elbow falls where its angle grows.
+    signs = side, second if geometry.family == "stanford" else -second, flip
+    return label(geometry, signs, np.array(angles))
 
 
 def _direction_text(twist: Array) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
+from armwright.files.inputs import read_program
 from armwright.files.output import write_file
 from armwright.program.api import Compilation, compile as compile_program
 from armwright.program.flow_analysis.side_effects import walk_statements
@@ -75,12 +76,14 @@ class ProgramText:
         """Write it to its file.
 
         Raises:
-            ProgramTextError: it has no file.
+            ProgramTextError: it has no file, or somebody else has changed the file meanwhile.
             OutputError: the file cannot be written.
         """
         if self.path is None:
-            raise ProgramTextError("the program has no file yet; name one")
-        write_file(self.path, self.text)
+            raise ProgramTextError("the program has no file; name one on the command line")
+        if self.path.exists() and read_program(self.path) != self._saved:
+            raise ProgramTextError(f"{self.path.name} has been changed by another program; nothing is written over it")
+        write_file(self.path, self.text, back=True)
         self._saved = self.text
 
     # ---- teaching ------------------------------------------------------------------------------------------------
@@ -115,8 +118,23 @@ class ProgramText:
             *([f"WITH SPEED = {speed:g}"] if speed != _NORMAL_SPEED else []),
         ]
         offset, indent = self._place_behind(line)
+        declaration, place = self._declaration(frame)
         statement = f"{indent}MOVE {' '.join([arm, 'TO', frame, ', '.join(clauses)]).rstrip()} ;\n"
-        self.replace(self.text[:offset] + statement + self.text[offset:])
+        text = self.text[:offset] + statement + self.text[offset:]
+        # What is declared stands in front of all statements.
+        self.replace(text[:place] + declaration + text[place:])
+
+    def _declaration(self, frame: str) -> tuple[str, int]:
+        """Return what declares a frame, and where it is to be inserted; nothing where it is declared."""
+        program = self.compiled.tree
+        if frame.upper() in self.compiled.symbols.declared:
+            return "", 0
+        for declared in program.declarations:
+            if declared.type.key == "FRAME" and not declared.type.sizes:
+                return f", {frame}", declared.names[-1].span.end
+        behind = program.headers[-1].span.end if program.headers else 0
+        begin = next(token for token in self.compiled.tokens if token.key == "BEGIN" and token.start >= behind)
+        return f"VAR {frame} : FRAME ;\n", begin.start
 
     def _place_behind(self, line: int) -> tuple[int, str]:
         """Return where a statement can be inserted behind a line, and the blanks in front of it."""

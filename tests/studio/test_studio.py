@@ -1,0 +1,295 @@
+"""A studio without a browser: what its commands do, and which page may send them."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.cell.reader import read_cell
+from armwright.cell.simulator import Simulator
+from armwright.program.api import compile as compile_program
+from armwright.program.vm.interpreter import interpret
+from armwright.studio.cell_file import CellFile
+from armwright.studio.project import Project
+from armwright.studio.studio import Studio
+from armwright.studio.workbench import Workbench
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PROGRAM = "{ Two stops. }\nVAR low, high : FRAME ;\nBEGIN\n  MOVE ARM_1 TO LOW ;\n  MOVE ARM_1 TO HIGH ;\nEND.\n"
+
+
+class Pages:
+    """A studio with its pages, whose time the test lets go by."""
+
+    def __init__(self, folder: Path, program: str = PROGRAM, cell: str = "") -> None:
+        (folder / "bench.toml").write_text(cell or CELL)
+        (folder / "bench.rlo").write_text(program)
+        self.file = CellFile(folder / "bench.toml")
+        self.studio = Studio(Project(Workbench(self.file.cell), self.file, folder / "bench.rlo"))
+        self.studio.workbench.warm_up()
+        self.now = 0.0
+        self.studio.page_opened(1)
+
+    def send(self, word: str, page: int = 1, **fields: Any) -> str:
+        """Send a command; return why it was not done."""
+        self.studio.receive(json.dumps({"do": word, **fields}), page, self.now)
+        return self.studio._refusals.get(page, "")
+
+    def state(self, page: int = 1) -> dict[str, Any]:
+        return json.loads(json.dumps(self.studio.state(page), allow_nan=False))  # type: ignore[no-any-return]
+
+    def wait(self, seconds: float) -> None:
+        for _ in range(round(seconds * 60)):
+            self.now += 1 / 60
+            self.studio.tick(self.now, 1 / 60)
+
+    @property
+    def tool(self) -> np.ndarray:
+        return self.studio.workbench.arms["ARM_1"].tool
+
+
+CELL = """\
+[arms.ARM_1]
+model = "puma560"
+tool = [1, 0, 0,  0, 1, 0,  0, 0, 1,  0, 0, 0.12]
+hand = [1, 0, 0,  0,-1, 0,  0, 0,-1,  0.45, -0.15, 0.25]
+
+[frames]
+LOW = [1, 0, 0,  0,-1, 0,  0, 0,-1,  0.45, -0.1, 0.05]
+HIGH = [1, 0, 0,  0,-1, 0,  0, 0,-1,  0.45, 0.1, 0.3]
+"""
+
+
+@pytest.fixture
+def pages(tmp_path: Path) -> Pages:
+    return Pages(tmp_path)
+
+
+# ---- jogging ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("frame", "axis", "way"), [("WORLD", 2, 1), ("TOOL", 0, -1), ("BASE", 1, 1), ("LOW", 4, -1)])
+def test_jog(pages: Pages, frame: str, axis: int, way: int) -> None:
+    """A jog moves along one axis of its frame, at its speed, as long as it is kept going."""
+    before = pages.tool
+    for _ in range(5):
+        assert pages.send("jog", arm="ARM_1", frame=frame, axis=axis, way=way, share=0.2) == ""
+        pages.wait(0.1)
+    after = pages.tool
+    axes = {"WORLD": np.eye(3), "BASE": np.eye(3), "TOOL": before[:3, :3], "LOW": before[:3, :3]}[frame]
+    if axis < 3:
+        np.testing.assert_allclose(after[:3, 3] - before[:3, 3], way * 0.25 * 0.2 * 0.5 * axes[:, axis], atol=1e-6)
+        np.testing.assert_allclose(after[:3, :3], before[:3, :3], atol=1e-6)
+    else:
+        turned = after[:3, :3] @ before[:3, :3].T
+        angle = np.arccos(np.clip((np.trace(turned) - 1) / 2, -1, 1))
+        assert angle == pytest.approx(np.radians(45) * 0.2 * 0.5, abs=1e-5)
+        np.testing.assert_allclose(turned @ axes[:, axis - 3], axes[:, axis - 3], atol=1e-6)
+
+
+@pytest.mark.parametrize("end", ["halt", "silence", "page closed", "handed over"])
+def test_a_jog_stops(pages: Pages, end: str) -> None:
+    """A jog stops when its key is let go, when the page says nothing more, is lost, or has handed over control."""
+    pages.send("jog", arm="ARM_1", frame="JOINT", axis=0, way=1, share=1.0)
+    pages.wait(0.1)
+    if end == "halt":
+        pages.send("halt")
+    elif end == "page closed":
+        pages.studio.page_closed(1)
+    elif end == "handed over":
+        pages.studio.page_opened(2)
+        pages.send("ask", page=2)
+        pages.send("answer", give=True)
+    else:
+        pages.wait(0.2)
+    at = pages.studio.workbench.arms["ARM_1"].q.copy()
+    pages.wait(1.0)
+    np.testing.assert_array_equal(pages.studio.workbench.arms["ARM_1"].q, at)
+
+
+def test_a_jog_to_a_limit(pages: Pages) -> None:
+    """A joint that comes to its limit stays there, and that is said."""
+    for _ in range(100):
+        pages.send("jog", arm="ARM_1", frame="JOINT", axis=5, way=1, share=1.0)
+        pages.wait(0.1)
+    assert pages.state()["refusal"] == "joint 6 is at its limit"
+    arm = pages.studio.workbench.arms["ARM_1"]
+    assert arm.q[5] == pytest.approx(arm.upper[5])
+
+
+def test_undo(pages: Pages) -> None:
+    """Each gesture is taken back as a whole."""
+    start = pages.studio.workbench.arms["ARM_1"].q.copy()
+    for value in (0.1, 0.2, 0.3):
+        pages.send("joint", arm="ARM_1", joint=1, value=value)
+    pages.now += 1.0
+    pages.send("go to", arm="ARM_1", frame="LOW")
+    assert pages.send("undo") == ""
+    assert pages.studio.workbench.arms["ARM_1"].q[0] == 0.3
+    pages.send("undo")
+    np.testing.assert_array_equal(pages.studio.workbench.arms["ARM_1"].q, start)
+    assert pages.send("undo") == "there is nothing to take back"
+
+
+def test_wrong_commands(pages: Pages) -> None:
+    """What cannot be done changes nothing, and the reason is told."""
+    before = pages.state()["arms"]
+    assert "ARM_1" in pages.send("joint", arm="ARM_2", joint=1, value=0.0)
+    assert "joints 1 to 6" in pages.send("joint", arm="ARM_1", joint=7, value=0.0)
+    assert "6 joints" in pages.send("joints", arm="ARM_1", q=[0.0])
+    assert pages.send("tool", arm="ARM_1", pose=[1.0] * 12) != ""
+    assert pages.send("tool", arm="ARM_1", pose=[1.0] * 3) != ""
+    assert "did you mean jog" in pages.send("jogg")
+    assert "HIGH" in pages.send("go to", arm="ARM_1", frame="HIHG")
+    assert "share" in pages.send("jog", arm="ARM_1", frame="TOOL", axis=0, way=1, share=0.0)
+    assert pages.state()["arms"] == before
+
+
+# ---- control ---------------------------------------------------------------------------------------------------------
+
+
+def test_control(pages: Pages) -> None:
+    """One page commands; another one follows, and gets control when it is handed over, in time, or the first is lost."""
+    pages.studio.page_opened(2)
+    assert pages.state(1)["control"]["mine"]
+    assert pages.send("joint", page=2, arm="ARM_1", joint=1, value=0.1) == "another page has control; ask for it"
+    assert pages.state(1)["refusal"] == ""
+    assert pages.state(1)["arms"] == pages.state(2)["arms"]
+
+    pages.send("ask", page=2)
+    assert pages.state(1)["control"]["asked"]
+    pages.send("answer", give=False)
+    assert pages.state(1)["control"]["mine"]
+    pages.send("ask", page=2)
+    pages.wait(11.0)
+    assert pages.state(2)["control"]["mine"]
+    pages.studio.page_closed(2)
+    assert pages.state(1)["control"]["mine"]
+
+
+# ---- teaching --------------------------------------------------------------------------------------------------------
+
+
+def test_teach_and_insert(pages: Pages) -> None:
+    """A MOVE to a taught frame brings the arm to where it was taught; nothing is written before it is saved."""
+    pages.send("joint", arm="ARM_1", joint=1, value=0.6)
+    taught = pages.tool
+    assert pages.send("insert", arm="ARM_1", frame="pick", line=4, straight=True, speed=40.0) == ""
+    state = pages.state()
+    lines = state["program"]["source"].splitlines()
+    assert lines[1] == "VAR low, high, PICK : FRAME ;"
+    assert lines[4] == "  MOVE ARM_1 TO PICK STRAIGHTLY, WITH SPEED = 40 ;"
+    assert state["program"]["runs"]
+    assert state["program"]["changed"]
+    assert "+PICK" in state["file"]["change"]
+    assert "PICK" not in pages.file.path.read_text()
+    for what in ("cell", "program"):
+        assert pages.send("save", what=what) == ""
+    assert pages.state()["file"]["change"] == ""
+    np.testing.assert_allclose(read_cell(pages.file.path).tree().world("PICK"), taught, atol=1e-6)
+
+    pages.send("joint", arm="ARM_1", joint=1, value=0.7)
+    assert pages.send("touch up", line=5) == ""
+    np.testing.assert_allclose(pages.file.cell.tree().world("PICK"), pages.tool, atol=1e-6)
+    assert pages.send("touch up", line=1) == "there is no MOVE in line 1"
+    assert "expected 1 to 120" in pages.send("insert", arm="ARM_1", frame="Q", line=4, speed=0.0)
+    assert "Q" not in pages.file.cell.frames
+
+
+def test_a_program_from_nothing(tmp_path: Path) -> None:
+    """MOVEs are inserted into an empty program."""
+    pages = Pages(tmp_path, program="")
+    for number, value in enumerate((0.0, 0.3, 0.5)):
+        pages.send("joint", arm="ARM_1", joint=1, value=value)
+        assert pages.send("insert", arm="ARM_1", frame=f"P{number}", line=100) == ""
+    text = pages.state()["program"]["source"]
+    assert (
+        text
+        == "VAR P0, P1, P2 : FRAME ;\nBEGIN\n  MOVE ARM_1 TO P0 ;\n  MOVE ARM_1 TO P1 ;\n  MOVE ARM_1 TO P2 ;\nEND.\n"
+    )
+    assert pages.state()["program"]["runs"]
+
+
+# ---- running ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_run(pages: Pages) -> None:
+    """A run shows what the program does, in its time; jogging and editing have to wait."""
+    compiled = compile_program(pages.studio.project.program.compiled.source, pages.file.cell)
+    recording = interpret(compiled.code, pages.file.cell, Simulator(pages.file.cell))
+    stream = recording.streams[0]
+
+    assert pages.send("run") == ""
+    for _ in range(30):
+        pages.wait(0.1)
+        run = pages.state()["run"]
+        row = min(round(run["time"] / pages.file.cell.period), len(stream.q) - 1)
+        shown = pages.studio.workbench.arms["ARM_1"].q
+        assert np.abs(shown - stream.q[max(row - 1, 0) : row + 2]).max(axis=1).min() < 1e-2
+    assert "stop it first" in pages.send("joint", arm="ARM_1", joint=1, value=0.0)
+    assert "stop it first" in pages.send("text", text="BEGIN\nEND.\n", version=0)
+    pages.wait(recording.duration)
+    run = pages.state()["run"]
+    assert (run["ended"], run["reason"], run["time"]) == (True, "end", pytest.approx(recording.duration, abs=1e-3))
+    np.testing.assert_allclose(pages.studio.workbench.arms["ARM_1"].q, stream.q[-1], atol=1e-9)
+    assert pages.send("stop") == ""
+    assert pages.state()["run"] is None
+    np.testing.assert_allclose(pages.studio.workbench.arms["ARM_1"].q, stream.q[-1], atol=1e-9)
+
+
+def test_breakpoints_steps_and_back(pages: Pages) -> None:
+    """A run stands at a breakpoint; a step and a step back lead to the same configuration, to the bit."""
+    pages.send("break", line=5, on=True)
+    pages.send("run")
+    pages.wait(6.0)
+    run = pages.state()["run"]
+    assert (run["reason"], run["lines"][0]["line"], run["playing"]) == ("breakpoint", 5, False)
+    there = pages.studio.workbench.arms["ARM_1"].q.copy()
+    pages.send("go", way="next")
+    pages.wait(6.0)
+    assert not np.array_equal(pages.studio.workbench.arms["ARM_1"].q, there)
+    pages.send("go", way="back")
+    pages.wait(1.0)
+    np.testing.assert_array_equal(pages.studio.workbench.arms["ARM_1"].q, there)
+
+
+def test_run_from_here(pages: Pages) -> None:
+    """From a line on the program runs from where the arm is, and one line by itself."""
+    pages.send("joint", arm="ARM_1", joint=1, value=0.5)
+    start = pages.studio.workbench.arms["ARM_1"].q.copy()
+    pages.send("run", line=4, only=True)
+    pages.wait(0.01)
+    np.testing.assert_allclose(pages.studio.workbench.arms["ARM_1"].q, start, atol=1e-4)
+    pages.wait(5.0)
+    assert pages.state()["run"]["reason"] == "end"
+    np.testing.assert_allclose(pages.tool, pages.file.cell.tree().world("LOW"), atol=1e-6)
+    pages.send("stop")
+    assert "no statement" in pages.send("run", line=6)
+
+
+def test_a_program_with_errors(pages: Pages) -> None:
+    """A wrong program is shown with its diagnostics, and does not run."""
+    text = PROGRAM.replace("MOVE ARM_1 TO HIGH", "MOV ARM_1 TO HIGH")
+    assert pages.send("text", text=text, version=0) == ""
+    (problem, *_) = pages.state()["program"]["diagnostics"]
+    assert (problem["code"], problem["line"]) == ("E105", 5)
+    assert "line 5: E105" in pages.send("run")
+    assert "changed meanwhile" in pages.send("text", text="", version=0)
+
+
+def test_a_run_that_fails(tmp_path: Path) -> None:
+    """At a MOVE out of reach a run stands with its message, and ends when it goes on; then the page goes on."""
+    far = CELL.replace("0.45, 0.1, 0.3]", "4.45, 0.1, 0.3]")
+    pages = Pages(tmp_path, cell=far)
+    pages.send("run")
+    pages.wait(6.0)
+    run = pages.state()["run"]
+    assert (run["ended"], run["reason"], run["lines"][0]["line"]) == (False, "exception", 5)
+    assert "out of reach" in run["text"]
+    pages.send("go", way="continue")
+    pages.wait(0.1)
+    assert pages.state()["run"]["reason"] == "failed"
+    assert pages.send("stop") == ""
+    assert pages.send("joint", arm="ARM_1", joint=1, value=0.0) == ""
