@@ -38,15 +38,18 @@ class Pages:
         return self.studio._refusals.get(page, "")
 
     def state(self, page: int = 1) -> dict[str, Any]:
+        """Return what a page shows."""
         return json.loads(json.dumps(self.studio.state(page), allow_nan=False))  # type: ignore[no-any-return]
 
     def wait(self, seconds: float) -> None:
+        """Let time go by [s]."""
         for _ in range(round(seconds * 60)):
             self.now += 1 / 60
             self.studio.tick(self.now, 1 / 60)
 
     @property
     def tool(self) -> np.ndarray:
+        """The pose of the tool in the world."""
         return self.studio.workbench.arms["ARM_1"].tool
 
 
@@ -151,7 +154,7 @@ def test_wrong_commands(pages: Pages) -> None:
 
 
 def test_control(pages: Pages) -> None:
-    """One page commands; another one follows, and gets control when it is handed over, in time, or the first is lost."""
+    """One page commands; another one gets control when it is handed over, in time, or when the first is lost."""
     pages.studio.page_opened(2)
     assert pages.state(1)["control"]["mine"]
     assert pages.send("joint", page=2, arm="ARM_1", joint=1, value=0.1) == "another page has control; ask for it"
