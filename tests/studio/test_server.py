@@ -192,6 +192,7 @@ def test_a_lost_page_stops_its_jog(running: Running, end: str) -> None:
         page.recv(5)
         page.send('{"do": "jog", "arm": "ARM_1", "frame": "JOINT", "axis": 0, "way": 1, "share": 0.5}')
         page.recv(5)
+        time.sleep(0.1)
         if end == "cut":
             page.socket.shutdown(socket.SHUT_RDWR)
     time.sleep(0.4)

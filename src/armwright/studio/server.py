@@ -130,6 +130,8 @@ class Server:
 
     async def _live(self, socket: Any) -> None:
         """Serve a page until it is closed."""
+        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - of the extra
+
         if len(self._pages) >= _MOST_PAGES:
             await socket.close(code=1013, reason=f"{_MOST_PAGES} pages are open")
             return
@@ -142,8 +144,10 @@ class Server:
         self._changed()
         sender = asyncio.create_task(self._send_states(page))
         try:
-            async for text in socket:
-                self._receive(page, text)
+            # A connection that is cut is a page that is closed.
+            with contextlib.suppress(ConnectionClosed):
+                async for text in socket:
+                    self._receive(page, text)
         finally:
             sender.cancel()
             del self._pages[page.number]
