@@ -1,0 +1,204 @@
+"""The page of a studio in a browser: moved by hand, by key and by handle, taught, run, and left alone."""
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.cell.reader import read_cell
+
+pytest.importorskip("websockets")
+CELL = """\
+name = "bench"
+[arms.ARM_1]
+model = "puma560"
+tool = [1, 0, 0,  0, 1, 0,  0, 0, 1,  0, 0, 0.12]
+hand = [1, 0, 0,  0,-1, 0,  0, 0,-1,  0.45, -0.15, 0.25]
+
+[frames]  # taught
+HIGH = [1, 0, 0,  0,-1, 0,  0, 0,-1,  0.45, 0.1, 0.3]
+"""
+PROGRAM = (
+    "VAR high : FRAME ;\nBEGIN\n  MOVE ARM_1 TO high ;\n  MOVE ARM_1 TO high * XYZ(0, 0, 0.05) STRAIGHTLY ;\nEND.\n"
+)
+
+
+class Opened:
+    """A page that is open, and what it asked the network for."""
+
+    def __init__(self, page: Any, address: str, folder: Path) -> None:
+        """Open it."""
+        self.page, self.folder = page, folder
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.goto(address)
+        self.until(lambda: page.evaluate("Boolean(window.studio?.live.state?.ready)"))
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Wait for something."""
+        for _ in range(300):
+            if condition():
+                return
+            self.page.wait_for_timeout(50)
+        raise AssertionError(f"it does not come: {self.state()}")
+
+    def state(self) -> dict[str, Any]:
+        """Return the latest state."""
+        return self.page.evaluate("studio.live.state")  # type: ignore[no-any-return]
+
+    @property
+    def tool(self) -> np.ndarray:
+        """The twelve numbers of the pose of the tool."""
+        return np.array(self.state()["arms"]["ARM_1"]["tool"])
+
+
+@pytest.fixture
+def opened(browser: Any, tmp_path: Path) -> Iterator[Opened]:
+    (tmp_path / "bench.toml").write_text(CELL)
+    (tmp_path / "bench.rlo").write_text(PROGRAM)
+    command = [sys.executable, "-m", "armwright", "studio", "bench.toml", "bench.rlo"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    page = browser.new_page(viewport={"width": 1200, "height": 800})
+    try:
+        opened = Opened(page, process.stdout.readline().strip(), tmp_path)
+        yield opened
+        assert opened.errors == []
+        assert all(url.startswith(("http://127.0.0.1:", "data:", "blob:")) for url in opened.requests)
+    finally:
+        page.close()
+        process.terminate()
+        process.wait(10)
+        process.stdout.close()
+    assert process.returncode == 0
+
+
+def test_moved_by_hand(opened: Opened) -> None:
+    """A slider, a number, a handle and a held key move the arm, each in its way; Ctrl Z takes it back."""
+    page = opened.page
+    page.locator("#joint-1").focus()
+    for _ in range(10):
+        page.keyboard.press("ArrowRight")
+    step = float(page.locator("#joint-1").get_attribute("step"))
+    first = opened.state()["arms"]["ARM_1"]["q"][0]
+    opened.until(lambda: opened.state()["arms"]["ARM_1"]["q"][0] > first - 1e-9)
+    opened.until(lambda: page.evaluate("!studio.live.awaiting && !studio.live.queue.size"))
+    assert step > 0
+
+    number = page.get_by_role("textbox", name="Joint 2 in °")
+    number.fill("-20,5")
+    number.press("Enter")
+    opened.until(lambda: abs(opened.state()["arms"]["ARM_1"]["q"][1] - np.radians(-20.5)) < 1e-6)
+
+    handles = page.evaluate("studio.gizmo()")
+    box = page.locator("#view").bounding_box()
+    (start, tip) = next(it["points"] for it in handles if it["kind"] == "move" and it["k"] == 2)
+    before = opened.tool
+    page.mouse.move(box["x"] + tip["x"], box["y"] + tip["y"])
+    page.mouse.down()
+    for share in (0.1, 0.2, 0.3, 0.4):
+        dx, dy = (share * (start[axis] - tip[axis]) for axis in ("x", "y"))
+        page.mouse.move(box["x"] + tip["x"] + dx, box["y"] + tip["y"] + dy)
+    page.mouse.up()
+    opened.until(lambda: not np.allclose(opened.tool, before, atol=1e-4))
+    page.wait_for_timeout(200)
+    # Along the approach axis of the tool, and along no other.
+    shift = opened.tool[9:] - before[9:]
+    np.testing.assert_allclose(np.cross(shift, before[6:9]), 0, atol=1e-6)
+    assert shift @ before[6:9] < -1e-3
+    np.testing.assert_allclose(opened.tool[:9], before[:9], atol=1e-6)
+
+    dragged = opened.tool
+    page.keyboard.press("Control+z")
+    opened.until(lambda: np.allclose(opened.tool, before, atol=1e-6))
+    assert not np.allclose(dragged, before, atol=1e-6)
+
+
+@pytest.mark.parametrize("end", ["key", "other window", "hidden"])
+def test_a_held_key_is_let_go(opened: Opened, end: str) -> None:
+    """A jog lasts as long as its key is held, and no longer than the page is looked at."""
+    page = opened.page
+    page.locator("#jog button").nth(8).focus()
+    before = opened.tool
+    page.keyboard.down("Space")
+    opened.until(lambda: opened.tool[11] < before[11] - 1e-4 or opened.tool[11] > before[11] + 1e-4)
+    if end == "key":
+        page.keyboard.up("Space")
+    elif end == "other window":
+        page.evaluate("window.dispatchEvent(new Event('blur'))")
+    else:
+        page.evaluate(
+            "Object.defineProperty(document, 'hidden', { value: true });"
+            "document.dispatchEvent(new Event('visibilitychange'))"
+        )
+    page.wait_for_timeout(300)
+    at = opened.tool
+    page.wait_for_timeout(300)
+    np.testing.assert_array_equal(opened.tool, at)
+
+
+def test_teach_and_save(opened: Opened) -> None:
+    """A frame is taught, its change shown, and written with the comments of the file when that is asked for."""
+    page, file = opened.page, opened.folder / "bench.toml"
+    page.get_by_role("tab", name="Teach").click()
+    page.get_by_label("Name").fill("pick")
+    page.get_by_role("button", name="Teach and insert MOVE").click()
+    opened.until(lambda: "PICK" in opened.state()["frames"])
+
+    assert "+PICK" in page.locator("#change").inner_text()
+    assert "MOVE ARM_1 TO PICK" in page.locator("#text").input_value()
+    assert file.read_text() == CELL
+    page.get_by_role("button", name="Save the cell file").click()
+    opened.until(lambda: opened.state()["file"]["change"] == "")
+    assert "[frames]  # taught" in file.read_text()
+    np.testing.assert_allclose(read_cell(file).tree().world("PICK")[:3, 3], opened.tool[9:], atol=1e-6)
+    page.locator("#save-program").click()
+    opened.until(lambda: "PICK" in (opened.folder / "bench.rlo").read_text())
+
+
+def test_run_to_a_breakpoint_and_back(opened: Opened) -> None:
+    """A program runs to its breakpoint; after a step on and one back the arm stands as before, to the bit."""
+    page = opened.page
+    page.get_by_role("button", name="Breakpoint in line 4").click()
+    page.locator("#pace").select_option("4")
+    page.locator("#run").click()
+    opened.until(lambda: (opened.state()["run"] or {}).get("reason") == "breakpoint")
+    assert "breakpoint" in page.locator("#run-text").inner_text()
+    assert page.locator("#gutter .now").inner_text() == "4"
+    there = opened.state()["arms"]["ARM_1"]["q"]
+    page.locator("#step").click()
+    opened.until(lambda: opened.state()["arms"]["ARM_1"]["q"] != there and not opened.state()["run"]["playing"])
+    page.locator("#back").click()
+    opened.until(lambda: opened.state()["arms"]["ARM_1"]["q"] == there)
+    assert page.locator("#text").get_attribute("readonly") is not None
+    page.locator("#stop").click()
+    opened.until(lambda: opened.state()["run"] is None)
+
+
+def test_the_editor(opened: Opened) -> None:
+    """What is typed is checked, underlined and explained; a fix is one click."""
+    page = opened.page
+    page.locator("#text").fill(PROGRAM.replace("high * XYZ", "hihg * XYZ"))
+    opened.until(lambda: any(it["severity"] == "error" for it in opened.state()["program"]["diagnostics"]))
+    opened.until(lambda: page.locator("#colours .wavy").count() > 0)
+    assert page.locator("#colours .wavy.error").first.inner_text() == "hihg"
+    assert page.locator("#run").is_disabled()
+    page.locator("#text").fill(PROGRAM)
+    opened.until(lambda: not opened.state()["program"]["diagnostics"])
+
+
+def test_a_lost_server(opened: Opened) -> None:
+    """Without its connection the page says so, and nothing can be moved; when it is back the page goes on."""
+    page = opened.page
+    page.evaluate("studio.live.socket.close()")
+    opened.until(lambda: "lost" in page.locator("#link").inner_text())
+    opened.until(lambda: page.locator("#link").inner_text() == "")
+    page.locator("#joint-1").focus()
+    page.keyboard.press("End")
+    opened.until(lambda: opened.state()["arms"]["ARM_1"]["q"][0] > 2.0)
