@@ -1,1 +1,2 @@
-from .live_arm import LiveArm as LiveArm
+from .studio import Studio as Studio
+from .widget import show as show

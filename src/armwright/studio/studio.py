@@ -93,7 +93,7 @@ class Studio:
         if not self.workbench.ready:
             raise MessageError("the equations of the arm are being compiled; a moment, please")
 
-    def _do_moving(self, command: m.Command, page: int, now: float) -> None:  # noqa: C901 - a line for each
+    def _do_moving(self, command: m.Command, page: int, now: float) -> None:  # noqa: C901, PLR0912 - a line for each
         bench = self.workbench
         match command:
             case m.SetJoint():
@@ -166,6 +166,11 @@ class Studio:
                 if not least <= command.rate <= most:
                     raise MessageError(f"pace.rate: expected {least} to {most}, got {command.rate:g}")
                 project.running().rate = command.rate
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything goes on by itself."""
+        return self._jog is not None or self.project.run is not None
 
     def tick(self, now: float, seconds: float) -> bool:
         """Let what moves by itself go on for a time [s]; return whether anything has changed."""

@@ -1,0 +1,133 @@
+"""The page of a studio in a notebook: in a frame of its own, without a server, moved by the kernel of the notebook."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import html
+import json
+import time
+from typing import Any
+
+from armwright.arm.model import Arm
+from armwright.arrays import ArrayLike, joint_array
+from armwright.cell.model import Cell, CellArm
+from armwright.errors import KindError, shown
+from armwright.extras import import_extra
+from armwright.kinematics.inverse_kinematics.revolutions import mid_range
+from armwright.program.vm.recording import Recording
+from armwright.report.page import run_page
+from armwright.report.run_data import run_page_data
+from armwright.studio.page import studio_page
+from armwright.studio.project import Project
+from armwright.studio.studio import Studio
+from armwright.studio.workbench import Workbench
+
+# What the frame may do: its own style and script, and no address at all.
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
+_HEIGHT = 620
+_TICK = 1 / 30
+# The only page of a widget.
+_PAGE = 1
+_SCRIPT = """
+export default {
+  render({ model, el }) {
+    const frame = document.createElement("iframe");
+    frame.sandbox = "allow-scripts";
+    frame.style = `width:100%;height:${model.get("height")}px;border:0`;
+    frame.srcdoc = model.get("page");
+    const listen = (event) => {
+      if (event.source === frame.contentWindow) model.send(event.data);
+    };
+    const tell = (message) => frame.contentWindow?.postMessage(message, "*");
+    window.addEventListener("message", listen);
+    model.on("msg:custom", tell);
+    el.append(frame);
+    return () => {
+      window.removeEventListener("message", listen);
+      model.off("msg:custom", tell);
+    };
+  },
+};
+"""
+
+
+class Shown:
+    """A page that a notebook shows as it is."""
+
+    def __init__(self, page: str) -> None:
+        """Take a page."""
+        self.page = page
+
+    def _repr_html_(self) -> str:
+        """Show the page in a frame that may use no address."""
+        content = html.escape(self.page, quote=True)
+        style = f"width:100%;height:{_HEIGHT}px;border:0"
+        return f'<iframe sandbox="allow-scripts" style="{style}" srcdoc="{content}"></iframe>'
+
+
+def show(thing: Arm | Cell | Recording, *, q: ArrayLike | None = None) -> Any:
+    """Return what a notebook shows of a thing: arms and cells to be moved by hand, recordings as the page of a run.
+
+    Args:
+        thing: an arm, a cell or the recording of a run.
+        q: (n,) joint positions of an arm; the middle of its limits when left out.
+
+    Raises:
+        KindError: it is something else.
+        MissingExtraError: anywidget is not installed.
+    """
+    if isinstance(thing, Recording):
+        return Shown(run_page(run_page_data(thing, (), "")))
+    if isinstance(thing, Arm):
+        start = mid_range(thing) if q is None else joint_array(q, thing.n)
+        return live_widget(Cell(name=thing.name, arms={"ARM_1": CellArm(arm=thing, start=start)}))
+    if isinstance(thing, Cell):
+        return live_widget(thing)
+    raise KindError(f"expected an arm, a cell or a recording, got {shown(thing)}")
+
+
+def live_widget(cell: Cell) -> Any:
+    """Return a widget with the page of a studio, without files.
+
+    Raises:
+        MissingExtraError: anywidget is not installed.
+    """
+    anywidget = import_extra("anywidget", "a live view in a notebook", "notebook")
+    traitlets = import_extra("traitlets", "a live view in a notebook", "notebook")
+    studio = Studio(Project(Workbench(cell)))
+    studio.workbench.warm_up()
+    studio.page_opened(_PAGE)
+
+    class StudioWidget(anywidget.AnyWidget):  # type: ignore[misc, name-defined] # of the extra
+        """The page, and what it shows."""
+
+        _esm = _SCRIPT
+        page = traitlets.Unicode(studio_page(studio.workbench, "", _POLICY)).tag(sync=True)
+        height = traitlets.Int(_HEIGHT).tag(sync=True)
+
+    widget = StudioWidget()
+    widget.studio = studio
+    ticking: list[asyncio.Task[None]] = []
+
+    def tell() -> None:
+        widget.send(json.dumps(studio.state(_PAGE), separators=(",", ":"), allow_nan=False))
+
+    async def tick() -> None:
+        while studio.moves:
+            await asyncio.sleep(_TICK)
+            if studio.tick(time.monotonic(), _TICK):
+                tell()
+
+    def receive(_: object, content: object, __: object) -> None:
+        if not isinstance(content, str):
+            return
+        if content == "hello" or studio.receive(content, _PAGE, time.monotonic()):
+            tell()
+        ticking[:] = [task for task in ticking if not task.done()]
+        with contextlib.suppress(RuntimeError):
+            if studio.moves and not ticking:
+                ticking.append(asyncio.get_running_loop().create_task(tick()))
+
+    widget.on_msg(receive)
+    return widget
