@@ -12,6 +12,7 @@ from . import (
     program as program,
     simulation as simulation,
     spatial as spatial,
+    studio as studio,
     study as study,
     sweep as sweep,
     tracing as tracing,
@@ -22,4 +23,5 @@ from .arm.urdf.reader import load_urdf as load_urdf
 from .compiled.arm import CompiledArm as CompiledArm, compile_arm as compile_arm
 from .errors import ArmwrightError as ArmwrightError
 from .motion.trajectory import Trajectory as Trajectory
+from .studio.widget import show as show
 from .version import __version__ as __version__

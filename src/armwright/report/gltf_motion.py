@@ -225,8 +225,8 @@ def _glb(document: bytes, buffer: bytes) -> bytes:
     """Return a binary file from its JSON and its buffer."""
     chunks = b""
     for kind, content, filler in ((b"JSON", document, b" "), (b"BIN\0", buffer, b"\0")):
-        content += filler * (-len(content) % 4)
-        chunks += struct.pack("<I", len(content)) + kind + content
+        whole = content + filler * (-len(content) % 4)
+        chunks += struct.pack("<I", len(whole)) + kind + whole
     return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
 
 
@@ -252,7 +252,9 @@ def _triangles(
 
 
 def _box(size: Array) -> tuple[Array, Array, npt.NDArray[np.int64]]:
-    vertices, normals, faces = [], [], []
+    vertices: list[Array] = []
+    normals: list[Array] = []
+    faces: list[int] = []
     for axis in range(3):
         for side in (-1, 1):
             first = len(vertices)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -260,10 +260,14 @@ def _label(geometry: ClosedFormGeometry, q: Array) -> str:
     Branches meet where a factor of the determinant of the Jacobian vanishes: its signs tell them apart.
     """
     angles = geometry.angles(q.tolist())
-    side, second, flip = (1 if factor >= 0 else -1 for factor in determinant_factors(geometry, angles))
+    side, second, flip = determinant_factors(geometry, angles)
     # The factor of an elbow falls where its angle grows.
-    signs = side, second if geometry.family == "stanford" else -second, flip
-    return label(geometry, signs, np.array(angles))
+    second = second if geometry.family == "stanford" else -second
+    return label(geometry, (_sign(side), _sign(second), _sign(flip)), np.array(angles))
+
+
+def _sign(value: Any) -> Literal[1, -1]:
+    return 1 if value >= 0 else -1
 
 
 def _direction_text(twist: Array) -> str:
