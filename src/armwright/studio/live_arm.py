@@ -103,10 +103,26 @@ class LiveArm:
         compiled = planning_arm(self.placed.arm)
         return compiled if isinstance(compiled, CompiledArm) else None
 
+    @property
+    def closed(self) -> bool:
+        """Whether its inverse kinematics is known in closed form."""
+        return self._geometry is not None
+
+    @cached_property
+    def reach(self) -> float:
+        """How far from its base the tool could be if the arm were straight [m]."""
+        arm = self.placed.arm
+        slides = [
+            0.0 if joint.revolute or not math.isfinite(joint.limits.upper) else joint.limits.upper
+            for joint in arm.joints
+        ]
+        spans = (joint.span(abs(slide)) for joint, slide in zip(arm.joints, slides, strict=True))
+        return float(sum(spans)) + float(np.linalg.norm(arm.tool[:3, 3]))
+
     def warm_up(self) -> None:
         """Compile what moving the arm needs."""
         self.tool_at(self.q)
-        self._jacobian(self.q)
+        self.jacobian_at(self.q)
         if self._geometry is not None:
             self.solutions()
 
@@ -145,14 +161,14 @@ class LiveArm:
         q, _ = self.equations.inverse_branches(X_BT, self.q)
         rows: list[Array] = []
         for number in np.flatnonzero(self._is_met(self.equations.forward(q), X_BT)).tolist():
-            row = self._turned(q[number])
+            row = self.turned(q[number])
             # A branch that a pose does not have repeats another.
             if not any(np.abs(row - other).max() < _MET for other in rows):
                 rows.append(row)
         return np.array(rows).reshape(-1, self.placed.arm.n)
 
-    def _turned(self, q: Array) -> Array:
-        """Return a configuration with every angle turned by whole revolutions into its limits, if that is possible."""
+    def turned(self, q: Array) -> Array:
+        """Return configurations (..., n) with every angle turned by a revolution into its limits, where possible."""
         below, above = q < self.lower, q > self.upper
         turn = 2 * math.pi * (below.astype(float) - above)
         better = (below | above) & (q + turn >= self.lower) & (q + turn <= self.upper) & self._revolute
@@ -182,7 +198,7 @@ class LiveArm:
         Raises:
             UnreachableError: no configuration within the limits does that, or only one far from the present.
         """
-        q = self._nearest(X_WT)
+        q = self.configuration_for(X_WT)
         far = np.abs(q - self.q) > self._leap
         if far.any() and not leaping:
             joints = ", ".join(str(i + 1) for i in np.flatnonzero(far))
@@ -191,7 +207,12 @@ class LiveArm:
             )
         self.q = q
 
-    def _nearest(self, X_WT: Array) -> Array:
+    def configuration_for(self, X_WT: Array) -> Array:
+        """Return the configuration (n,) nearest to the present one that brings the tool to a pose (4, 4) in the world.
+
+        Raises:
+            UnreachableError: none within the limits does.
+        """
         if self._geometry is None or self.equations is None:
             return self._numeric(X_WT)
         rows = self._branches(X_WT)
@@ -212,12 +233,13 @@ class LiveArm:
             error = np.concatenate([X_BT[:3, 3] - X[:3, 3], rotation_vector(X_BT[:3, :3] @ X[:3, :3].T)])
             if np.abs(error).max() < _MET / 10:
                 return q
-            J = self._jacobian(q)
+            J = self.jacobian_at(q)
             step = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * min(1.0, float(error @ error)) * np.eye(6), error)
             q = np.clip(q + step, self.lower, self.upper)
         raise UnreachableError(f"{self.name} finds no way there: out of reach, or beyond a limit")
 
-    def _jacobian(self, q: Array) -> Array:
+    def jacobian_at(self, q: Array) -> Array:
+        """Return the Jacobian (6, n) at joint positions (n,), axes of the base."""
         return np.asarray(jacobian(self.placed.arm, q) if self.equations is None else self.equations.jacobian(q))
 
     # ---- what is wrong -------------------------------------------------------------------------------------------
@@ -226,7 +248,7 @@ class LiveArm:
         """Return what is to be said of the present configuration: joints near their limits, singular directions."""
         near = (self.q - self.lower < self._near) | (self.upper - self.q < self._near)
         found = [Remark("limit", "warning", self._limit_text(i), (i + 1,)) for i in np.flatnonzero(near).tolist()]
-        U, sigma, Vt = np.linalg.svd(scaled_rows(self._jacobian(self.q), 1.0))
+        U, sigma, Vt = np.linalg.svd(scaled_rows(self.jacobian_at(self.q), 1.0))
         if sigma[-1] < _SMALL * sigma[0]:
             found.append(self._singular(float(sigma[-1] / sigma[0]), U[:, len(sigma) - 1], Vt[len(sigma) - 1]))
         return found

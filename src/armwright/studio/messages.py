@@ -264,6 +264,22 @@ class Pace:
     rate: float
 
 
+@attrs.frozen(kw_only=True)
+class Map:
+    """Show where in a plane through the tool an arm can bring it, or show that no more."""
+
+    arm: str
+    plane: Literal["xy", "xz", "yz", "none"]
+
+
+@attrs.frozen(kw_only=True)
+class Preview:
+    """Show where an arm would be with its tool at a frame; without a name, show that no more."""
+
+    arm: str
+    frame: str
+
+
 Command: TypeAlias = (
     Got
     | SetJoint
@@ -292,6 +308,8 @@ Command: TypeAlias = (
     | Stop
     | Reset
     | Pace
+    | Map
+    | Preview
 )
 # By the word in a message.
 _COMMANDS: dict[str, type[Any]] = {
@@ -322,6 +340,8 @@ _COMMANDS: dict[str, type[Any]] = {
     "stop": Stop,
     "reset": Reset,
     "pace": Pace,
+    "map": Map,
+    "preview": Preview,
 }
 
 

@@ -48,6 +48,8 @@ class Studio:
         # The version of the program that each page has, and why its latest command was not done.
         self._versions: dict[int, int] = {}
         self._refusals: dict[int, str] = {}
+        # The map that each page has, and whether all of it.
+        self._maps: dict[int, tuple[int, bool]] = {}
         # What is being jogged, and until when.
         self._jog: m.Jog | None = None
         self._jog_until = -math.inf
@@ -63,6 +65,7 @@ class Studio:
         self.control.close(page)
         self._versions.pop(page, None)
         self._refusals.pop(page, None)
+        self._maps.pop(page, None)
 
     def receive(self, text: str | bytes, page: int, now: float) -> bool:
         """Do what a page asks for; return whether anything may have changed.
@@ -119,6 +122,10 @@ class Studio:
                 bench.undo()
             case m.Reset():
                 bench.reset()
+            case m.Map():
+                bench.show_map(command.arm, None if command.plane == "none" else command.plane)
+            case m.Preview():
+                bench.preview(command.arm, command.frame)
             case m.AskForControl():
                 self.control.ask(page, now)
             case m.AnswerRequest():
@@ -170,14 +177,18 @@ class Studio:
     @property
     def moves(self) -> bool:
         """Whether anything goes on by itself."""
-        return self._jog is not None or self.project.run is not None
+        bench = self.workbench
+        mapping = bench.map is not None and not bench.map.done
+        return self._jog is not None or self.project.run is not None or mapping
 
     def tick(self, now: float, seconds: float) -> bool:
         """Let what moves by itself go on for a time [s]; return whether anything has changed."""
         handed_over = self.control.tick(now)
         if handed_over or now > self._jog_until:
             self._jog = None
-        changed = self._tick_run(seconds) or handed_over
+        # A map is worked out while nothing moves: jogging does not wait for it.
+        mapped = self._jog is None and self.workbench.map_on()
+        changed = self._tick_run(seconds) or handed_over or mapped
         if self._jog is None:
             return changed
         jog = self._jog
@@ -212,4 +223,8 @@ class Studio:
         if self._versions.get(page) != program.version:
             self._versions[page] = program.version
             state["program"]["source"] = program.text
+        shown = self.workbench.map_number, self.workbench.map is not None and self.workbench.map.done
+        if self._maps.get(page, (0, False)) != shown:
+            self._maps[page] = shown
+            state["map"] = None if self.workbench.map is None else self.workbench.map.state()
         return state

@@ -20,6 +20,7 @@ from armwright.spatial.poses import from_noap, homogeneous, to_noap
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.studio.live_arm import LiveArm, Remark, Solution, UnreachableError
 from armwright.studio.program_run import ProgramRun
+from armwright.studio.reach_map import Plane, ReachMap
 
 # Full speed of jogging: of angles [rad/s], of lengths [m/s].
 _TURNING, _SLIDING = math.radians(45.0), 0.25
@@ -38,6 +39,8 @@ class Workbench:
         cell: the cell.
         arms: its arms, by name.
         ready: whether what moving needs has been compiled.
+        map: where an arm can bring its tool; None where no map is shown.
+        map_number: counts the maps.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -50,6 +53,9 @@ class Workbench:
         # How the program that is shown spells a frame.
         self._spelled: Callable[[str], str] = str
         self._checks: ConfigurationChecks | None = None
+        self.map: ReachMap | None = None
+        self.map_number = 0
+        self._ghost: tuple[str, Array] | None = None
         # What was shown last of a run: parts and openings.
         self._followed: object = None
         self._undo: list[tuple[str, Array]] = []
@@ -216,6 +222,30 @@ class Workbench:
         """Take the frames of a cell that differs in nothing else."""
         self.cell, self._tree, self._spelled = cell, cell.tree(), str
 
+    # ---- maps and previews ---------------------------------------------------------------------------------------
+
+    def show_map(self, name: str, plane: Plane | None) -> None:
+        """Begin a map of a plane through the tool of an arm; None for no map."""
+        self.map = None if plane is None else ReachMap(self.arm(name), plane)
+        self.map_number += 1
+
+    def map_on(self) -> bool:
+        """Work out some more of the map; return whether all of it has become known."""
+        if self.map is None or self.map.done:
+            return False
+        self.map.step()
+        return self.map.done
+
+    def preview(self, name: str, frame: str) -> None:
+        """Show where an arm would be with its tool at a frame; without a name, show that no more."""
+        self._ghost = None
+        if not frame:
+            return
+        arm, poses = self.arm(name), self.frame_poses()
+        if frame not in poses:
+            raise UnknownNameError("frame", frame, poses)
+        self._ghost = name, arm.configuration_for(poses[frame])
+
     # ---- what is shown -------------------------------------------------------------------------------------------
 
     def frame_poses(self) -> dict[str, Array]:
@@ -243,6 +273,7 @@ class Workbench:
             "parts": {name: self._part_state(name) for name in self.cell.parts},
             "frames": {name: _rounded(to_noap(X)) for name, X in self.frame_poses().items()},
             "near": self._near_state(),
+            "ghost": None if self._ghost is None else {"arm": self._ghost[0], "q": _rounded(self._ghost[1])},
             "undo": len(self._undo),
         }
 
@@ -268,7 +299,7 @@ class Workbench:
 
 
 def _solution_state(it: Solution) -> dict[str, Any]:
-    return {"label": it.label, "fault": it.fault, "here": it.here}
+    return {"label": it.label, "fault": it.fault, "here": it.here, "q": _rounded(it.q)}
 
 
 def _remark_state(it: Remark) -> dict[str, Any]:

@@ -125,7 +125,20 @@ function showSolutions(solutions) {
     const number = list.children.length;
     const button = make("button", { type: "button" }, make("span"), make("small"));
     button.addEventListener("click", () => send({ do: "solution", arm: chosenArm().name, number }));
-    list.append(make("li", {}, button));
+    const item = make("li", {}, button);
+    whilePointedAt(
+      item,
+      () => {
+        const q = armState()?.solutions?.[number]?.q;
+        overlay.hover = q ? { arm: chosenArm().name, q } : null;
+        drawSoon();
+      },
+      () => {
+        overlay.hover = null;
+        drawSoon();
+      },
+    );
+    list.append(item);
   }
   solutions.forEach(({ label, fault, here }, i) => {
     const button = list.children[i].firstChild;

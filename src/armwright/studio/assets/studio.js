@@ -9,7 +9,11 @@ function drawSoon() {
   requestAnimationFrame(() => {
     drawing = false;
     drawView();
-    if (pen && lens) paintGizmo();
+    if (pen && lens) {
+      paintMap();
+      paintGhost();
+      paintGizmo();
+    }
     STATS.drawn++;
   });
 }
@@ -99,6 +103,7 @@ function onKeyDown(event) {
 function start() {
   startGizmo();
   startView();
+  startOverlays();
   startPendant();
   startTeaching();
   startEditor();

@@ -6,6 +6,11 @@ function frameItem(name) {
   const arm = () => chosenArm().name;
   const go = make("button", { type: "button", textContent: "Go", title: `Bring the tool to ${name}` });
   go.addEventListener("click", () => send({ do: "go to", arm: arm(), frame: name }));
+  whilePointedAt(
+    go,
+    () => mine() && !live.state.run && send({ do: "preview", arm: arm(), frame: name }, "preview"),
+    () => mine() && !live.state.run && send({ do: "preview", arm: arm(), frame: "" }, "preview"),
+  );
   const update = make("button", { type: "button", textContent: "Teach", title: `Give ${name} the pose of the tool` });
   update.addEventListener("click", () => send({ do: "teach", arm: arm(), name }));
   const rename = make("button", { type: "button", textContent: "Rename" });
