@@ -63,6 +63,15 @@ class Log:
             if np.abs(X - self._tracks[name][-1][1]).max() > _STILL:
                 self._tracks[name].append((tick * self._cell.period, X))
 
+    def at(self, arm: str, tick: int) -> Measured:
+        """Return what a servo did at a tick that has been recorded, or at the last one."""
+        tick = max(0, min(tick, self._count - 1))
+        block, row = divmod(tick, _BLOCK)
+        full = self._full[arm]
+        values = full[block][row] if block < len(full) else self._rows[arm][row]
+        n = (len(values) - 1) // 4
+        return Measured(values[:n], values[n : 2 * n], values[2 * n : 3 * n])
+
     def streams(self) -> tuple[MeasuredStream, ...]:
         """Return what was recorded, one stream per arm."""
         return tuple(self._stream(name) for name in self._cell.arms)

@@ -31,7 +31,7 @@ from armwright.physics.measured import Log
 from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
 from armwright.physics.seeing import target_of
-from armwright.physics.servo import ArmServo, Sent, TorqueLaw
+from armwright.physics.servo import ArmServo, Measured, Sent, TorqueLaw
 from armwright.physics.vision import camera_in_world, look
 from armwright.physics.watch import Watch
 from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
@@ -300,6 +300,13 @@ class PhysicsCell:
         return seen.pose
 
     # ---- results -------------------------------------------------------------------------------------------------
+
+    def measured(self, arm: str, time: float) -> Measured:
+        """Return what the servo of an arm measured and did at a time [s] that has gone by; at rest before the first."""
+        if not self._tick:
+            rest = np.zeros(self._cell.arms[arm].arm.n)
+            return Measured(self.configuration(arm, 0.0), rest, rest)
+        return self._log.at(arm, round(time / self._cell.period))
 
     def true_pose(self, part: str) -> Array:
         """Return the pose (4, 4) of a part in the world, as it is now."""

@@ -23,7 +23,17 @@ from armwright.version import __version__
 
 # Of the pages of results, and then those of the studio.
 _SHARED_SCRIPTS = ("basics.js", "scene.js", "poses.js", "camera.js", "meshes.js", "surface.js", "labels.js", "view.js")
-_SCRIPTS = ("live.js", "overlays.js", "gizmo.js", "pendant.js", "teaching.js", "editor.js", "running.js", "studio.js")
+_SCRIPTS = (
+    "live.js",
+    "overlays.js",
+    "gizmo.js",
+    "pendant.js",
+    "teaching.js",
+    "editor.js",
+    "running.js",
+    "charts_live.js",
+    "studio.js",
+)
 
 
 def studio_page(workbench: Workbench, token: str, policy: str) -> str:

@@ -13,6 +13,8 @@ from armwright.cell.frames import FrameTree
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
 from armwright.cell.part_poses import PartTrack
+from armwright.physics.servo import Measured
+from armwright.physics.world import PhysicsCell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.debugger.stop_reason import Stop
@@ -117,14 +119,23 @@ class ProgramRun:
 
     # ---- what is shown -------------------------------------------------------------------------------------------
 
-    def configuration(self, arm: str) -> Array:
-        """Return the joint positions (n,) of an arm at the time that is shown, as they were planned."""
+    def motion(self, arm: str) -> tuple[Array, Array, Array]:
+        """Return positions, speeds and accelerations (n,) of the joints of an arm at the time shown, as planned."""
         segments = self.debugger.machine.state.segments[arm]
         i = bisect_right(segments, self.time + 1e-9, key=lambda segment: segment.t0) - 1
+        start = np.array(self._cell.arms[arm].start)
         if i < 0:
-            return np.array(self._cell.arms[arm].start)
-        segment = segments[i]
-        return np.asarray(segment.trajectory(min(max(self.time - segment.t0, 0.0), segment.duration)))
+            return start, np.zeros_like(start), np.zeros_like(start)
+        segment, t = segments[i], self.time - segments[i].t0
+        q, qd, qdd = (np.asarray(segment.trajectory(min(max(t, 0.0), segment.duration), order)) for order in range(3))
+        # Then the arm rests.
+        moves = float(t < segment.duration)
+        return q, moves * qd, moves * qdd
+
+    def measured(self, arm: str) -> Measured | None:
+        """Return what was measured of an arm at the time shown; None without physics."""
+        hardware = self.debugger.machine.hardware
+        return hardware.measured(arm, self.time) if isinstance(hardware, PhysicsCell) else None
 
     def tree(self) -> FrameTree:
         """Return the frame tree at the time that is shown."""
@@ -189,11 +200,21 @@ class ProgramRun:
             "ended": stop is not None and stop.has_ended,
             "reason": "" if stop is None else stop.reason,
             "text": "" if stop is None or stop.diagnostic is None else stop.diagnostic.message,
+            "motions": {name: self._motion_state(name) for name in self._cell.arms},
+            "devices": sorted(self.debugger.machine.hardware.active_devices()),
             "trace": [
                 {"t": round(effect.t0, 4), "line": source.line(effect.span.start), "text": effect.text}
                 for effect in trace[-_TRACE:]
             ],
         }
+
+    def _motion_state(self, arm: str) -> dict[str, list[float]]:
+        names = ("q", "qd", "qdd")
+        state = {name: np.round(values, 6).tolist() for name, values in zip(names, self.motion(arm), strict=True)}
+        measured = self.measured(arm)
+        if measured is not None:
+            state |= {f"{name}_measured": np.round(getattr(measured, name), 6).tolist() for name in ("q", "qd", "tau")}
+        return state
 
     def recording(self) -> Recording:
         """Return all that the program has done so far."""

@@ -11,6 +11,7 @@ from armwright.cell.hardware import HardwareFactory
 from armwright.cell.simulator import Simulator
 from armwright.errors import UnknownNameError
 from armwright.files.inputs import read_program
+from armwright.physics.world import PhysicsCell
 from armwright.studio.cell_file import CellFile, TeachingError
 from armwright.studio.program_run import ProgramRun
 from armwright.studio.program_text import ProgramText, ProgramTextError
@@ -164,11 +165,7 @@ class Project:
             error = next(it for it in compiled.diagnostics if it.is_error)
             where = compiled.source.line(error.span.start)
             raise ProgramTextError(f"line {where}: {error.code}: {error.message}")
-        hardware: HardwareFactory = Simulator
-        if physics:
-            from armwright.physics.world import PhysicsCell  # noqa: PLC0415 - only where it is asked for
-
-            hardware = PhysicsCell
+        hardware: HardwareFactory = PhysicsCell if physics else Simulator
         self.run = ProgramRun(compiled.code, cell, hardware, self.breakpoints)
         self.run.begin(stop_on_entry=entry)
 

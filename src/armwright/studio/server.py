@@ -130,8 +130,6 @@ class Server:
 
     async def _live(self, socket: Any) -> None:
         """Serve a page until it is closed."""
-        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - of the extra
-
         if len(self._pages) >= _MOST_PAGES:
             await socket.close(code=1013, reason=f"{_MOST_PAGES} pages are open")
             return
@@ -142,17 +140,25 @@ class Server:
         self._pages[page.number] = page
         self.studio.page_opened(page.number)
         self._changed()
-        sender = asyncio.create_task(self._send_states(page))
+        tasks = {asyncio.create_task(self._send_states(page)), asyncio.create_task(self._receive_all(page))}
         try:
-            # A connection that is cut is a page that is closed.
-            with contextlib.suppress(ConnectionClosed):
-                async for text in socket:
-                    self._receive(page, text)
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
         finally:
-            sender.cancel()
+            for task in tasks:
+                task.cancel()
             del self._pages[page.number]
             self.studio.page_closed(page.number)
             self._changed()
+
+    async def _receive_all(self, page: _Page) -> None:
+        """Do what a page asks for until it is closed, or its connection is cut."""
+        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - of the extra
+
+        with contextlib.suppress(ConnectionClosed):
+            async for text in page.socket:
+                self._receive(page, text)
 
     def _receive(self, page: _Page, text: str | bytes) -> None:
         """Do what a page asks for."""
@@ -234,9 +240,13 @@ class Server:
             warm = loop.run_in_executor(None, self.studio.workbench.warm_up)
             ticking = asyncio.create_task(self._tick())
             warm.add_done_callback(lambda _: self._changed())
+            waiting = asyncio.create_task(stopped.wait())
             try:
-                await stopped.wait()
+                await asyncio.wait({waiting, ticking}, return_when=asyncio.FIRST_COMPLETED)
+                if ticking.done():
+                    ticking.result()
             finally:
+                waiting.cancel()
                 ticking.cancel()
 
 

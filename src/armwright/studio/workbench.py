@@ -195,7 +195,8 @@ class Workbench:
     def follow(self, run: ProgramRun) -> None:
         """Show what a run shows: its arms, parts and frames."""
         for name, arm in self.arms.items():
-            arm.q = run.configuration(name)
+            measured = run.measured(name)
+            arm.q = run.motion(name)[0] if measured is None else np.array(measured.q)
         self._tree, self._spelled, parts = run.tree(), run.spelled, run.parts()
         widths = {name: arm.gripper_or_usual.opening for name, arm in self.cell.arms.items()}
         openings = {name: run.opening(name) * width for name, width in widths.items()}

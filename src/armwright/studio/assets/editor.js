@@ -85,7 +85,7 @@ function showEditor(state) {
   if (key !== editor.key) {
     editor.key = key;
     paintText();
-    showProblems(program.diagnostics);
+    showProblems(byId("text").value.trim() ? program.diagnostics : []);
   }
   const running = new Map((run?.lines ?? []).map((it) => [it.line, it]));
   [...byId("gutter").children].forEach((button, i) => {

@@ -104,6 +104,7 @@ function start() {
   startGizmo();
   startView();
   startOverlays();
+  startStrip();
   startPendant();
   startTeaching();
   startEditor();
