@@ -296,3 +296,19 @@ def test_a_run_that_fails(tmp_path: Path) -> None:
     assert pages.state()["run"]["reason"] == "failed"
     assert pages.send("stop") == ""
     assert pages.send("joint", arm="ARM_1", joint=1, value=0.0) == ""
+
+
+def test_what_is_kept_of_a_run(pages: Pages) -> None:
+    """The page, the 3-D file and the film of a run."""
+    assert pages.send("keep", what="page", arm="ARM_1") == "no program runs"
+    pages.send("run")
+    pages.wait(6.0)
+    beginnings = {"page": b"<!DOCTYPE html>", "gltf": b"glTF", "gif": b"GIF8"}
+    for what in beginnings:
+        assert pages.send("keep", what=what, arm="ARM_1") == ""
+    for page, job in pages.studio.jobs:
+        made = job()
+        assert page == 1
+        assert any(made.content.startswith(beginning) for beginning in beginnings.values())
+        assert made.message()["download"]["name"] == made.name
+    assert len({job().name for _, job in pages.studio.jobs}) == 3

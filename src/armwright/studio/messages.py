@@ -280,6 +280,14 @@ class Preview:
     frame: str
 
 
+@attrs.frozen(kw_only=True)
+class Keep:
+    """Send a file of the run: its page, a 3-D file that moves, or a film of an arm."""
+
+    what: Literal["page", "gltf", "gif"]
+    arm: str
+
+
 Command: TypeAlias = (
     Got
     | SetJoint
@@ -310,6 +318,7 @@ Command: TypeAlias = (
     | Pace
     | Map
     | Preview
+    | Keep
 )
 # By the word in a message.
 _COMMANDS: dict[str, type[Any]] = {
@@ -342,6 +351,7 @@ _COMMANDS: dict[str, type[Any]] = {
     "pace": Pace,
     "map": Map,
     "preview": Preview,
+    "keep": Keep,
 }
 
 

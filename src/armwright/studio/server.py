@@ -16,7 +16,9 @@ from urllib.parse import parse_qs, urlsplit
 
 import attrs
 
+from armwright.errors import ArmwrightError
 from armwright.extras import import_extra
+from armwright.studio.downloads import Download
 from armwright.studio.messages import MAX_MESSAGE
 from armwright.studio.page import studio_page
 from armwright.studio.studio import Studio
@@ -69,6 +71,7 @@ class Server:
         self._token = secrets.token_urlsafe(_TOKEN_BYTES)
         self._pages: dict[int, _Page] = {}
         self._count = 0
+        self._sending: set[asyncio.Task[None]] = set()
 
     @property
     def address(self) -> str:
@@ -165,6 +168,26 @@ class Server:
         page.may_send.set()
         if self.studio.receive(text, page.number, time.monotonic()):
             self._changed()
+        while self.studio.jobs:
+            number, job = self.studio.jobs.pop()
+            task = asyncio.create_task(self._send_file(number, job))
+            self._sending.add(task)
+            task.add_done_callback(self._sending.discard)
+
+    async def _send_file(self, number: int, job: Callable[[], Download]) -> None:
+        """Make a file beside all else, and send it to the page that has asked for it."""
+        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - of the extra
+
+        try:
+            made = await asyncio.get_running_loop().run_in_executor(None, job)
+        except ArmwrightError as error:
+            self.studio.refuse(number, error)
+            self._changed()
+            return
+        page = self._pages.get(number)
+        if page is not None:
+            with contextlib.suppress(ConnectionClosed):
+                await page.socket.send(json.dumps(made.message()))
 
     def _changed(self) -> None:
         for page in self._pages.values():

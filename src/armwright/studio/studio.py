@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from armwright.errors import ArmwrightError
 from armwright.studio import messages as m
 from armwright.studio.control import Control
+from armwright.studio.downloads import Download, download
 from armwright.studio.messages import MessageError, read_message
 from armwright.studio.project import Project
 
@@ -40,11 +43,13 @@ class Studio:
         workbench: the arms.
         project: the files.
         control: which page commands.
+        jobs: files that pages have asked for, each with the number of the page; whoever serves the pages makes them.
     """
 
     def __init__(self, project: Project) -> None:
         """Take a project that no page commands yet."""
         self.project, self.workbench, self.control = project, project.workbench, Control()
+        self.jobs: list[tuple[int, Callable[[], Download]]] = []
         # The version of the program that each page has, and why its latest command was not done.
         self._versions: dict[int, int] = {}
         self._refusals: dict[int, str] = {}
@@ -168,6 +173,10 @@ class Studio:
                 project.running().pause()
             case m.Stop():
                 project.stop()
+            case m.Keep():
+                self.workbench.arm(command.arm)
+                recording = project.running().recording()
+                self.jobs.append((page, partial(download, recording, command.what, command.arm)))
             case m.Pace():
                 least, most = _RATES
                 if not least <= command.rate <= most:
@@ -195,7 +204,7 @@ class Studio:
         try:
             self.workbench.jog(jog.arm, jog.frame, jog.axis, jog.way * jog.share * seconds, now)
         except ArmwrightError as error:
-            self._refuse(error)
+            self.refuse(self.control.page, error)
         return True
 
     def _tick_run(self, seconds: float) -> bool:
@@ -203,13 +212,13 @@ class Studio:
             return self.project.tick(seconds)
         except ArmwrightError as error:
             self.project.run = None
-            self._refuse(error)
+            self.refuse(self.control.page, error)
             return True
 
-    def _refuse(self, error: ArmwrightError) -> None:
-        """Tell the page that commands why what it began does not go on."""
-        if self.control.page is not None:
-            self._refusals[self.control.page] = str(error)
+    def refuse(self, page: int | None, error: ArmwrightError) -> None:
+        """Tell a page why what it began does not go on."""
+        if page is not None:
+            self._refusals[page] = str(error)
 
     def state(self, page: int) -> dict[str, Any]:
         """Return what a page shows, as plain data; with the text of the program where it has another one."""

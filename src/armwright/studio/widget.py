@@ -124,6 +124,9 @@ def live_widget(cell: Cell) -> Any:
             return
         if content == "hello" or studio.receive(content, _PAGE, time.monotonic()):
             tell()
+        while studio.jobs:
+            _, job = studio.jobs.pop()
+            widget.send(json.dumps(job().message()))
         ticking[:] = [task for task in ticking if not task.done()]
         with contextlib.suppress(RuntimeError):
             if studio.moves and not ticking:

@@ -35,8 +35,13 @@ function flush() {
 }
 
 function receive(text) {
+  const message = JSON.parse(text);
+  if (message.download) {
+    keepFile(message.download);
+    return;
+  }
   const first = !live.state;
-  live.state = JSON.parse(text);
+  live.state = message;
   live.awaiting = false;
   if (!flush()) live.socket.send('{"do":"got"}');
   for (const follower of followers) follower(live.state, first);

@@ -23,6 +23,7 @@ function showRun(state) {
   byId("back").disabled = off || !run;
   byId("stop").disabled = off || !run;
   byId("physics").disabled = off || Boolean(run);
+  for (const button of document.querySelectorAll("[data-keep]")) button.disabled = off || !run;
   const texts = { end: "ended", failed: "failed", breakpoint: "stands at a breakpoint", entry: "stands at its beginning", step: "stands", start: "stands at its beginning", exception: "stands at an error", pause: "stands" };
   const what = run && (run.playing ? "runs" : (texts[run.reason] ?? "stands"));
   byId("run-text").textContent = run ? `${number(run.time, 2)} s, ${what}${run.text ? `: ${run.text}` : ""}` : "";
@@ -42,7 +43,44 @@ function showTrace(trace) {
   list.lastChild?.scrollIntoView({ block: "nearest" });
 }
 
+function saveBlob(blob, name) {
+  const link = make("a", { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+function keepFile({ name, type, data: content }) {
+  saveBlob(new Blob([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], { type }), name);
+}
+
+// The view as a video, from one click to the next.
+const film = { recorder: null };
+
+function toggleVideo() {
+  const button = byId("video");
+  if (film.recorder) {
+    film.recorder.stop();
+    film.recorder = null;
+    button.textContent = "Video";
+    return;
+  }
+  const type = ["video/mp4;codecs=avc1", "video/webm;codecs=vp9", "video/webm"].find((one) => window.MediaRecorder?.isTypeSupported(one));
+  if (!type) {
+    byId("run-text").textContent = "this browser records no video";
+    return;
+  }
+  const pieces = [];
+  film.recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: type });
+  film.recorder.ondataavailable = ({ data: piece }) => pieces.push(piece);
+  film.recorder.onstop = () => saveBlob(new Blob(pieces, { type }), `view.${type.includes("mp4") ? "mp4" : "webm"}`);
+  film.recorder.start();
+  button.textContent = "End the video";
+}
+
 function startRunning() {
+  byId("video").addEventListener("click", toggleVideo);
+  for (const button of document.querySelectorAll("[data-keep]"))
+    button.addEventListener("click", () => send({ do: "keep", what: button.dataset.keep, arm: chosenArm().name }));
   byId("run").addEventListener("click", startRun);
   byId("pause").addEventListener("click", () => send({ do: "pause" }));
   byId("step").addEventListener("click", () => step("next"));
