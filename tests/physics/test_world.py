@@ -339,7 +339,7 @@ def test_a_weight_on_the_tool(tmp_path: Path) -> None:
         world.start_motion("ARM_1", quintic(q, goal, 1.5), now, np.eye(4))
         now += 2.5
         assert world.advance(now) is None
-        force = world.contact_force("ARM_1", now)
+        force = world.contact_wrench("ARM_1", now)
         np.testing.assert_allclose(force, (0, 0, -2 * 9.80665), atol=0.01 * 2 * 9.80665)
 
 
@@ -351,7 +351,7 @@ def test_sensors_of_forces_and_efforts(tmp_path: Path) -> None:
     readings = []
     for tick in range(1, 1001):
         world.advance(tick * cell.period)
-        readings.append(world.contact_force("ARM_1", tick * cell.period))
+        readings.append(world.contact_wrench("ARM_1", tick * cell.period))
 
     changes = np.flatnonzero(np.diff(np.array(readings)[:, 2])) + 2
     assert (np.diff(changes) == 10).all()

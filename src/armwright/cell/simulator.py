@@ -78,13 +78,15 @@ class Simulator:
         self._active: set[str] = set()
         self._answers = {name: list(answers) for name, answers in cell.visions.items()}
         self._parts = PartPoses(cell)
+        # Wrenches that the sensors of forces take for zero.
+        self._zeros: dict[str, Array] = {}
 
     def copy(self) -> "Simulator":
         """Return a simulator in the same state; later commands to one do not change the other."""
         other = Simulator(self._cell)
         other._motions, other._active = dict(self._motions), set(self._active)
         other._answers = {name: list(answers) for name, answers in self._answers.items()}
-        other._parts = self._parts.copy()
+        other._parts, other._zeros = self._parts.copy(), dict(self._zeros)
         return other
 
     def advance(self, now: float) -> None:
@@ -143,10 +145,27 @@ class Simulator:
         depth = float(motion.depths()[:passed].max())
         return PeakContact(depth, depth * self._cell.contact.stiffness)
 
-    def contact_force(self, arm: str, now: float) -> Array:
-        """Return the force (3,) of the plane on an arm and what it moves [N]: upwards, proportional to the depth."""
-        depth = max((self._depth(arm, point, now) for point in self._motions[arm].points), default=0.0)
-        return np.array([0.0, 0.0, depth * self._cell.contact.stiffness])
+    def contact_wrench(self, arm: str, now: float) -> Array:
+        """Return the wrench (6,) of the plane on an arm and what it moves, less that of ``zero_force``.
+
+        Force [N], upwards and proportional to the depth, and its moment about the tool point [N m].
+        """
+        return self._wrench(arm, now) - self._zeros.get(arm, 0.0)
+
+    def zero_force(self, arm: str, now: float) -> Array:
+        """Let the present wrench count as zero from now on; return it (6,)."""
+        self._zeros[arm] = self._wrench(arm, now)
+        return self._zeros[arm]
+
+    def _wrench(self, arm: str, now: float) -> Array:
+        points = self._motions[arm].points
+        depths = [self._depth(arm, point, now) for point in points]
+        if not any(depths):
+            return np.zeros(6)
+        deepest = int(np.argmax(depths))
+        force = np.array([0.0, 0.0, depths[deepest] * self._cell.contact.stiffness])
+        lever = self._hands(now)[arm][:3, :3] @ points[deepest].pose[:3, 3]
+        return np.concatenate([force, np.cross(lever, force)])
 
     def tool_wrenches(self, arm: str, now: float) -> Array:
         """Return the wrenches of the plane on the tool of an arm, (k, 6), at this servo tick and the following ones.

@@ -157,17 +157,21 @@ class Contacts:
                 found.append(Overlap(self.names[a], self.names[b], depth))
         return found
 
-    def tool_force(self, data: Any, arm: str) -> Array:
-        """Return the force (3,) on the tool of an arm along the axes of the world, without the weight of the tool [N].
+    def tool_wrench(self, data: Any, arm: str) -> Array:
+        """Return the wrench (6,) on the tool of an arm along the axes of the world, without the weight of the tool.
 
-        As a sensor between the arm and its tool reads it.
+        Force [N] and moment about the tool point [N m], as a sensor between the arm and its tool reads them.
         """
         import mujoco  # noqa: PLC0415 - only cells with several bodies need it
 
         mujoco.mj_rnePostConstraint(self._model, data)
         tool = self._tools[arm]
+        moment, force = -data.cfrc_int[tool, :3], -data.cfrc_int[tool, 3:]
         weight = self._model.body_subtreemass[tool] * self._model.opt.gravity
-        return np.asarray(-data.cfrc_int[tool, 3:] - weight)
+        # MuJoCo gives moments about the centre of mass of all that hangs together.
+        centre = data.subtree_com[self._model.body_rootid[tool]] - data.xpos[tool]
+        lever = data.subtree_com[tool] - data.xpos[tool]
+        return np.concatenate([force - weight, moment + np.cross(centre, force) - np.cross(lever, weight)])
 
     def plate_depth(self, data: Any) -> float:
         """Return how deep the plane that yields is pressed [m]."""

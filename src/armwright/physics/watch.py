@@ -18,6 +18,7 @@ from armwright.physics.plant import arm_indices
 from armwright.physics.servo import Sent
 from armwright.physics.world_model import WorldModel, in_hand, part_pose, tool_pose
 from armwright.spatial.poses import inverse
+from armwright.spatial.shapes import centroid
 
 # How long a held part may be off the pads, and an arm off its track [s].
 _LOST, _OFF_TRACK = 0.05, 0.02
@@ -119,6 +120,20 @@ class Watch:
         """Return the mass that the servo of an arm knows in its hand [kg]."""
         part = self.hands[arm].part
         return self._cell.parts[part].mass if part is not None and self._cell.arms[arm].servo.knows_parts else 0.0
+
+    def known_wrench(self, data: Any, arm: str) -> Array:
+        """Return the wrench (6,) of the weight of the part that an arm holds, as its controller knows the part.
+
+        Force [N] and moment about the tool point [N m], along the axes of the world.
+        """
+        mass, part = self.known_load(arm), self.hands[arm].part
+        if not mass or part is None:
+            return np.zeros(6)
+        known = self._cell.parts[part]
+        # As the program believes that it holds the part: by its grasp frame.
+        lever = tool_pose(data, arm)[:3, :3] @ known.grasp[:3, :3].T @ (centroid(known.shape) - known.grasp[:3, 3])
+        weight = mass * self._cell.gravity
+        return np.concatenate([weight, np.cross(lever, weight)])
 
     def peak_contact(self, arm: str) -> PeakContact:
         """Return the deepest contact of an arm with the plane since its latest motion began."""
