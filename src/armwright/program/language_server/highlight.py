@@ -5,12 +5,12 @@ from collections import deque
 from collections.abc import Collection, Iterable, Iterator
 from typing import ClassVar
 
-from pygments.lexer import RegexLexer, default, include
+from pygments.lexer import RegexLexer, bygroups, default, include
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace, _TokenType
 
 from armwright.program.language.source import Source
 from armwright.program.language.units import UNITS
-from armwright.program.language.words import RLO_2_TYPES, SENSORS, VOCABULARIES, Standard
+from armwright.program.language.words import RLO_2_TYPES, SENSORS, STATEMENT_PHRASES, VOCABULARIES, Standard
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax.line_numbers import blank_line_numbers
@@ -23,6 +23,7 @@ TYPES = frozenset((*_VOCABULARY.types, *RLO_2_TYPES))
 OPERATORS = frozenset(("AND", "OR", "NOT"))
 KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
 
+_PHRASE = bygroups(Keyword.Pseudo, Whitespace, Keyword.Pseudo)
 _NAME = r"(?a:[A-Z]\w*)(?!\w)"
 _NUMBER = r"[0-9]+(?:\.[0-9]+)?(?a:E[+-]?[0-9]+)?"
 
@@ -47,6 +48,7 @@ class RloLexer(RegexLexer):
         "root": [
             include("blank"),
             (_any_of(["READ"]), Keyword, "sensor"),
+            *((rf"(?a:({one})([ \t]+)({other}))(?!\w)", _PHRASE) for one, other in STATEMENT_PHRASES.items()),
             (_any_of(["UNITS"]), Keyword.Declaration, "units"),
             (_any_of(["PROCEDURE"]), Keyword.Declaration, "procedure"),
             include("reserved"),
