@@ -21,10 +21,12 @@ class PeakContact(NamedTuple):
     Attributes:
         depth: depth of penetration [m]; 0 without contact.
         force: contact force there [N].
+        body: the name of the body of the scene; empty for the plane of contact.
     """
 
     depth: float
     force: float
+    body: str = ""
 
 
 class Mishap(NamedTuple):

@@ -270,11 +270,15 @@ class ClearanceChecker:
             row[near.places] = near.distances
         return result
 
+    def poses_at(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:
+        """Return the poses (2, 4, 4) of two bodies in the world at a time [s]."""
+        poses, _ = self._placed(motions, np.array([time]), np.array([time]))
+        return np.asarray(poses[0, list(bodies)])
+
     def nearest_points(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:
         """Return the points (2, 3) of two bodies that are nearest to each other, or deepest in each other [m]."""
-        poses, _ = self._placed(motions, np.array([time]), np.array([time]))
-        for body in bodies:
-            self.distances.place(body, poses[0, body])
+        for body, X in zip(bodies, self.poses_at(motions, time, bodies), strict=True):
+            self.distances.place(body, X)
         return self.distances.nearest(*bodies, within=_FAR).points
 
     def _closest(self, window: Window, near: _Near, place: int) -> Closest:

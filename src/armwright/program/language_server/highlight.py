@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Collection, Iterable, Iterator
 from typing import ClassVar
 
-from pygments.lexer import RegexLexer, bygroups, default, include
+from pygments.lexer import RegexLexer, default, include
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace, _TokenType
 
 from armwright.program.language.source import Source
@@ -23,7 +23,6 @@ TYPES = frozenset((*_VOCABULARY.types, *RLO_2_TYPES))
 OPERATORS = frozenset(("AND", "OR", "NOT"))
 KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
 
-_PHRASE = bygroups(Keyword.Pseudo, Whitespace, Keyword.Pseudo)
 _NAME = r"(?a:[A-Z]\w*)(?!\w)"
 _NUMBER = r"[0-9]+(?:\.[0-9]+)?(?a:E[+-]?[0-9]+)?"
 
@@ -31,6 +30,12 @@ _NUMBER = r"[0-9]+(?:\.[0-9]+)?(?a:E[+-]?[0-9]+)?"
 def _any_of(words: Collection[str]) -> str:
     """Return a pattern for one of some words, in any case and not as the beginning of a longer one."""
     return rf"(?a:{'|'.join(sorted(words))})(?!\w)"
+
+
+def _phrases() -> Iterator[tuple[str, _TokenType, str]]:
+    """Yield the rules of words that start a statement in front of another one."""
+    for one, other in STATEMENT_PHRASES.items():
+        yield rf"(?a:{one}(?=[ \t]+{other}(?!\w)))", Keyword.Pseudo, "phrase"
 
 
 class RloLexer(RegexLexer):
@@ -48,7 +53,10 @@ class RloLexer(RegexLexer):
         "root": [
             include("blank"),
             (_any_of(["READ"]), Keyword, "sensor"),
-            *((rf"(?a:({one})([ \t]+)({other}))(?!\w)", _PHRASE) for one, other in STATEMENT_PHRASES.items()),
+            *(
+                (rf"(?a:{one}(?=[ \t]+{other}(?!\w)))", Keyword.Pseudo, "phrase")
+                for one, other in STATEMENT_PHRASES.items()
+            ),
             (_any_of(["UNITS"]), Keyword.Declaration, "units"),
             (_any_of(["PROCEDURE"]), Keyword.Declaration, "procedure"),
             include("reserved"),
@@ -89,6 +97,7 @@ class RloLexer(RegexLexer):
             (r"[;,:.()\[\]]", Punctuation),
         ],
         "sensor": [include("blank"), (_any_of(SENSORS), Keyword.Pseudo, "#pop"), default("#pop")],
+        "phrase": [include("blank"), (_any_of(STATEMENT_PHRASES.values()), Keyword.Pseudo, "#pop")],
         "units": [include("blank"), (_any_of(UNITS), Keyword.Type), (r",", Punctuation), default("#pop")],
         "unit": [(_any_of(UNITS), Keyword.Type, "#pop")],
         "procedure": [

@@ -1,0 +1,219 @@
+"""What stands in a cell yields to a tool that comes down on it in a motion that a force may end.
+
+The deepest contact counts: its force is the stiffness times the depth, along the normal of the contact. Depths and
+normals are those of the convex solids by which collisions are found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.contact_course import ContactCourse, Pair, Pressing
+from armwright.cell.model import Cell
+from armwright.cell.part_poses import PartPoses
+from armwright.cell.simulator import Simulator
+from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.trajectory import Trajectory, hold
+from armwright.physics.clearance import Body, ClearanceChecker, Window
+from armwright.physics.collisions import CellCollisions
+from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
+
+# A contact that becomes no deeper than this is none, as of what stands on something [m].
+_TOUCH = 1e-5
+# Ticks that are computed together.
+_BLOCK = 32
+# Points of the rim of a cylinder.
+_RIM = 16
+# Contacts whose normals are so near that of the deepest press together: cosine of the angle.
+_SAME_NORMAL = 0.9
+# Time of a first contact [s].
+_TIME_TOLERANCE = 1e-10
+
+
+def kinematic_cell(cell: Cell) -> Simulator:
+    """Return the kinematic simulator of a cell; where it has no plane of contact, what stands in it yields to tools."""
+    stands = bool(cell.fixtures or cell.parts) and cell.contact.height is None
+    return Simulator(cell, YieldingScene(cell) if stands else None)
+
+
+class YieldingScene:
+    """The fixtures of a cell, and the parts that no arm holds, as springs."""
+
+    def __init__(self, cell: Cell) -> None:
+        """Take a cell. Its solids are prepared when they are first needed."""
+        self._cell = cell
+
+    @cached_property
+    def _collisions(self) -> CellCollisions:
+        return CellCollisions(self._cell)
+
+    def along(
+        self,
+        arm: str,
+        trajectory: Trajectory,
+        now: float,
+        parts: PartPoses,
+        *,
+        guarded: bool,
+        pressed: frozenset[Pair],
+    ) -> ContactCourse:
+        """Return the contacts of the tool of an arm, and of what it holds, along a motion; see ``SceneContacts``."""
+        checker, pairs = self._collisions.tool_pairs(arm, parts)
+        counted = [pair for pair in pairs if guarded or pair in pressed]
+        motion = _ToolMotion(self._cell, arm, trajectory, checker, counted, pressed)
+        return motion.course(now, guarded=guarded)
+
+
+class _ToolMotion:
+    """A motion of one tool among bodies that stand."""
+
+    def __init__(  # noqa: PLR0917 - a motion, and what it is among
+        self,
+        cell: Cell,
+        arm: str,
+        trajectory: Trajectory,
+        checker: ClearanceChecker,
+        pairs: Sequence[Pair],
+        pressed: frozenset[Pair],
+    ) -> None:
+        self._cell, self._arm, self._trajectory = cell, arm, trajectory
+        self._checker, self._pairs = checker, pairs
+        self._motions: Mapping[str, Trajectory] = {
+            **{name: hold(other.start, 0.0) for name, other in cell.arms.items()},
+            arm: trajectory,
+        }
+        self._numbers = np.array([checker.pairs.index(pair) for pair in pairs], dtype=np.intp)
+        self._last = round(trajectory.duration / cell.period)
+        # What overlaps from the start, and was not pressed in, counts from there on.
+        self._free = np.zeros(len(pairs))
+        start = np.maximum(self._depths(np.zeros(1))[0], 0.0) if pairs else self._free
+        self._free = np.where([pair in pressed for pair in pairs], 0.0, start)
+
+    def _depths(self, times: Array) -> Array:
+        """Return how deep each pair overlaps at some times, (t, k) [m]; below 0 where it does not."""
+        distances = self._checker.distances_at(self._motions, times, self._numbers, _TOUCH)
+        return np.asarray(-distances - self._free)
+
+    def course(self, now: float, *, guarded: bool) -> ContactCourse:
+        """Return the contacts, until one is deeper than it may be."""
+        ticks: dict[int, Pressing] = {}
+        first: float | None = None
+        excess: int | None = None
+        tick: int | None = 0
+        if self._pairs and (self._depths(np.zeros(1)) <= 0).all():
+            first, tick = self._next_contact(0)
+        allowed = self._cell.contact.max_depth
+        while self._pairs and tick is not None and excess is None:
+            numbers = np.arange(tick, min(tick + _BLOCK, self._last + 1))
+            depths = self._depths(np.minimum(numbers * self._cell.period, self._trajectory.duration))
+            for number, row in zip(numbers.tolist(), depths, strict=True):
+                if row.max() <= 0:
+                    tick = self._next_contact(number)[1]
+                    break
+                ticks[number] = self._pressing(number, row)
+                allowed = max(allowed, ticks[0].depth) if 0 in ticks else allowed
+                if row.max() > allowed + _TOUCH:
+                    excess = number
+                    break
+                tick = number + 1 if number < self._last else None
+        return ContactCourse(
+            guarded=guarded,
+            t0=now,
+            ticks=ticks,
+            last_tick=self._last if excess is None else excess,
+            first_contact=None if first is None or not guarded else now + first,
+            excess_tick=excess,
+        )
+
+    def _next_contact(self, tick: int) -> tuple[float | None, int | None]:
+        """Return when something is touched after a tick [s], and the first tick in contact; None where nothing is."""
+        period, duration = self._cell.period, self._trajectory.duration
+        margins = -(self._free + _TOUCH)
+        window = Window(min(tick * period, duration), duration, self._numbers, margins)
+        met = self._checker.first_contact(self._motions, windows=[window])
+        if met is None:
+            return None, None
+        place = self._pairs.index(met.bodies)
+
+        def depth(time: float) -> float:
+            return float(self._depths(np.array([time]))[0, place])
+
+        before = math.floor(met.time / period)
+        while before > tick and depth(before * period) > 0:
+            before -= 1
+        if depth(before * period) > 0:
+            return before * period, before
+        from scipy.optimize import brentq  # noqa: PLC0415 - half of what a run would import, and few touch anything
+
+        time = float(brentq(depth, before * period, met.time, xtol=_TIME_TOLERANCE))
+        return time, min(before + 1, self._last)
+
+    def _pressing(self, tick: int, depths: Array) -> Pressing:
+        """Return what is pressed on at a tick at which pairs overlap so deep (k,) [m]."""
+        time = min(tick * self._cell.period, self._trajectory.duration)
+        deepest = int(depths.argmax())
+        places = [deepest, *(place for place in np.flatnonzero(depths > 0).tolist() if place != deepest)]
+        contacts = [self._contact(time, self._pairs[place], float(depths[place])) for place in places]
+        normal = contacts[0][1]
+        alike = [number for number, (_, other) in enumerate(contacts) if other @ normal >= _SAME_NORMAL]
+        weights = depths[[places[number] for number in alike]]
+        centre = weights @ np.array([contacts[number][0] for number in alike]) / weights.sum()
+        placed = self._cell.arms[self._arm]
+        tool = (placed.base @ forward(placed.arm, self._trajectory(time)))[:3, 3]
+        force = self._cell.contact.stiffness * depths[deepest] * normal
+        return Pressing(
+            depth=float(depths[deepest]),
+            wrench=np.concatenate([force, np.cross(centre - tool, force)]),
+            body=self._checker.bodies[self._pairs[deepest][1]].name,
+            pairs=frozenset(self._pairs[place] for place in places),
+        )
+
+    def _contact(self, time: float, pair: Pair, depth: float) -> tuple[Array, Array]:
+        """Return where two bodies press on each other (3,) [m], and the direction (3,) in which the tool is pushed."""
+        own, other = self._checker.nearest_points(self._motions, time, pair)
+        normal = (other - own) / np.linalg.norm(other - own)
+        poses = self._checker.poses_at(self._motions, time, pair)
+        centres = [
+            _pressed_centre(self._checker.bodies[body], X, direction, depth)
+            for body, X, direction in zip(pair, poses, (-normal, normal), strict=True)
+        ]
+        # The smaller of both surfaces is that of the contact.
+        return min(centres, key=lambda it: it[1])[0], normal
+
+
+def _pressed_centre(body: Body, X: Array, direction: Array, depth: float) -> tuple[Array, float]:
+    """Return the centre (3,) of what of a body is pressed in [m], and its radius.
+
+    Args:
+        body: the body.
+        X: (4, 4) its pose in the world.
+        direction: (3,) into what it presses on, in the world.
+        depth: how deep it presses [m].
+    """
+    points = _outermost(body.solid.shape, X[:3, :3].T @ direction) @ X[:3, :3].T + X[:3, 3]
+    heights = points @ direction
+    weights = np.maximum(heights - heights.max() + depth, 0.0)
+    centre = weights @ points / weights.sum()
+    return centre, float(np.linalg.norm(points[weights > 0] - centre, axis=1).max())
+
+
+def _outermost(shape: Shape, direction: Array) -> Array:
+    """Return points (k, 3) of a solid among which those are that reach farthest in a direction (3,) [m]."""
+    match shape:
+        case Box(size=size):
+            return np.array(np.meshgrid(*np.outer((-0.5, 0.5), size).T)).reshape(3, -1).T
+        case Cylinder(radius=radius, length=length):
+            angles = np.arange(_RIM) * (2 * math.pi / _RIM) + math.atan2(direction[1], direction[0])
+            rim = np.stack([radius * np.cos(angles), radius * np.sin(angles)], axis=1)
+            return np.concatenate([np.insert(rim, 2, z, axis=1) for z in (-length / 2, length / 2)])
+        case Capsule(radius=radius, length=length):
+            return np.array([(0.0, 0.0, -length / 2), (0.0, 0.0, length / 2)]) + radius * direction
+        case Sphere(radius=radius):
+            return (radius * direction)[None]
+        case Mesh(vertices=vertices):
+            return np.asarray(vertices)
