@@ -164,8 +164,8 @@ def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
     for later, local in ((4.5, 1.5), (5.0, 2.0), (60.0, 2.0)):
         np.testing.assert_array_equal(hardware.configuration("ARM_1", later), motion(local))
         depth = plane - (X_WB @ forward(arm, motion(local)))[2, 3]
-        np.testing.assert_allclose(hardware.contact_wrench("ARM_1", later), (0, 0, 1000 * depth), atol=1e-6)
-        np.testing.assert_allclose(hardware.peak_contact("ARM_1", later), (depth, 1000 * depth), atol=1e-9)
+        np.testing.assert_allclose(hardware.contact_wrench("ARM_1", later), (0, 0, 1000 * depth, 0, 0, 0), atol=1e-6)
+        np.testing.assert_allclose(hardware.peak_contact("ARM_1", later)[:2], (depth, 1000 * depth), atol=1e-9)
     # Deeper than 5 mm it has come on the first tick at which it is.
     heights = np.array([(X_WB @ forward(arm, motion(k * 1e-3)))[2, 3] for k in range(2001)])
     assert hardware.excess_depth_time("ARM_1") == pytest.approx(3.0 + np.flatnonzero(heights < plane - 5e-3)[0] * 1e-3)
@@ -175,7 +175,7 @@ def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
     assert hardware.contact_time("ARM_1") is None
     assert hardware.excess_depth_time("ARM_1") is None
     depth = plane - (X_WB @ forward(arm, motion(1.5)))[2, 3]
-    np.testing.assert_allclose(hardware.contact_wrench("ARM_1", 60.5), (0, 0, 1000 * depth), atol=1e-6)
+    np.testing.assert_allclose(hardware.contact_wrench("ARM_1", 60.5), (0, 0, 1000 * depth, 0, 0, 0), atol=1e-6)
     assert not hardware.contact_wrench("ARM_1", 61.001).any()
 
 

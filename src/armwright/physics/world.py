@@ -166,7 +166,7 @@ class PhysicsCell:
         data = self._data
         for name, servo in self._servos.items():
             reference, drive = self._sent[name].at(self._tick), self._watch.hands[name].drive
-            servo.load = self._watch.known_load(name)
+            servo.load, servo.leaning = self._watch.known_load(name), self._watch.hands[name].guarded
             try:
                 measured = servo.drive(data, self.now, reference)
             except InvalidValueError:
