@@ -67,9 +67,12 @@ def test_a_weight_at_a_lever(sample: Sample, tmp_path: Path, *, known: bool) -> 
     cell, world, _ = carrying(tmp_path, known=known)
     arm, now = cell.arms["ARM_1"].arm, world.now
     weight, worst = np.array([0.0, 0.0, -MASS * STANDARD_GRAVITY]), 0.0
+    home = world.sent_configuration("ARM_1", now)
     for rng in sample.cases(20):
         q = world.sent_configuration("ARM_1", now)
-        goal = np.clip(q + rng.uniform(-0.15, 0.15, arm.n) * (1, 1, 0.3, 1, 1, 1), arm.limits.lower, arm.limits.upper)
+        goal = np.clip(
+            home + rng.uniform(-0.15, 0.15, arm.n) * (1, 1, 0.3, 1, 1, 1), arm.limits.lower, arm.limits.upper
+        )
         world.start_motion("ARM_1", quintic(q, goal, 1.5), now, np.eye(4))
         now += 2.5
         assert world.advance(now) is None
@@ -100,14 +103,11 @@ def test_a_part_that_is_heavier_than_known(tmp_path: Path) -> None:
 
 def test_errors_of_the_sensor(tmp_path: Path, rng: np.random.Generator) -> None:
     """Forces and moments have noise and constant errors of their own, and one reading in each period of the sensor."""
+    gripper = "gripper = { force_N = 30 }\n"
     cell = bench(
         tmp_path,
         "stanford",
-        (
-            "gripper = { force_N = 30 }\n",
-            "gripper = { force_N = 30 }\n"
-            "force = { rate_hz = 100, noise_N = 1, bias_N = 0.5, noise_Nm = 0.1, bias_Nm = -0.2 }\n",
-        ),
+        (gripper, gripper + "force = { rate_hz = 100, noise_N = 1, bias_N = 0.5, noise_Nm = 0.1, bias_Nm = -0.2 }\n"),
     )
     world = PhysicsCell(attrs.evolve(cell, cameras={}), seed=int(rng.integers(1000)))
     readings = []
@@ -131,7 +131,7 @@ def test_errors_of_the_sensor(tmp_path: Path, rng: np.random.Generator) -> None:
 
 
 def test_zero_force(tmp_path: Path) -> None:
-    """After ZERO FORCE the sensor reads changes: a part in the hand is gone, and its weight upwards once it is let go."""
+    """After ZERO FORCE the sensor reads changes: a held part weighs nothing, and upwards once it is let go."""
     program = (
         "  PRINT(FORCE(Z), TORQUE(X)) ;\n  ZERO FORCE ARM_1 ;\n  PRINT(FORCE(Z), TORQUE(X)) ;\n"
         "  OPEN ARM_1 ;\n  PAUSE 0.5 ;\n  PRINT(FORCE(Z), TORQUE(X)) ;\n  ZERO FORCE ARM_1 ;\n  PRINT(FORCE(Z)) ;\n"
@@ -165,7 +165,8 @@ def test_the_plane_is_a_spring(sample: Sample, tmp_path: Path) -> None:
         where = f"1,0,0, 0,-1,0, 0,0,-1, {rng.uniform(0.4, 0.5):.4f},{rng.uniform(-0.1, 0.1):.4f}"
         program = (
             f"VAR low, up : FRAME ; BEGIN up = ({where},{height + 0.02:.6f}) ; low = ({where},{height - aim:.6f}) ;\n"
-            "MOVE ARM_1 TO up ; MOVE ARM_1 TO low STRAIGHTLY, WITH SPEED = 10, ON FORCE(Z) > 1000 DO HALT ; PAUSE 2 END."
+            "MOVE ARM_1 TO up ;\n"
+            "MOVE ARM_1 TO low STRAIGHTLY, WITH SPEED = 10, ON FORCE(Z) > 1000 DO HALT ; PAUSE 2 END."
         )
 
         interpret(compiled(cell, program).code, cell, world)
