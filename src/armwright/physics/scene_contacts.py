@@ -17,10 +17,10 @@ from armwright.cell.contact_course import ContactCourse, Pair, Pressing
 from armwright.cell.model import Cell
 from armwright.cell.part_poses import PartPoses
 from armwright.cell.simulator import Simulator
-from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics.clearance import Body, ClearanceChecker, Window
 from armwright.physics.collisions import CellCollisions
+from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 
 # A contact that becomes no deeper than this is none, as of what stands on something [m].
@@ -31,8 +31,8 @@ _BLOCK = 32
 _RIM = 16
 # Contacts whose normals are so near that of the deepest press together: cosine of the angle.
 _SAME_NORMAL = 0.9
-# Time of a first contact [s].
-_TIME_TOLERANCE = 1e-10
+# Time of a first contact [ticks].
+_TIME_TOLERANCE = 1e-8
 
 
 def kinematic_cell(cell: Cell) -> Simulator:
@@ -87,17 +87,28 @@ class _ToolMotion:
             **{name: hold(other.start, 0.0) for name, other in cell.arms.items()},
             arm: trajectory,
         }
-        self._numbers = np.array([checker.pairs.index(pair) for pair in pairs], dtype=np.intp)
+        numbers = {pair: number for number, pair in enumerate(checker.pairs)}
+        self._numbers = np.array([numbers[pair] for pair in pairs], dtype=np.intp)
         self._last = round(trajectory.duration / cell.period)
         # What overlaps from the start, and was not pressed in, counts from there on.
         self._free = np.zeros(len(pairs))
-        start = np.maximum(self._depths(np.zeros(1))[0], 0.0) if pairs else self._free
-        self._free = np.where([pair in pressed for pair in pairs], 0.0, start)
+        start = self._depths(self._poses(np.zeros(1))[0])
+        self._free = np.where([pair in pressed for pair in pairs], 0.0, np.maximum(start, 0.0))
 
-    def _depths(self, times: Array) -> Array:
-        """Return how deep each pair overlaps at some times, (t, k) [m]; below 0 where it does not."""
-        distances = self._checker.distances_at(self._motions, times, self._numbers, _TOUCH)
-        return np.asarray(-distances - self._free)
+    def _poses(self, ticks: Array) -> Array:
+        """Return the poses (t, b, 4, 4) of all bodies at some ticks, which may be between two."""
+        times = np.minimum(ticks * self._cell.period, self._trajectory.duration)
+        return self._checker.poses(self._motions, times)
+
+    def _depths(self, poses: Array) -> Array:
+        """Return how deep each pair overlaps, (k,) [m], below 0 where it does not, where all bodies are (b, 4, 4)."""
+        solids, radii, depths = self._checker.distances, self._checker.radii, np.full(len(self._pairs), -_TOUCH)
+        for place, (own, other) in enumerate(self._pairs):
+            if np.linalg.norm(poses[own, :3, 3] - poses[other, :3, 3]) < radii[own] + radii[other] + _TOUCH:
+                solids.place(own, poses[own])
+                solids.place(other, poses[other])
+                depths[place] = -solids.between(own, other, _TOUCH)
+        return np.asarray(depths - self._free)
 
     def course(self, now: float, *, guarded: bool) -> ContactCourse:
         """Return the contacts, until one is deeper than it may be."""
@@ -105,17 +116,17 @@ class _ToolMotion:
         first: float | None = None
         excess: int | None = None
         tick: int | None = 0
-        if self._pairs and (self._depths(np.zeros(1)) <= 0).all():
+        if self._pairs and (self._depths(self._poses(np.zeros(1))[0]) <= 0).all():
             first, tick = self._next_contact(0)
         allowed = self._cell.contact.max_depth
         while self._pairs and tick is not None and excess is None:
-            numbers = np.arange(tick, min(tick + _BLOCK, self._last + 1))
-            depths = self._depths(np.minimum(numbers * self._cell.period, self._trajectory.duration))
-            for number, row in zip(numbers.tolist(), depths, strict=True):
+            numbers = range(tick, min(tick + _BLOCK, self._last + 1))
+            for number, poses in zip(numbers, self._poses(np.array(numbers, dtype=np.float64)), strict=True):
+                row = self._depths(poses)
                 if row.max() <= 0:
                     tick = self._next_contact(number)[1]
                     break
-                ticks[number] = self._pressing(number, row)
+                ticks[number] = self._pressing(poses, row)
                 allowed = max(allowed, ticks[0].depth) if 0 in ticks else allowed
                 if row.max() > allowed + _TOUCH:
                     excess = number
@@ -140,47 +151,53 @@ class _ToolMotion:
             return None, None
         place = self._pairs.index(met.bodies)
 
-        def depth(time: float) -> float:
-            return float(self._depths(np.array([time]))[0, place])
+        def depth(tick: float) -> float:
+            return float(self._depths(self._poses(np.array([tick]))[0])[place])
 
         before = math.floor(met.time / period)
-        while before > tick and depth(before * period) > 0:
+        while before > tick and depth(before) > 0:
             before -= 1
-        if depth(before * period) > 0:
+        if depth(before) > 0:
             return before * period, before
         from scipy.optimize import brentq  # noqa: PLC0415 - half of what a run would import, and few touch anything
 
-        time = float(brentq(depth, before * period, met.time, xtol=_TIME_TOLERANCE))
+        time = period * float(brentq(depth, before, met.time / period, xtol=_TIME_TOLERANCE))
         return time, min(before + 1, self._last)
 
-    def _pressing(self, tick: int, depths: Array) -> Pressing:
-        """Return what is pressed on at a tick at which pairs overlap so deep (k,) [m]."""
-        time = min(tick * self._cell.period, self._trajectory.duration)
+    def _pressing(self, poses: Array, depths: Array) -> Pressing:
+        """Return what is pressed on where all bodies are (b, 4, 4) and pairs overlap so deep (k,) [m]."""
         deepest = int(depths.argmax())
         places = [deepest, *(place for place in np.flatnonzero(depths > 0).tolist() if place != deepest)]
-        contacts = [self._contact(time, self._pairs[place], float(depths[place])) for place in places]
+        contacts = [self._contact(poses, self._pairs[place], float(depths[place])) for place in places]
         normal = contacts[0][1]
         alike = [number for number, (_, other) in enumerate(contacts) if other @ normal >= _SAME_NORMAL]
         weights = depths[[places[number] for number in alike]]
         centre = weights @ np.array([contacts[number][0] for number in alike]) / weights.sum()
-        placed = self._cell.arms[self._arm]
-        tool = (placed.base @ forward(placed.arm, self._trajectory(time)))[:3, 3]
         force = self._cell.contact.stiffness * depths[deepest] * normal
         return Pressing(
             depth=float(depths[deepest]),
-            wrench=np.concatenate([force, np.cross(centre - tool, force)]),
+            wrench=np.concatenate([force, np.cross(centre - self._tool_point(poses), force)]),
             body=self._checker.bodies[self._pairs[deepest][1]].name,
             pairs=frozenset(self._pairs[place] for place in places),
         )
 
-    def _contact(self, time: float, pair: Pair, depth: float) -> tuple[Array, Array]:
+    def _tool_point(self, poses: Array) -> Array:
+        """Return the tool point (3,) where all bodies are (b, 4, 4) [m]."""
+        own = self._pairs[0][0]
+        X_LB = self._checker.bodies[own].solid.pose
+        X_WT = poses[own] @ inverse(X_LB) @ self._cell.arms[self._arm].arm.tool
+        return np.asarray(X_WT[:3, 3])
+
+    def _contact(self, poses: Array, pair: Pair, depth: float) -> tuple[Array, Array]:
         """Return where two bodies press on each other (3,) [m], and the direction (3,) in which the tool is pushed."""
-        own, other = self._checker.nearest_points(self._motions, time, pair)
+        solids = self._checker.distances
+        for body in pair:
+            solids.place(body, poses[body])
+        own, other = solids.nearest(*pair, within=_TOUCH).points
         normal = (other - own) / np.linalg.norm(other - own)
-        poses = self._checker.poses_at(self._motions, time, pair)
         centres = [
-            _pressed_centre(self._checker.bodies[body], X, direction, depth)
-            for body, X, direction in zip(pair, poses, (-normal, normal), strict=True)
+            _pressed_centre(self._checker.bodies[body], poses[body], direction, depth)
+            for body, direction in zip(pair, (-normal, normal), strict=True)
         ]
         # The smaller of both surfaces is that of the contact.
         return min(centres, key=lambda it: it[1])[0], normal
