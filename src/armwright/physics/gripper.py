@@ -33,8 +33,8 @@ _INSIDE = 0.01
 # A soft constraint of one geom with what it touches: rolling and torsional friction are small.
 _ROLLING = (0.005, 1e-4)
 _STIFF = (0.95, 0.99, 0.001, 0.5, 2.0)
-# Contacts of pads with what they do not hold: time constant [s] and damping; from 0 to full stiffness within 2 mm.
-_TOUCH, _YIELDING = (0.01, 1.0), (0.01, 0.95, 0.002, 0.5, 1.0)
+# Contacts of pads with what they do not hold: time constant [s] and damping; from 0 to full stiffness within 3 mm.
+_TOUCH, _YIELDING = (5e-3, 1.0), (0.01, 0.9, 0.003, 0.5, 1.0)
 
 
 def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, **geoms: Any) -> None:
