@@ -60,7 +60,7 @@ def text_of(at: tuple[float, float], top: float, speed: float, force: float, bef
         f"{before}  up = ({where},{top + 0.03:.6f}) ; low = ({where},{top - 0.03:.6f}) ;\n"
         "  MOVE ARM_1 TO up ;\n  ZERO FORCE ARM_1 ;\n"
         f"  MOVE ARM_1 TO low STRAIGHTLY, WITH SPEED = {speed:.3f},\n"
-        f"    ON FORCE(Z) > {force:.3f} DO BEGIN hit = 1 ; PRINT(\"hit\") ; HALT END ;\n"
+        f'    ON FORCE(Z) > {force:.3f} DO BEGIN hit = 1 ; PRINT("hit") ; HALT END ;\n'
         "  PRINT(hit) ;\n  PAUSE 0.5 ;\n  MOVE ARM_1 TO up STRAIGHTLY ;\nEND.\n"
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from typing import Protocol, TypeAlias
 
 import attrs
@@ -42,7 +43,8 @@ class ContactCourse:
     Attributes:
         guarded: whether all contacts count; otherwise only those at the start.
         t0: when the motion began, on the clock of the cell [s].
-        ticks: what is pressed on, by the tick since then; nothing at all others.
+        ticks: since then, in order, from each of which on another thing is pressed on, or otherwise.
+        pressings: what is pressed on from each of these ticks on; before the first it is nothing.
         last_tick: what is pressed on then stays.
         first_contact: when the motion comes down on something [s], on the clock of the cell; None where it does not.
         excess_tick: the first tick at which it is deeper than it may be; None where it never is.
@@ -50,7 +52,8 @@ class ContactCourse:
 
     guarded: bool
     t0: float
-    ticks: dict[int, Pressing]
+    ticks: tuple[int, ...]
+    pressings: tuple[Pressing, ...]
     last_tick: int
     first_contact: float | None
     excess_tick: int | None
@@ -61,12 +64,20 @@ class ContactCourse:
 
     def at(self, now: float, period: float) -> Pressing:
         """Return what is pressed on at a time [s] on the clock of the cell."""
-        return self.ticks.get(self.tick(now, period), NOTHING)
+        count = bisect_right(self.ticks, self.tick(now, period))
+        return self.pressings[count - 1] if count else NOTHING
 
     def deepest(self, now: float, period: float) -> Pressing:
         """Return the deepest contact until a time [s] on the clock of the cell."""
-        end = self.tick(now, period)
-        return max((it for tick, it in self.ticks.items() if tick <= end), key=lambda it: it.depth, default=NOTHING)
+        count = bisect_right(self.ticks, self.tick(now, period))
+        return max(self.pressings[:count], key=lambda it: it.depth, default=NOTHING)
+
+    def wrenches(self, now: float, period: float) -> Array:
+        """Return the wrenches (k, 6) at the tick of a time [s] and the following ones; the last one remains."""
+        start = self.tick(now, period)
+        known = np.array([NOTHING.wrench, *(pressing.wrench for pressing in self.pressings)])
+        numbers = np.arange(start, max((start, *self.ticks[-1:])) + 1)
+        return np.asarray(known[np.searchsorted(self.ticks, numbers, side="right")])
 
 
 class SceneContacts(Protocol):

@@ -216,13 +216,8 @@ class Simulator:
 
     def _scene_wrenches(self, arm: str, now: float) -> Array:
         """Return the wrenches (k, 6) of the scene on a tool at this tick and the following ones, in the base."""
-        course, R_BW = self._courses[arm], self._cell.arms[arm].base[:3, :3].T
-        start = course.tick(now, self._cell.period)
-        wrenches = np.zeros((course.last_tick - start + 1, 2, 3))
-        for tick, pressing in course.ticks.items():
-            if tick >= start:
-                wrenches[tick - start] = pressing.wrench.reshape(2, 3) @ R_BW.T
-        return wrenches.reshape(-1, 6)
+        wrenches = self._courses[arm].wrenches(now, self._cell.period)
+        return (wrenches.reshape(-1, 3) @ self._cell.arms[arm].base[:3, :3]).reshape(-1, 6)
 
     def _depth(self, arm: str, point: _ContactPoint, now: float) -> float:
         """Return the depth of a point in the plane [m]."""

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.contact_course import ContactCourse, Pair, Pressing
+from armwright.cell.contact_course import NOTHING, ContactCourse, Pair, Pressing
 from armwright.cell.model import Cell
 from armwright.cell.part_poses import PartPoses
 from armwright.cell.simulator import Simulator
@@ -27,6 +27,8 @@ from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 _TOUCH = 1e-5
 # Ticks that are computed together.
 _BLOCK = 32
+# Ticks of a contact that are looked at, about.
+_MAX_TICKS = 20_000
 # Points of the rim of a cylinder.
 _RIM = 16
 # Contacts whose normals are so near that of the deepest press together: cosine of the angle.
@@ -112,7 +114,8 @@ class _ToolMotion:
 
     def course(self, now: float, *, guarded: bool) -> ContactCourse:
         """Return the contacts, until one is deeper than it may be."""
-        ticks: dict[int, Pressing] = {}
+        ticks: list[int] = []
+        pressings: list[Pressing] = []
         first: float | None = None
         excess: int | None = None
         tick: int | None = 0
@@ -120,22 +123,27 @@ class _ToolMotion:
             first, tick = self._next_contact(0)
         allowed = self._cell.contact.max_depth
         while self._pairs and tick is not None and excess is None:
-            numbers = range(tick, min(tick + _BLOCK, self._last + 1))
+            # Of a very long contact not every tick is looked at.
+            stride = 1 + (self._last - tick) // _MAX_TICKS
+            numbers = range(tick, min(tick + stride * _BLOCK, self._last + 1), stride)
             for number, poses in zip(numbers, self._poses(np.array(numbers, dtype=np.float64)), strict=True):
                 row = self._depths(poses)
+                ticks.append(number)
+                pressings.append(self._pressing(poses, row) if row.max() > 0 else NOTHING)
                 if row.max() <= 0:
                     tick = self._next_contact(number)[1]
                     break
-                ticks[number] = self._pressing(poses, row)
-                allowed = max(allowed, ticks[0].depth) if 0 in ticks else allowed
+                if not number:
+                    allowed = max(allowed, pressings[0].depth)
                 if row.max() > allowed + _TOUCH:
                     excess = number
                     break
-                tick = number + 1 if number < self._last else None
+                tick = min(number + stride, self._last) if number < self._last else None
         return ContactCourse(
             guarded=guarded,
             t0=now,
-            ticks=ticks,
+            ticks=tuple(ticks),
+            pressings=tuple(pressings),
             last_tick=self._last if excess is None else excess,
             first_contact=None if first is None or not guarded else now + first,
             excess_tick=excess,
