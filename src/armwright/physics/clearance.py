@@ -24,8 +24,9 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.motion.trajectory import Trajectory
+from armwright.physics.cell_bodies import Body
 from armwright.physics.distances import TOLERANCE, Distances
-from armwright.spatial.shapes import Solid, farthest
+from armwright.spatial.shapes import farthest
 
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
@@ -39,22 +40,6 @@ _CLOSEST_FIRST = 64
 _PART_OF_DISTANCE, _PART_OF_OVERLAP = 0.1, 0.1
 # Farther apart no two bodies of a cell are [m].
 _FAR = 1e4
-
-
-class Body(NamedTuple):
-    """A solid of a cell.
-
-    Attributes:
-        name: in messages.
-        solid: in the frame of the link that carries it; in the world where none does.
-        arm: the arm that carries it; None where it stands.
-        link: of the arm, from 1; 0 is its base.
-    """
-
-    name: str
-    solid: Solid
-    arm: str | None = None
-    link: int = 0
 
 
 class LinkPoses(Protocol):

@@ -17,12 +17,13 @@ from armwright.cell.part_poses import PartPoses
 from armwright.compiled.arm import planning_arm
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.trajectory import Trajectory, hold
-from armwright.physics.cell_bodies import has_solids
-from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, Closest, PlacedArm, Window
+from armwright.physics.cell_bodies import Body, has_solids
+from armwright.physics.clearance import RESOLUTION, ClearanceChecker, Closest, PlacedArm, Window
 from armwright.physics.joint_space import Margins
 from armwright.physics.placed_bodies import CellBodies, Role
+from armwright.physics.planned_move import PlannedMove
 from armwright.physics.planner import PlannedPath, plan_path
-from armwright.physics.wanted_contacts import PlannedMove, Surroundings, WantedContacts
+from armwright.physics.wanted_contacts import Surroundings, WantedContacts
 
 # Larger distances are not looked for [m].
 LOOKED_FOR = 0.05

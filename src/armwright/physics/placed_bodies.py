@@ -9,8 +9,7 @@ import attrs
 
 from armwright.cell.model import Cell, CellArm
 from armwright.cell.part_poses import PartPoses
-from armwright.physics.cell_bodies import arm_bodies, has_solids
-from armwright.physics.clearance import Body
+from armwright.physics.cell_bodies import Body, arm_bodies, has_solids
 from armwright.physics.hand_solids import gripper_solids
 from armwright.physics.self_collision import self_pairs
 from armwright.spatial.shapes import Solid, convex_solids

@@ -18,7 +18,7 @@ from armwright.arrays import Array
 from armwright.dynamics.arguments import weighed
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.physics.clearance import Body
+from armwright.physics.cell_bodies import Body
 from armwright.physics.geoms import add_geom, place, quaternion
 from armwright.physics.graphics import load_mujoco
 from armwright.spatial.poses import inverse

@@ -23,8 +23,8 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import ranges
 from armwright.arrays import Array, Flags
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.physics.cell_bodies import arm_bodies
-from armwright.physics.clearance import RESOLUTION, Body
+from armwright.physics.cell_bodies import Body, arm_bodies
+from armwright.physics.clearance import RESOLUTION
 from armwright.physics.distances import Distances
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, farthest
 

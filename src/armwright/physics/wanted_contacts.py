@@ -14,15 +14,16 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.trajectory import Trajectory, join
-from armwright.physics.clearance import Body, ClearanceChecker, Closest, Numbers, Window
+from armwright.motion.trajectory import Trajectory
+from armwright.physics.cell_bodies import Body
+from armwright.physics.clearance import ClearanceChecker, Closest, Numbers, Window
 from armwright.physics.placed_bodies import Role
+from armwright.physics.planned_move import PlannedMove
 
 # How deep a held part may touch what it stands on, and on which length of the path [m].
 REST_DEPTH, REST_LENGTH = 0.5e-3, 0.01
@@ -34,30 +35,6 @@ _LOOKS = 201
 _STANDS = 1e-3
 # Moments that are looked at together.
 _BLOCK = 32
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class PlannedMove:
-    """A MOVE before it begins.
-
-    Attributes:
-        arm: the arm.
-        stages: its trajectories, one after the other.
-        goal_part: the part that it goes to, to be grasped; None where it goes to none.
-        after_force: whether the tool may still press on something, because a force ended the MOVE before.
-        on_force: whether a force ends this one.
-    """
-
-    arm: str
-    stages: tuple[Trajectory, ...]
-    goal_part: str | None = None
-    after_force: bool = False
-    on_force: bool = False
-
-    @cached_property
-    def trajectory(self) -> Trajectory:
-        """All stages as one motion."""
-        return join(self.stages)
 
 
 class Surroundings(NamedTuple):

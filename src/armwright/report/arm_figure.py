@@ -12,8 +12,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.scene import Gripper
-from armwright.physics.cell_bodies import arm_bodies
-from armwright.physics.clearance import Body as SolidBody
+from armwright.physics.cell_bodies import Body as SolidBody, arm_bodies
 from armwright.physics.hand_solids import gripper_length, gripper_solids
 from armwright.report.animation import ArmFigure, Body, ChainJoint
 from armwright.report.shape_table import ShapeTable

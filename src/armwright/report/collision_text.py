@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from armwright.physics.collisions import LOOKED_FOR, CheckedBodies, StageClearance
 from armwright.program.vm.recording import Recording
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import CheckedBodies, StageClearance
 
 # The text wherever a motion is reported whose collisions are not checked.
 NOT_CHECKED = "not checked"
@@ -30,6 +32,8 @@ def _least(recording: Recording) -> str:
         if run.clearance is not None and run.clearance.distance is not None
     ]
     if not near:
+        from armwright.physics.collisions import LOOKED_FOR  # noqa: PLC0415 - of cells with bodies
+
         return f"no arm comes within {LOOKED_FOR * 1e3:g} mm of another body"
     distance, run, clearance = min(near, key=lambda entry: entry[0])
     own, other = clearance.bodies

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -12,15 +13,16 @@ from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory, hold, join
-from armwright.physics.collisions import Collision, MoveCheck
-from armwright.physics.planner import PlannedPath
-from armwright.physics.wanted_contacts import PlannedMove
+from armwright.physics.planned_move import PlannedMove
 from armwright.program.language.source import Span
 from armwright.program.vm.machine import Machine, RunError
 from armwright.program.vm.move_diagnostics import collision_advice, collision_location, collision_message
 from armwright.program.vm.move_request import MoveRequest
-from armwright.program.vm.planned_paths import can_be_passed, replanned
 from armwright.program.vm.process import Motion, PendingStage, Process, Threat
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import Collision, MoveCheck
+    from armwright.physics.planner import PlannedPath
 
 # A motion that has so little left is over [s].
 _ROUNDING = 1e-9
@@ -47,6 +49,8 @@ def checked_stages(
     collisions = machine.collisions
     if collisions is None:
         return stages
+    from armwright.program.vm.planned_paths import can_be_passed, replanned  # noqa: PLC0415 - of cells with bodies
+
     hand = machine.state.hands[arm]
     move = PlannedMove(
         arm=arm,

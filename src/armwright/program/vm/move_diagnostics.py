@@ -1,6 +1,9 @@
 """Obstacles of motions and their detours, in the words of the program: poses, causes, costs."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,11 +12,12 @@ from armwright.arrays import Array
 from armwright.errors import counted
 from armwright.motion.detour import Detour
 from armwright.motion.plan import Obstacle
-from armwright.physics.clearance import RESOLUTION
-from armwright.physics.collisions import Collision
-from armwright.physics.planner import PlannedPath
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm.recording import RunStage
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import Collision
+    from armwright.physics.planner import PlannedPath
 
 CODES = {"reach": "E401", "limits": "E402", "singular": "E403"}
 _GOAL_MESSAGES = {
@@ -86,6 +90,8 @@ def collision_message(collision: Collision, goal: str, arm: str) -> str:
     where = "after it has arrived" if collision.at_rest else f"{collision.fraction * 100:.0f} % of the way there"
     meets = f"{other} would hit {own}" if collision.at_rest else f"{own} would hit {other}"
     if collision.depth <= 0:
+        from armwright.physics.clearance import RESOLUTION  # noqa: PLC0415 - of few runs
+
         near = f"nearer than {RESOLUTION * 1e3:g} mm, which counts as a hit"
         return f"`{goal}` cannot be reached by {arm} on this path: {own} would come to {other} {where}, {near}"
     return f"`{goal}` cannot be reached by {arm} on this path: {meets} {where}, {deep}"
