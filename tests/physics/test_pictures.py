@@ -11,7 +11,7 @@ import pytest
 
 from armwright.cell.scene import Camera
 from armwright.errors import MissingExtraError, OutputError
-from armwright.physics.graphics import graphics, load_mujoco
+from armwright.mujoco_library import graphics, load_mujoco
 from armwright.physics.pictures import Photographer, add_camera, camera_pose, png, save_picture
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import homogeneous

@@ -43,7 +43,7 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
         packages: folders of packages, by name, in which the meshes of a URDF file are.
 
     Raises:
-        MissingExtraError: the file is URDF or MJCF, and lxml or MuJoCo is not installed.
+        MissingExtraError: the file is URDF, and lxml is not installed, or MJCF, and MuJoCo cannot be loaded.
         KindError: the name is neither a text nor a path.
         UnknownNameError: the catalogue has no such arm; the nearest is named.
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.geoms import add_geom
-from armwright.physics.graphics import load_mujoco
 from armwright.spatial.shapes import Shape, Solid
 
 # Distances between convex solids are found by iteration, to this [m].
@@ -41,7 +41,6 @@ class Distances:
             shapes: of the solids, in the order of their numbers.
         """
         mujoco = load_mujoco()
-
         self._mujoco = mujoco
         spec = mujoco.MjSpec()
         spec.option.ccd_tolerance = TOLERANCE

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.mujoco_library import load_mujoco
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 
 # Of a rotation matrix, that it is the identity.
@@ -15,8 +16,7 @@ _ROUNDING = 1e-15
 
 def quaternion(R: Array) -> Array:
     """Return the unit quaternion (4,) wxyz of a rotation (3, 3), as MuJoCo computes it."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     q = np.empty(4)
     mujoco.mju_mat2Quat(q, np.ascontiguousarray(R).reshape(9))
     return q
@@ -30,8 +30,7 @@ def place(X: Array) -> dict[str, Array]:
 
 def add_geom(spec: Any, body: Any, name: str, solid: Solid, **options: Any) -> Any:
     """Add a solid to a body of a specification, and return its geom; a mesh collides as its convex hull."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     kinds = mujoco.mjtGeom
     match solid.shape:
         case Box(size=size):

@@ -9,8 +9,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.scene import Marker
 from armwright.extras import import_extra
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.geoms import place
-from armwright.physics.graphics import load_mujoco
 
 # The sides of the black square in cells of the pattern, and of the white margin around it.
 CELLS, _MARGIN = 6, 1

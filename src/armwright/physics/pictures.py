@@ -14,8 +14,8 @@ from armwright.arrays import Array
 from armwright.cell.scene import Camera
 from armwright.errors import MissingExtraError
 from armwright.files.output import write_file
+from armwright.mujoco_library import graphics, load_mujoco
 from armwright.physics.geoms import quaternion
-from armwright.physics.graphics import graphics, load_mujoco
 from armwright.physics.markers import opencv
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import homogeneous

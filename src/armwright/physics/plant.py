@@ -18,9 +18,9 @@ from armwright.arrays import Array
 from armwright.dynamics.arguments import weighed
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import link_poses
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import Body
 from armwright.physics.geoms import add_geom, place, quaternion
-from armwright.physics.graphics import load_mujoco
 from armwright.spatial.poses import inverse
 
 # What MuJoCo's compiler takes as the least [kg], [kg m²].
@@ -91,7 +91,6 @@ def new_world(gravity: Array, timestep: float) -> Any:
         timestep: [s].
     """
     mujoco = load_mujoco()
-
     spec = mujoco.MjSpec()
     # Angles of joints are given in radians.
     spec.compiler.degree = False
@@ -105,8 +104,7 @@ def new_world(gravity: Array, timestep: float) -> Any:
 
 def finish(spec: Any, arms: tuple[PlantArm, ...]) -> Any:
     """Compile a world and give its arms the inertia that they have."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     model = spec.compile()
     if arms:
         for arm in arms:
@@ -129,8 +127,7 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
     Raises:
         UnsupportedArmError: masses are unknown, or a joint moves nothing that has any; the link is named.
     """
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     refuse_massless(weighed(arm))
     # Frames 0 to n and the tool, at zero positions, in the base frame.
     frames = link_poses(arm, np.zeros(arm.n))
@@ -185,8 +182,7 @@ def _add_joint(body: Any, name: str, joint: Joint, motor: Motor, before: Array) 
         motor: its drive.
         before: (4, 4) frame i-1 seen from the link's frame at zero position: the joint is about or along its z.
     """
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     kinds, limits = mujoco.mjtJoint, joint.limits
     added = body.add_joint(
         name=name,

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.scene import Camera
-from armwright.physics.graphics import load_mujoco
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.markers import marker_corners
 from armwright.physics.pictures import DRAWN_GROUPS, Picture, camera_pose
 from armwright.spatial.poses import homogeneous, inverse

@@ -12,6 +12,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.cell.scene import Part
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.geoms import add_geom, place, quaternion
 from armwright.physics.gripper import add_gripper, grip
@@ -139,8 +140,7 @@ def _add_standing(spec: Any, cell: Cell) -> None:
 
 def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
     """Add a floor on which parts fall that have been lost; nothing else meets it."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     things = [(fixture.pose, fixture.shape) for fixture in cell.fixtures.values()]
     things += [(part.pose, part.shape) for part in parts.values()]
     lowest = min([float(X[2, 3]) - farthest(shape) for X, shape in things], default=0.0)
@@ -185,8 +185,7 @@ def _add_part(spec: Any, part: Part, colour: tuple[float, ...]) -> None:
 
 def _add_plate(spec: Any, cell: Cell) -> None:
     """Add the plane of contact of the cell, if there is one: a light plate on a spring."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     plane = cell.contact
     if plane.height is None:
         return

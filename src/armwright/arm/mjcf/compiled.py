@@ -9,9 +9,9 @@ from typing import Any
 
 from armwright.arm.mjcf.elements import MjcfText, Node, path_below
 from armwright.errors import FileFormatError
-from armwright.extras import import_extra
 from armwright.files.inputs import read_bytes
 from armwright.files.limits import MEGABYTE, limit, limit_message
+from armwright.mujoco_library import load_mujoco
 
 _MESH_FILES = (".stl", ".obj")
 _LINE = re.compile(r"line (\d+)")
@@ -21,10 +21,10 @@ def compile_mjcf(path: Path, text: MjcfText) -> Any:
     """Return the model that MuJoCo makes of a text.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
+        MissingExtraError: MuJoCo cannot be loaded.
         FileFormatError: MuJoCo refuses the text, or a mesh file is missing or beyond a limit.
     """
-    mujoco = import_extra("mujoco", "reading MJCF", "physics", "mujoco-core")
+    mujoco = load_mujoco()
     try:
         spec = mujoco.MjSpec.from_string(text.text)
         spec.compiler.usethread = False

@@ -7,6 +7,7 @@ from typing import Any
 
 from armwright.arm.model import Limits, Motor
 from armwright.files.limits import limit
+from armwright.mujoco_library import load_mujoco
 
 # What MuJoCo takes as the largest number: a limit of this size says that there is none. Our own writer puts it there.
 NO_LIMIT = 1e10
@@ -20,8 +21,7 @@ def limits_of(model: Any, joint: int, name: str) -> tuple[Limits, list[str]]:
         joint: its number.
         name: its name, for the sentences.
     """
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     ends, notes = (-math.inf, math.inf), []
     if model.jnt_limited[joint]:
         most = limit("revolutions") * math.tau if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE else NO_LIMIT
@@ -87,8 +87,7 @@ def motor_of(model: Any, joint: int, name: str) -> tuple[Motor, list[str]]:
         joint: its number.
         name: its name, for the sentences.
     """
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     dof = int(model.jnt_dofadr[joint])
     inertia, viscous = float(model.dof_armature[dof]), float(model.dof_damping[dof])
     for i in range(model.nu):
