@@ -79,13 +79,13 @@ def _mesh_files(spec: Any, path: Path, text: MjcfText) -> dict[str, bytes]:
         if place not in names:
             names[place] = f"{len(names)}{kind}"
             try:
-                files[names[place]] = read_bytes(place, "meshes_mb")
+                files[names[place]] = read_bytes(place, "mesh_mb")
             except FileFormatError as error:
                 raise node.error("file", str(error)) from error
         # A file that two meshes are made of takes memory twice.
         total += len(files[names[place]])
-        if total > limit("meshes_mb") * MEGABYTE:
-            raise node.error("file", f"the meshes are too large together: {limit_message('meshes_mb')}")
+        if total > limit("mesh_mb") * MEGABYTE:
+            raise node.error("file", f"the meshes are too large together: {limit_message('mesh_mb')}")
         mesh.file = names[place]
     return files
 
