@@ -119,7 +119,7 @@ class PartPoses:
         if part is not None:
             X_HP = inverse(hands[arm]) @ self.in_world(part, hands)
             self._put(part, arm, X_HP, now)
-            self._openings[arm] = _width_across(self._cell.parts[part].shape, X_HP)
+            self._openings[arm] = width_across(self._cell.parts[part].shape, X_HP)
         return part
 
     def open(self, arm: str, hands: Mapping[str, Array], now: float, width: float | None = None) -> tuple[str, ...]:
@@ -154,7 +154,10 @@ class PartPoses:
         )
 
 
-def _width_across(shape: Shape, X_HP: Array) -> float:
-    """Return how far apart the fingers are that hold a part: both are as far from the middle as its farther side."""
+def width_across(shape: Shape, X_HP: Array) -> float:
+    """Return how far apart the fingers are that hold a solid at a pose (4, 4) on the tool [m].
+
+    Both fingers are as far from the middle as its farther side.
+    """
     across = X_HP[:3, :3].T[:, 1]
     return 2 * max(float(X_HP[1, 3]) + support(shape, across), support(shape, -across) - float(X_HP[1, 3]))

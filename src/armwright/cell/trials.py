@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TypeAlias
 
@@ -25,7 +26,7 @@ class Goal:
 
     at: str
     distance: float = 2e-3
-    angle: float = 0.05235987755982989
+    angle: float = math.radians(3.0)
 
 
 @attrs.frozen(kw_only=True)

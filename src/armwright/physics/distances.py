@@ -10,6 +10,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.mujoco_library import load_mujoco
 from armwright.physics.geoms import add_geom
+from armwright.spatial.poses import homogeneous
+from armwright.spatial.rotations import rotation_from_quaternion
 from armwright.spatial.shapes import Shape, Solid
 
 # Distances between convex solids are found by iteration, to this [m].
@@ -76,8 +78,4 @@ def _inner_pose(model: Any, number: int) -> Array | None:
     position, quaternion = model.geom_pos[number], model.geom_quat[number]
     if not position.any() and np.array_equal(quaternion, (1.0, 0.0, 0.0, 0.0)):
         return None
-    from armwright.spatial.rotations import rotation_from_quaternion  # noqa: PLC0415
-
-    X = np.eye(4)
-    X[:3, :3], X[:3, 3] = rotation_from_quaternion(quaternion), position
-    return X
+    return homogeneous(rotation_from_quaternion(quaternion), position)

@@ -22,6 +22,14 @@ def quaternion(R: Array) -> Array:
     return q
 
 
+def principal_inertia(inertia: Array) -> tuple[Array, Array]:
+    """Return the principal moments (3,) of a tensor (3, 3), the smallest first, and the rotation (3, 3) to its axes."""
+    moments, axes = np.linalg.eigh(inertia)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] = -axes[:, 0]
+    return moments, axes
+
+
 def place(X: Array) -> dict[str, Array]:
     """Return the arguments that put a body, a geom or a site at a pose (4, 4)."""
     turned = np.abs(X[:3, :3] - np.eye(3)).max() > _ROUNDING

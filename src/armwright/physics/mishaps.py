@@ -6,6 +6,8 @@ R606: an arm is not where it was sent. R607: the world has become unstable.
 
 from __future__ import annotations
 
+import math
+
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.hardware import Mishap
@@ -65,7 +67,7 @@ def off_track(time: float, arm: str, model: Arm, error: Array, limits: Array) ->
     """Return what is said where joints are farther than the limits from where they were sent, (n,) each."""
     joint = int((error / limits).argmax())
     revolute = model.joints[joint].revolute
-    amount = f"{error[joint] * 57.29577951308232:.3g} deg" if revolute else f"{error[joint] * 1e3:.3g} mm"
+    amount = f"{math.degrees(error[joint]):.3g} deg" if revolute else f"{error[joint] * 1e3:.3g} mm"
     return Mishap(
         time=time,
         arm=arm,

@@ -20,7 +20,7 @@ from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import Body
-from armwright.physics.geoms import add_geom, place, quaternion
+from armwright.physics.geoms import add_geom, place, principal_inertia, quaternion
 from armwright.spatial.poses import inverse
 
 # What MuJoCo's compiler takes as the least [kg], [kg m²].
@@ -159,9 +159,7 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
 
 def _set_inertia(body: Any, link: Link) -> Inertia:
     """Give a body the inertia of a link, or one that the compiler takes."""
-    moments, axes = np.linalg.eigh(link.inertia)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] = -axes[:, 0]
+    moments, axes = principal_inertia(link.inertia)
     padded = np.maximum(moments, _LEAST_MOMENT if moments.min() <= 0 else 0.0)
     lacking = padded[2] - padded[0] - padded[1]
     if lacking > 0:

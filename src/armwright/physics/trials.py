@@ -145,7 +145,7 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
     moving = _come_to_rest(world, cell, now)
     errors = {
         part: placing_error(world.true_pose(part), goal_pose(cell, part, world), cell.parts[part])
-        for part in _goals(cell)
+        for part in cell.trials.goals
     }
     cause, message = ended_by or _fault(world, cell, moving, errors) or ("", "")
     return Verdict(
@@ -154,10 +154,6 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
         distance=max((distance for distance, _ in errors.values()), default=0.0),
         angle=max((angle for _, angle in errors.values()), default=0.0),
     )
-
-
-def _goals(cell: Cell) -> tuple[str, ...]:
-    return tuple(cell.trials.goals)
 
 
 def _fault(
@@ -169,7 +165,7 @@ def _fault(
             return _TOUCHED, f"{mishap.message} at {mishap.time:.3f} s"
     for part in moving:
         return MOVING, f"{part} still moves {_PATIENCE:g} s after the end"
-    for part in _goals(cell):
+    for part in cell.trials.goals:
         if arms := world.touching_arms(part):
             return HELD, f"{part} is touched by {', '.join(arms)}"
     for part, (distance, angle) in errors.items():
@@ -182,11 +178,11 @@ def _fault(
 
 def _come_to_rest(world: PhysicsCell, cell: Cell, now: float) -> tuple[str, ...]:
     """Let a world go on until all parts with a goal have been at rest for some time; return those that still move."""
-    moving, rest = _goals(cell), 0
+    moving, rest = tuple(cell.trials.goals), 0
     for look in range(1, round(_PATIENCE / _LOOK) + 1):
         while world.advance(now + look * _LOOK) is not None:
             pass
-        fast = tuple(part for part in _goals(cell) if _moves(world, part))
+        fast = tuple(part for part in cell.trials.goals if _moves(world, part))
         rest = 0 if fast else rest + 1
         if rest * _LOOK >= _REST_TIME:
             return ()
