@@ -1,6 +1,7 @@
 """Hand-eye calibration: the truth lies within its intervals, an independent solver agrees, bad data are refused."""
 
 import re
+import sys
 
 import attrs
 import numpy as np
@@ -17,10 +18,10 @@ from armwright.calibration.board_detection import board_finder
 from armwright.calibration.camera_intrinsics import calibrate_intrinsics
 from armwright.calibration.hand_eye import HandEyeCalibration, calibrate_hand_eye
 from armwright.calibration.hand_eye_start import closed_form
-from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError
+from armwright.errors import ContradictionError, InvalidValueError, MissingExtraError, ShapeError, TooFewError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import homogeneous, inverse
-from calibration.boards import CHARUCO, Scene, board_views, lens_numbers, photographed, projected, random_scene
+from calibration.boards import CHARUCO, Scene, board_views, photographed, projected, random_scene
 from calibration.simulated import random_arm, random_pose
 from samples import Sample
 
@@ -41,7 +42,7 @@ def errors(found: HandEyeCalibration, scene: Scene) -> Array:
     rows = []
     for X, truth in ((found.camera, scene.camera), (found.board, scene.board)):
         rows += [truth[:3, 3] - X[:3, 3], Rotation.from_matrix(truth[:3, :3] @ X[:3, :3].T).as_rotvec()]
-    numbers = lens_numbers(scene.lens) - lens_numbers(found.lens)
+    numbers = scene.lens.numbers - found.lens.numbers
     return np.concatenate([*rows, numbers[list(found.lens_numbers)]])
 
 
@@ -94,9 +95,7 @@ def cost_by_hand(scene: Scene, views: BoardViews, sigma: float, *, fit_lens: boo
             rows.append((view.pixels - pixels).ravel() / sigma)
         return np.concatenate(rows)
 
-    start = np.concatenate(
-        [vector(scene.camera), vector(scene.board), lens_numbers(scene.lens), np.zeros(6 * len(hand))]
-    )
+    start = np.concatenate([vector(scene.camera), vector(scene.board), scene.lens.numbers, np.zeros(6 * len(hand))])
     if fit_lens:
         return residuals, start
     held = np.arange(12, 21)
@@ -276,6 +275,15 @@ def test_parallel_rotations_are_refused_with_their_direction(rng: np.random.Gene
             lens=scene.lens,
             eye_in_hand=eye_in_hand,
         )
+
+
+def test_missing_opencv_is_one_line(rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a known lens and a table of corners, too, a missing OpenCV is told with how to install it."""
+    scene = random_scene(rng, ARM, 6, eye_in_hand=True, accuracy=ArmAccuracy())
+    views = projected(rng, scene, PIXEL_NOISE)
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    with pytest.raises(MissingExtraError, match="needs opencv-python-headless; install it by: pip install"):
+        calibrate_hand_eye(views, scene.readings, lens=scene.lens)
 
 
 def test_small_rotations_and_few_pictures_are_refused(rng: np.random.Generator) -> None:

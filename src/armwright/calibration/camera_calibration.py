@@ -16,7 +16,7 @@ from armwright.calibration.board import BoardViews
 from armwright.calibration.camera_intrinsics import LENS_NUMBERS, CameraIntrinsics, calibrate_intrinsics
 from armwright.calibration.camera_tables import PictureJoints
 from armwright.calibration.hand_eye import HandEyeCalibration, calibrate_hand_eye
-from armwright.errors import InvalidValueError, counted
+from armwright.errors import InvalidValueError, counted, listed
 from armwright.files.result_table import ResultTable
 from armwright.spatial.euler import to_rpy
 from armwright.spatial.lens import Lens
@@ -83,12 +83,12 @@ class CameraCalibration:
         else:
             yield from (f"left out: {name}: {reason}" for name, reason in self.views.left_out.items())
         if self.without_joints:
-            yield f"pictures without joint positions: {_listed(self.without_joints)}"
+            yield f"pictures without joint positions: {listed(self.without_joints, _MAX_NAMED)}"
         if self.hand_eye is None:
             return
         found = self.hand_eye
         if found.wrong:
-            wrong = _listed([found.names[i] for i in found.wrong])
+            wrong = listed([found.names[i] for i in found.wrong], _MAX_NAMED)
             yield f"pictures that contradict the others, without weight: {wrong}"
         accuracy = found.readings.accuracy
         stated = (
@@ -104,7 +104,7 @@ class CameraCalibration:
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data in SI units."""
         errors, halves = self.lens_errors
-        values = _lens_values(self.lens)
+        values = self.lens.numbers.tolist()
         data: dict[str, Any] = {
             "camera": self.name,
             "pictures": list(self.views.names),
@@ -131,7 +131,7 @@ class CameraCalibration:
     def tables(self) -> Iterator[ResultTable]:
         """Give the lens, the pose of the camera and of the board, and the pictures."""
         errors, halves = self.lens_errors
-        rows = zip(LENS_NUMBERS, _lens_values(self.lens), errors, halves, strict=True)
+        rows = zip(LENS_NUMBERS, self.lens.numbers, errors, halves, strict=True)
         yield ResultTable(
             title=f"Lens of {self.name}, {self.lens.width} x {self.lens.height} pixels",
             heads=("number", "estimate", "standard error", "95 % ±"),
@@ -262,15 +262,6 @@ def calibrate_camera(
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
-
-
-def _listed(names: list[str] | tuple[str, ...]) -> str:
-    more = f" and {len(names) - _MAX_NAMED} more" if len(names) > _MAX_NAMED else ""
-    return f"{', '.join(names[:_MAX_NAMED])}{more}"
-
-
-def _lens_values(lens: Lens) -> list[float]:
-    return [*lens.focal.tolist(), *lens.centre.tolist(), *lens.distortion.tolist()]
 
 
 def _numbers_text(values: Array) -> str:

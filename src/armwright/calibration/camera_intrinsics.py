@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from armwright.arrays import Array, integer
 from armwright.calibration.board import BoardView, BoardViews, board_views
 from armwright.errors import InvalidValueError, TooFewError, counted
-from armwright.extras import import_extra
+from armwright.extras import opencv
 from armwright.spatial.lens import Lens
 
 # The numbers of a lens, in the order of its attributes.
@@ -67,11 +67,6 @@ class CameraIntrinsics:
     sigma: float
     degrees_of_freedom: int
     wrong_corners: int
-
-    @property
-    def values(self) -> Array:
-        """(9,) focal lengths, centre, distortion."""
-        return np.concatenate([self.lens.focal, self.lens.centre, self.lens.distortion])
 
     @property
     def half_widths(self) -> Array:
@@ -142,7 +137,7 @@ def calibrate_intrinsics(views: BoardViews, *, coefficients: int = 5) -> CameraI
 
 
 def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
-    cv2 = import_extra("cv2", "calibrating a camera", "physics", "opencv-python-headless")
+    cv2 = opencv("calibrating a camera")
     fixed = {
         0: cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3,
         2: cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K3,

@@ -24,7 +24,7 @@ from armwright.calibration.board import BoardViews
 from armwright.calibration.camera_intrinsics import CameraIntrinsics
 from armwright.calibration.hand_eye_fit import HandEyeFit, HandEyeProblem, HandEyeState
 from armwright.calibration.hand_eye_start import MIN_PICTURES, check_motions, hand_eye_start
-from armwright.calibration.reprojection import BoardPose, first_board_pose, refined_board_pose, twist_between
+from armwright.calibration.reprojection import BoardPose, board_pose, refined_board_pose, twist_between
 from armwright.errors import ContradictionError, ShapeError
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import inverse
@@ -167,7 +167,7 @@ def calibrate_hand_eye(
     camera, board, distances = hand_eye_start(carried, np.array([found.pose for found in seen]))
     state = HandEyeState(camera=camera, board=board, lens=known, corrections=none)
     fit, used, squares = _fit_without_wrong(problem, state, _not_far(distances))
-    spread = _mean_square(squares[used], len(used))
+    spread = _mean_square(squares[used])
     _refuse_contradiction(views.names, used, spread)
     return HandEyeCalibration(
         eye_in_hand=eye_in_hand,
@@ -195,12 +195,9 @@ def _board_poses(views: BoardViews, lens: Lens, guesses: Array | None) -> list[B
     """Return the poses of the board that fit each picture best on its own."""
     points = views.board.points
     return [
-        refined_board_pose(
-            lens,
-            points[view.corners],
-            view.pixels,
-            first_board_pose(lens, points[view.corners], view.pixels) if guesses is None else guesses[i],
-        )
+        board_pose(lens, points[view.corners], view.pixels)
+        if guesses is None
+        else refined_board_pose(lens, points[view.corners], view.pixels, guesses[i])
         for i, view in enumerate(views.views)
     ]
 
@@ -223,7 +220,7 @@ def _fit_without_wrong(
         found = _board_poses(problem.views, fit.state.lens, poses)
         poses = np.array([one.pose for one in found])
         squares = _disagreements(problem, fit.state, found)
-        limit = float(chi2.isf(_WRONG, 6)) * max(1.0, _median_square(squares[used], len(used)))
+        limit = float(chi2.isf(_WRONG, 6)) * max(1.0, _median_square(squares[used]))
         agreeing = [int(i) for i in np.flatnonzero(squares <= limit)]
         tried.add(tuple(used))
         if agreeing == used or len(agreeing) < MIN_PICTURES or tuple(agreeing) in tried or len(tried) > _ROUNDS:
@@ -256,14 +253,14 @@ def _adjoint(X: Array) -> Array:
     return result
 
 
-def _mean_square(squares: Array, count: int) -> float:
+def _mean_square(squares: Array) -> float:
     """Return the mean of squared disagreements, each of six numbers, twelve of which were fitted; about 1."""
-    return float(squares.sum()) / (6 * count - 12)
+    return float(squares.sum()) / (6 * len(squares) - 12)
 
 
-def _median_square(squares: Array, count: int) -> float:
+def _median_square(squares: Array) -> float:
     """Return the same by the median, which wrong pictures do not move."""
-    return float(np.median(squares) / chi2.ppf(0.5, 6)) * count / max(count - 2, 1)
+    return float(np.median(squares) / chi2.ppf(0.5, 6)) * len(squares) / max(len(squares) - 2, 1)
 
 
 def _refuse_contradiction(names: Sequence[str], used: list[int], spread: float) -> None:

@@ -131,13 +131,12 @@ class HandEyeProblem:
         return float(np.sum((residuals / self.sigma) ** 2) + np.sum(state.corrections**2))
 
     def _moved(self, state: HandEyeState, step: Array, corrections: Array) -> HandEyeState:
-        lens = state.lens
-        numbers = np.concatenate([lens.focal, lens.centre, lens.distortion])
+        numbers = state.lens.numbers
         numbers[list(self.lens_numbers)] += step[12:]
         return HandEyeState(
             camera=moved(state.camera, step[:6]),
             board=moved(state.board, step[6:12]),
-            lens=attrs.evolve(lens, focal=numbers[:2], centre=numbers[2:4], distortion=numbers[4:]),
+            lens=state.lens.with_numbers(numbers),
             corrections=state.corrections + corrections,
         )
 

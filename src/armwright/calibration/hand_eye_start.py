@@ -18,7 +18,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import ContradictionError, InvalidValueError, TooFewError
-from armwright.spatial.poses import inverse
+from armwright.spatial.poses import homogeneous, inverse
 from armwright.spatial.rotations import nearest_rotation, rotation_vector
 
 MIN_PICTURES = 3
@@ -81,10 +81,8 @@ def hand_eye_start(E: Array, C: Array) -> tuple[Array, Array, Array]:
     Raises:
         ContradictionError: the board does not turn as the hand does.
     """
-    triples = list(itertools.islice(_triples(len(E)), _MAX_TRIPLES))
     guesses = []
-    for triple in triples:
-        chosen = list(triple)
+    for chosen in _triples(len(E)):
         X = closed_form(E[chosen], C[chosen])
         if X is None:
             continue
@@ -116,29 +114,25 @@ def closed_form(E: Array, C: Array) -> Array | None:
     U, s, Vt = np.linalg.svd(a.T @ b)
     if s[1] < _LEAST_ROTATION**2:
         return None
-    X = np.eye(4)
-    X[:3, :3] = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
+    R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
     rows = (A[:, :3, :3] - np.eye(3)).reshape(-1, 3)
-    right = (X[:3, :3] @ B[:, :3, 3, None])[..., 0] - A[:, :3, 3]
-    X[:3, 3] = np.linalg.lstsq(rows, right.ravel())[0]
-    return X
+    right = (R @ B[:, :3, 3, None])[..., 0] - A[:, :3, 3]
+    return homogeneous(R, np.linalg.lstsq(rows, right.ravel())[0])
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _triples(count: int) -> itertools.chain[tuple[int, ...]] | itertools.combinations[tuple[int, ...]]:
-    """Give triples of pictures: all, or evenly spread ones and then random ones, always the same."""
+def _triples(count: int) -> list[list[int]]:
+    """Return triples of pictures: all, or random ones, always the same."""
     if math.comb(count, 3) <= _MAX_TRIPLES:
-        return itertools.combinations(range(count), 3)
+        return [list(triple) for triple in itertools.combinations(range(count), 3)]
     rng = np.random.default_rng(0)
-    return itertools.chain(tuple(rng.choice(count, 3, replace=False).tolist()) for _ in range(_MAX_TRIPLES))
+    return [rng.choice(count, 3, replace=False).tolist() for _ in range(_MAX_TRIPLES)]
 
 
 def _mean_pose(X: Array) -> Array:
-    mean = np.eye(4)
-    mean[:3, :3], mean[:3, 3] = nearest_rotation(X[:, :3, :3].sum(axis=0)), X[:, :3, 3].mean(axis=0)
-    return mean
+    return homogeneous(nearest_rotation(X[:, :3, :3].sum(axis=0)), X[:, :3, 3].mean(axis=0))
 
 
 def _discrepancies(boards: Array, Z: Array) -> Array:

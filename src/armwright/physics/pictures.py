@@ -12,9 +12,10 @@ import numpy.typing as npt
 from armwright.arrays import Array
 from armwright.cell.scene import Camera
 from armwright.errors import MissingExtraError
+from armwright.extras import opencv
 from armwright.mujoco_library import graphics, load_mujoco
 from armwright.physics.geoms import quaternion
-from armwright.physics.markers import opencv
+from armwright.physics.markers import PURPOSE
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import homogeneous
 
@@ -81,7 +82,7 @@ class Photographer:
             MissingExtraError: OpenGL or OpenCV is missing.
         """
         mujoco = load_mujoco()
-        self._mujoco, self._cv2, self.model = mujoco, opencv(), model
+        self._mujoco, self._cv2, self.model = mujoco, opencv(PURPOSE), model
         self._views = {name: _View(camera) for name, camera in cameras.items()}
         self.graphics, context = graphics()
         self._scene = mujoco.MjvScene(model, _most_geometries(model))
@@ -226,6 +227,6 @@ def png(picture: Picture) -> bytes:
     Raises:
         MissingExtraError: OpenCV is missing.
     """
-    made, content = opencv().imencode(".png", picture[:, :, ::-1])
+    made, content = opencv(PURPOSE).imencode(".png", picture[:, :, ::-1])
     assert made  # noqa: S101 - there is a writer of PNG in every OpenCV
     return bytes(content)

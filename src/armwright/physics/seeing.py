@@ -10,7 +10,8 @@ from armwright.cell.hardware import DeviceError
 from armwright.cell.model import Cell
 from armwright.cell.scene import Marker, Sight
 from armwright.errors import InvalidValueError
-from armwright.physics.markers import CELLS, dictionary, marker_corners, opencv
+from armwright.extras import opencv
+from armwright.physics.markers import CELLS, PURPOSE, dictionary, marker_corners
 from armwright.physics.pictures import Picture
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import homogeneous, inverse_pose
@@ -77,7 +78,7 @@ def find_markers(picture: Picture, lens: Lens) -> dict[int, Array]:
     Raises:
         MissingExtraError: OpenCV is missing.
     """
-    cv2 = opencv()
+    cv2 = opencv(PURPOSE)
     grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
     found, numbers, _ = cv2.aruco.ArucoDetector(dictionary(), cv2.aruco.DetectorParameters()).detectMarkers(grey)
     brightness = grey.astype(np.float64)
@@ -201,7 +202,7 @@ def _free_pose(rays: Array, X_WC: Array, target: Target) -> Array:
     Source:
         Collins & Bartoli (2014), Infinitesimal plane-based pose estimation.
     """
-    cv2 = opencv()
+    cv2 = opencv(PURPOSE)
     size, seen = target.marker.size, np.ascontiguousarray(rays[:, :2])
     flat = marker_corners(size) * (1, 1, 0)
     _, rotations, positions, errors = cv2.solvePnPGeneric(flat, seen, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE_SQUARE)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from armwright.errors import listed
 from armwright.program.vm.recording import Recording
 
 if TYPE_CHECKING:
@@ -48,16 +48,11 @@ def _guesses(checked: CheckedBodies) -> list[str]:
         for arm, (largest, smallest) in checked.guessed.items()
     ]
     if checked.estimated:
-        texts.append(f"a guess: {_listed(checked.estimated)}")
+        texts.append(f"a guess: {listed(checked.estimated, _LISTED)}")
     if checked.left_out:
         pairs = [f"{one} with {other}" for one, other in checked.left_out]
-        texts.append(f"left out, as the guess meets the other at the start: {_listed(pairs)}")
+        texts.append(f"left out, as the guess meets the other at the start: {listed(pairs, _LISTED)}")
     return texts
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def clearance_data(clearance: StageClearance | None) -> dict[str, Any] | None:

@@ -18,7 +18,7 @@ from armwright.arm.mjcf.couplings import couplings
 from armwright.arm.mjcf.drives import limits_of, motor_of
 from armwright.arm.mjcf.solids import ellipsoids_of, pose_of, solids_of
 from armwright.arm.model import Limits, Link, Motor
-from armwright.arm.tree.kinematic_tree import check_lock, listed
+from armwright.arm.tree.kinematic_tree import check_lock, quoted
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, one_of
 from armwright.spatial.poses import homogeneous
@@ -168,7 +168,7 @@ class MjcfTree:
         if not bases:
             raise self.error("no body moves by a hinge or a slide")
         if len(bases) > 1:
-            names = listed(list(bases))
+            names = quoted(list(bases))
             raise self.error(f"the base is ambiguous: it could be {names}; specify one as base (--base)")
         return next(iter(bases))
 

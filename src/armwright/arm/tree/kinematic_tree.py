@@ -9,9 +9,11 @@ from typing import Protocol, TypeAlias
 
 from armwright.arm.model import Limits, Link, Motor
 from armwright.arrays import Array, number
-from armwright.errors import FileFormatError, InvalidValueError, KindError, shown
+from armwright.errors import FileFormatError, InvalidValueError, KindError, listed, shown
 from armwright.spatial.shapes import Solid
 
+# So many names are in a message.
+_MAX_LISTED = 50
 # Joints that are held: their names, or their positions by their names [rad] or [m].
 Lock: TypeAlias = Collection[str] | Mapping[str, float]
 
@@ -119,10 +121,9 @@ class Tree(Protocol):
         """Return the error that says ``message`` of the whole file."""
 
 
-def listed(names: Sequence[str], most: int = 50) -> str:
-    """Return names for a message, not more than some of them."""
-    more = f" and {len(names) - most:,} more" if len(names) > most else ""
-    return ", ".join(f"'{name}'" for name in names[:most]) + more
+def quoted(names: Sequence[str]) -> str:
+    """Return names in quotes for a message, not more than some of them."""
+    return listed([f"'{name}'" for name in names], _MAX_LISTED)
 
 
 def locked_positions(lock: Lock) -> dict[str, float]:
