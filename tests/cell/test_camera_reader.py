@@ -133,7 +133,7 @@ BELOW = BLOCK.replace("at = [1,0,0, 0,1,0, 0,0,1, 0,0,0.04]", "at = [1,0,0, 0,0,
         (f"{TOP}fov = 3\n", "cameras, Top, fov: unknown key"),
         (
             f'{SCENE}[visions]\nG = {{ marker = "GAOL" }}\n',
-            "G, marker: GAOL is not a marker of the scene of the cell; did",
+            "G, marker: GAOL is not a marker of the cell; did",
         ),
         (f'{SCENE}{BLOCK}{TOP}[visions]\nO = {{ part = "BLOCK", camera = "TOPP" }}\n', "did you mean TOP?"),
         (f'{BLOCK}[visions]\nO = {{ part = "BLOCK", on = "table" }}\n', "O, on: the scene has no table"),
