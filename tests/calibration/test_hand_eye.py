@@ -247,7 +247,7 @@ def test_the_wrong_setup_is_refused(rng: np.random.Generator, *, eye_in_hand: bo
     scene = random_scene(rng, ARM, 10, eye_in_hand=eye_in_hand, accuracy=ArmAccuracy())
     views = projected(rng, scene, PIXEL_NOISE)
 
-    with pytest.raises(ContradictionError, match=r"the camera is on the hand,? or beside the arm|behind the camera"):
+    with pytest.raises(ContradictionError, match=r"the camera is on the tool,? or beside the arm|behind the camera"):
         calibrate_hand_eye(views, scene.readings, lens=scene.lens, eye_in_hand=not eye_in_hand)
 
 
@@ -292,7 +292,7 @@ def test_small_rotations_and_few_pictures_are_refused(rng: np.random.Generator) 
     views = projected(rng, scene, PIXEL_NOISE)
     near = attrs.evolve(scene.readings, q=scene.readings.q[:1] + np.radians(2) * np.eye(6))
 
-    with pytest.raises(InvalidValueError, match=r"turns by [23](\.\d)? degrees at most"):
+    with pytest.raises(InvalidValueError, match=r"rotates by [23](\.\d)? degrees at most"):
         calibrate_hand_eye(views, near, lens=scene.lens)
     with pytest.raises(TooFewError, match=r"expected 3 pictures or more with joint positions, got 2"):
         calibrate_hand_eye(views.take([0, 1]), scene.readings.take([0, 1]), lens=scene.lens)

@@ -137,7 +137,7 @@ def test_two_poses_of_a_square() -> None:
     X_WC = TOP.pose @ homogeneous(np.eye(3), (0, 0, -0.7))
     corners = projected(SIMPLE, X_WC, FREE, BLOCK @ homogeneous(rotation_from_vector((0.3, 0, 0)), np.zeros(3)))
 
-    with pytest.raises(DeviceError, match="seen, but two orientations of it are not told apart: look from a smaller"):
+    with pytest.raises(DeviceError, match="two orientations of it cannot be distinguished: look from a smaller"):
         target_pose(corners + rng.normal(0, 0.05, (4, 2)), SIMPLE, X_WC, FREE)
 
 

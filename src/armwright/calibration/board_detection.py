@@ -80,11 +80,11 @@ def views_of_pictures(
             first = f"{size[0]} x {size[1]} pixels as in {Path(paths[0]).name}"
             message = f"expected {first}, got {width} x {height}; all pictures must be from one camera at one setting"
             raise FileFormatError(path, None, "", message)
-        found = find(path.name, picture)
-        if found is None:
+        view = find(path.name, picture)
+        if view is None:
             missing[path.name] = "the board is not found"
         else:
-            views.append(found)
+            views.append(view)
     if not views:
         raise TooFewError(
             f"the board is not found in any of {len(paths)} pictures; check the numbers of squares (columns x rows, "

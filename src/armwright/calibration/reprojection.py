@@ -86,7 +86,7 @@ def board_pose(lens: Lens, points: Array, pixels: Array) -> BoardPose:
             continue
         X = homogeneous(rotation_from_vector(np.ravel(rotation)), np.ravel(translation))
         candidates.append(refined_board_pose(lens, points, pixels, X))
-    return min(candidates, key=lambda found: float(np.sum(found.residuals**2)))
+    return min(candidates, key=lambda fit: float(np.sum(fit.residuals**2)))
 
 
 def refined_board_pose(lens: Lens, points: Array, pixels: Array, X_CO: Array) -> BoardPose:

@@ -54,13 +54,13 @@ def _poses(table: Table, known: Collection[str]) -> dict[str, Spread]:
     return poses
 
 
-def _goals(table: Table, parts: Collection[str], places: Collection[str]) -> dict[str, Goal]:
+def _goals(table: Table, parts: Collection[str], frames: Collection[str]) -> dict[str, Goal]:
     goals: dict[str, Goal] = {}
     refuse_too_many(table, "entries")
     for key in table:
         name = known_name(table, key, read_name(table, key, goals), parts, "a part")
         entry = table.table(key)
-        others = [*places, *(other for other in parts if other != name)]
+        others = [*frames, *(other for other in parts if other != name)]
         goals[name] = Goal(
             at=known_name(entry, "at", entry.text("at"), others, "a marker, frame or other part"),
             distance=entry.number("mm", default=2.0, lower=1e-3, upper=1e4) * 1e-3,

@@ -54,7 +54,7 @@ class Distances:
         # MuJoCo moves the frame of a mesh into its centre of mass and turns it to its axes of inertia.
         self._inner = [_inner_pose(self._model, i) for i in range(len(shapes))]
 
-    def place(self, number: int, X: Array) -> None:
+    def set_pose(self, number: int, X: Array) -> None:
         """Put a solid at a pose (4, 4)."""
         inner = self._inner[number]
         if inner is not None:

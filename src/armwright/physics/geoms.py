@@ -30,7 +30,7 @@ def principal_inertia(inertia: Array) -> tuple[Array, Array]:
     return moments, axes
 
 
-def place(X: Array) -> dict[str, Array]:
+def placement(X: Array) -> dict[str, Array]:
     """Return the arguments that put a body, a geom or a site at a pose (4, 4)."""
     turned = np.abs(X[:3, :3] - np.eye(3)).max() > _ROUNDING
     return {"pos": X[:3, 3], **({"quat": quaternion(X[:3, :3])} if turned else {})}
@@ -54,4 +54,4 @@ def add_geom(spec: Any, body: Any, name: str, solid: Solid, **options: Any) -> A
             # A mesh that is not closed has no volume to weigh; what carries it has its own inertia.
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
             form = {"type": kinds.mjGEOM_MESH, "meshname": name}
-    return body.add_geom(name=name, **form, **place(solid.pose), **options)
+    return body.add_geom(name=name, **form, **placement(solid.pose), **options)

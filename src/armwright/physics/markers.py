@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.cell.scene import Marker
 from armwright.extras import opencv
 from armwright.mujoco_library import load_mujoco
-from armwright.physics.geoms import place
+from armwright.physics.geoms import placement
 
 # What needs OpenCV, in messages.
 PURPOSE = "seeing markers"
@@ -84,7 +84,7 @@ def add_marker(spec: Any, body: Any, marker: Marker, name: str) -> None:
         userface=np.array(front + back + rim, dtype=np.int32).ravel(),
         usertexcoord=np.array([(0, 0), (1, 0), (1, 1), (0, 1)] * 2, dtype=np.float64).ravel(),
     )
-    pose = place(marker.pose)
+    pose = placement(marker.pose)
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_MESH,

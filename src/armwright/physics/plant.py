@@ -20,7 +20,7 @@ from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import Body
-from armwright.physics.geoms import add_geom, place, principal_inertia, quaternion
+from armwright.physics.geoms import add_geom, placement, principal_inertia, quaternion
 from armwright.spatial.poses import inverse
 
 # What MuJoCo's compiler takes as the least [kg], [kg m²].
@@ -131,11 +131,11 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
     refuse_massless(weighed(arm))
     # Frames 0 to n and the tool, at zero positions, in the base frame.
     frames = link_poses(arm, np.zeros(arm.n))
-    body = spec.worldbody.add_body(name=f"{name}/base", **place(base))
+    body = spec.worldbody.add_body(name=f"{name}/base", **placement(base))
     links = [body]
     behind, inertias = np.eye(4), []
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
-        body = body.add_body(name=f"{name}/link{i}", **place(inverse(behind) @ frames[i]))
+        body = body.add_body(name=f"{name}/link{i}", **placement(inverse(behind) @ frames[i]))
         inertias.append(_set_inertia(body, link))
         _add_joint(body, f"{name}/joint{i}", joint, motor, inverse(frames[i]) @ frames[i - 1])
         motor_of_joint = spec.add_actuator(
@@ -147,7 +147,7 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
             motor_of_joint.forcerange = (-joint.limits.effort, joint.limits.effort)
         links.append(body)
         behind = frames[i]
-    tool = body.add_body(name=f"{name}/tool", **place(inverse(behind) @ frames[arm.n + 1]))
+    tool = body.add_body(name=f"{name}/tool", **placement(inverse(behind) @ frames[arm.n + 1]))
     tool.add_site(name=f"{name}/tool")
     for number, it in enumerate(bodies, 1):
         # What is fixed to the base is told in frame 0 of the table. The links have their inertia already.

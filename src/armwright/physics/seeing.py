@@ -149,7 +149,7 @@ def target_pose(corners: Array, lens: Lens, X_WC: Array, target: Target) -> Arra
         target: what the marker is on.
 
     Raises:
-        DeviceError: the marker is not at the height where it is looked for, or its pose is not told apart from another.
+        DeviceError: the marker is at another height than expected, or its pose cannot be distinguished from another.
     """
     rays = lens.rays(corners)
     if target.height is None:
@@ -185,10 +185,10 @@ def _standing_pose(rays: Array, eye: Array, target: Target, height: float) -> Ar
         raise DeviceError(f"marker {number} of {name} is seen, but tilted: {name} does not stand as at the start")
     if not abs(larger - 1) < _WRONG_SIZE:
         # What is nearer to the camera looks larger.
-        off = (1 - 1 / larger) * float(eye[2] - heights.mean()) * 1e3
+        offset = (1 - 1 / larger) * float(eye[2] - heights.mean()) * 1e3
         raise DeviceError(
-            f"marker {number} of {name} is seen, but at another height: it looks {abs(off):.0f} mm "
-            f"{'higher' if off > 0 else 'lower'} than in the vision of {name}"
+            f"marker {number} of {name} is seen, but at another height: it looks {abs(offset):.0f} mm "
+            f"{'higher' if offset > 0 else 'lower'} than in the vision of {name}"
         )
     return homogeneous(R @ target.start[:3, :3], (*(seen.mean(axis=0) - R[:2, :2] @ arms[:, :2].mean(axis=0)), height))
 
@@ -209,8 +209,9 @@ def _free_pose(rays: Array, X_WC: Array, target: Target) -> Array:
     first, second = np.ravel(errors)[:2]
     if second < _TOLD_APART * first:
         raise DeviceError(
-            f"marker {target.marker.number} of {target.name} is seen, but two orientations of it are not told apart: "
-            "look from a smaller distance, more from the side, or at something that stands at a known height"
+            f"marker {target.marker.number} of {target.name} is seen, but two orientations of it cannot be "
+            "distinguished: look from a smaller distance, more from the side, or at something that stands at a "
+            "known height"
         )
     rotation, position = cv2.solvePnPRefineLM(flat, seen, np.eye(3), None, rotations[0], positions[0])
     X_CM = homogeneous(cv2.Rodrigues(rotation)[0], np.ravel(position))

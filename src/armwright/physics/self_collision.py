@@ -132,26 +132,26 @@ class _Touching:
         frames_a, frames_b = self._frames[some, a], self._frames[some, b]
         touch = np.zeros(len(frames_a), dtype=bool)
         unknown: list[tuple[tuple[int, int], tuple[int, int], Flags]] = []
-        for i, one in enumerate(self._solids[a]):
+        for i, solid in enumerate(self._solids[a]):
             for j, other in enumerate(self._solids[b]):
-                surely, maybe = touch_bounds(one, other, frames_a, frames_b)
+                surely, maybe = touch_bounds(solid, other, frames_a, frames_b)
                 touch |= surely
                 if (maybe & ~surely).any():
                     unknown.append(((a, i), (b, j), maybe & ~surely))
         for k in np.flatnonzero(~touch).tolist():
-            if not any(maybe[k] and self._distance(one, other, some.start + k) for one, other, maybe in unknown):
+            if not any(maybe[k] and self._distance(first, second, some.start + k) for first, second, maybe in unknown):
                 return False
         return True
 
-    def _distance(self, one: tuple[int, int], other: tuple[int, int], k: int) -> bool:
+    def _distance(self, first: tuple[int, int], second: tuple[int, int], k: int) -> bool:
         """Whether two solids, each by its body and its number there, touch in a configuration."""
         if self._distances is None:
             every = [(body, i) for body, own in enumerate(self._solids) for i in range(len(own))]
             self._numbers = {key: number for number, key in enumerate(every)}
             self._distances = Distances([self._solids[body][i].shape for body, i in every])
-        for body, i in (one, other):
-            self._distances.place(self._numbers[body, i], self._frames[k, body] @ self._solids[body][i].pose)
-        return self._distances.between(self._numbers[one], self._numbers[other], 2 * RESOLUTION) < RESOLUTION
+        for body, i in (first, second):
+            self._distances.set_pose(self._numbers[body, i], self._frames[k, body] @ self._solids[body][i].pose)
+        return self._distances.between(self._numbers[first], self._numbers[second], 2 * RESOLUTION) < RESOLUTION
 
 
 class _Rod(NamedTuple):

@@ -22,11 +22,11 @@ from armwright.spatial.shapes import support
 _MAX_DRAWS = 100
 # A part is at rest that is no faster than this [m/s], [rad/s], for so long [s]; the world goes on for so long [s].
 _REST_SPEED, _REST_TURN, _REST_TIME, _PATIENCE = 2e-3, 0.05, 0.1, 1.0
-# How often it is looked at [s].
-_LOOK = 0.01
+# How often that is checked [s].
+_INTERVAL = 0.01
 # What is wrong where an arm has pressed on what it should not.
 _TOUCHED = "R604"
-MOVING, HELD, MISPLACED = "moving", "not let go", "misplaced"
+MOVING, UNRELEASED, MISPLACED = "moving", "not let go", "misplaced"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -167,7 +167,7 @@ def _fault(
         return MOVING, f"{part} still moves {_PATIENCE:g} s after the end"
     for part in cell.trials.goals:
         if arms := world.touching_arms(part):
-            return HELD, f"{part} is touched by {', '.join(arms)}"
+            return UNRELEASED, f"{part} is touched by {', '.join(arms)}"
     for part, (distance, angle) in errors.items():
         goal = cell.trials.goals[part]
         if distance > goal.distance or angle > goal.angle:
@@ -178,13 +178,13 @@ def _fault(
 
 def _come_to_rest(world: PhysicsCell, cell: Cell, now: float) -> tuple[str, ...]:
     """Let a world go on until all parts with a goal have been at rest for some time; return those that still move."""
-    moving, rest = tuple(cell.trials.goals), 0
-    for look in range(1, round(_PATIENCE / _LOOK) + 1):
-        while world.advance(now + look * _LOOK) is not None:
+    moving, resting = tuple(cell.trials.goals), 0
+    for check in range(1, round(_PATIENCE / _INTERVAL) + 1):
+        while world.advance(now + check * _INTERVAL) is not None:
             pass
         fast = tuple(part for part in cell.trials.goals if _moves(world, part))
-        rest = 0 if fast else rest + 1
-        if rest * _LOOK >= _REST_TIME:
+        resting = 0 if fast else resting + 1
+        if resting * _INTERVAL >= _REST_TIME:
             return ()
         moving = fast or moving
     return moving

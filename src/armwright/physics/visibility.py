@@ -96,17 +96,17 @@ def _hidden_by(model: Any, data: Any, X_WC: Array, corners: Array) -> str:
     points = corners[0] + s * (corners[1] - corners[0]) + t * (corners[3] - corners[0])
     distances = np.linalg.norm(points, axis=1)
     rays = np.ascontiguousarray(points @ X_WC[:3, :3].T / distances[:, None])
-    met, far = np.full(len(rays), -1, dtype=np.int32), np.zeros(len(rays))
+    hit, far = np.full(len(rays), -1, dtype=np.int32), np.zeros(len(rays))
     eye = np.ascontiguousarray(X_WC[:3, 3])
     groups = DRAWN_GROUPS
-    mujoco.mj_multiRay(model, data, eye, rays.ravel(), groups, 1, -1, met, far, None, len(rays), float(distances.max()))
-    before = (met >= 0) & (far >= 0) & (far < distances - _BEFORE)
-    bodies = Counter(int(model.geom_bodyid[geometry]) for geometry in met[before].tolist())
+    mujoco.mj_multiRay(model, data, eye, rays.ravel(), groups, 1, -1, hit, far, None, len(rays), float(distances.max()))
+    before = (hit >= 0) & (far >= 0) & (far < distances - _BEFORE)
+    bodies = Counter(int(model.geom_bodyid[geometry]) for geometry in hit[before].tolist())
     if not bodies:
         return ""
     body = bodies.most_common(1)[0][0]
     if body:
         return str(model.body(body).name)
     # What belongs to no body stands: there the geometry has the name.
-    first = next(geometry for geometry in met[before].tolist() if model.geom_bodyid[geometry] == 0)
+    first = next(geometry for geometry in hit[before].tolist() if model.geom_bodyid[geometry] == 0)
     return str(model.geom(first).name) or "something"

@@ -30,7 +30,7 @@ REST_DEPTH, REST_LENGTH = 0.5e-3, 0.01
 # Fingers are clear of a part when they are so far from it [m].
 _CLEAR = 1e-3
 # Points on each stage at which the length of the path, and whether fingers are clear, are looked at.
-_LOOKS = 201
+_SAMPLES = 201
 # A held part that is so near to something at the start or the end of a stage stands on it there [m].
 _STANDS = 1e-3
 # Moments that are looked at together.
@@ -111,8 +111,8 @@ class WantedContacts:
 
     def _clear_time(self, numbers: Numbers) -> float:
         """Return when pairs are clear of each other for the first time [s]; infinity where they never are."""
-        times = np.concatenate([np.linspace(0.0, stage.duration, _LOOKS) for stage in self.move.stages])
-        times += np.repeat(self.starts, _LOOKS)
+        times = np.concatenate([np.linspace(0.0, stage.duration, _SAMPLES) for stage in self.move.stages])
+        times += np.repeat(self.starts, _SAMPLES)
         for first in range(0, len(times), _BLOCK):
             block = times[first : first + _BLOCK]
             distances = self._checker.distances_at(self._motions, block, numbers, 2 * _CLEAR)
@@ -145,7 +145,7 @@ class WantedContacts:
             return []
         zones = []
         for start, stage in zip(self.starts, self.move.stages, strict=True):
-            times = np.linspace(0.0, stage.duration, _LOOKS)
+            times = np.linspace(0.0, stage.duration, _SAMPLES)
             points = forward(self._arm, stage(times))[:, :3, 3]
             lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
             near = times[lengths <= REST_LENGTH], times[lengths[-1] - lengths <= REST_LENGTH]

@@ -14,7 +14,7 @@ from armwright.cell.model import Cell
 from armwright.cell.scene import Part
 from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import arm_bodies
-from armwright.physics.geoms import add_geom, place, principal_inertia, quaternion
+from armwright.physics.geoms import add_geom, placement, principal_inertia, quaternion
 from armwright.physics.gripper import add_gripper, grip
 from armwright.physics.markers import add_marker
 from armwright.physics.pictures import add_camera, add_lights
@@ -171,7 +171,7 @@ def _add_cameras(spec: Any, cell: Cell, tools: Mapping[str, Any]) -> None:
 
 
 def _add_part(spec: Any, part: Part, colour: tuple[float, ...]) -> None:
-    body = spec.worldbody.add_body(name=part.name, **place(part.pose))
+    body = spec.worldbody.add_body(name=part.name, **placement(part.pose))
     body.add_freejoint(name=part.name)
     moments, axes = principal_inertia(inertia(part.shape))
     body.explicitinertial, body.mass, body.inertia = True, part.mass, part.mass * moments

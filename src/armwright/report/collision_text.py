@@ -50,7 +50,7 @@ def _guesses(checked: CheckedBodies) -> list[str]:
     if checked.estimated:
         texts.append(f"a guess: {listed(checked.estimated, _LISTED)}")
     if checked.left_out:
-        pairs = [f"{one} with {other}" for one, other in checked.left_out]
+        pairs = [f"{a} with {b}" for a, b in checked.left_out]
         texts.append(f"left out, as the guess meets the other at the start: {listed(pairs, _LISTED)}")
     return texts
 
@@ -65,5 +65,5 @@ def clearance_data(clearance: StageClearance | None) -> dict[str, Any] | None:
         "bound": clearance.bound,
         "bodies": list(clearance.bodies),
         "time": clearance.time if near else None,
-        "position": list(clearance.place) if near else None,
+        "position": list(clearance.point) if near else None,
     }

@@ -92,12 +92,12 @@ def _mesh_files(spec: Any, path: Path, text: MjcfText) -> dict[str, bytes]:
 
 def _as_ours(error: Exception, path: Path, text: MjcfText) -> FileFormatError:
     """Return the error of MuJoCo, which counts the lines of the text that it got, in one line."""
-    said = " ".join(str(error).split())
+    message = " ".join(str(error).split())
     for start in ("XML Error: ", "Schema violation: ", "Error: "):
-        said = said.removeprefix(start)
-    number = _LINE.search(said)
+        message = message.removeprefix(start)
+    number = _LINE.search(message)
     node: Node | None = None
     if number and 0 < int(number[1]) <= len(text.nodes):
         node = text.nodes[int(number[1]) - 1]
-        said = said.partition(" Element ")[0]
-    return FileFormatError(path, None, "", said) if node is None else node.error("", said)
+        message = message.partition(" Element ")[0]
+    return FileFormatError(path, None, "", message) if node is None else node.error("", message)

@@ -101,7 +101,7 @@ def collision_location(collision: Collision) -> list[str]:
     """Return where in the world and when an arm would run into something, and what is known of the solids."""
     own, other = collision.bodies
     when = "" if collision.at_start else f", {collision.time:.3f} s after this MOVE begins"
-    notes = [f"at {_position(collision.place)} mm in the world{when}"]
+    notes = [f"at {_position(collision.point)} mm in the world{when}"]
     if collision.guessed:
         notes.append(f"the shape of {own} or {other} is a guess: the arm file has no exact solid of it")
     return notes
@@ -124,7 +124,6 @@ def clearance_warning(run: RunStage, wanted: float) -> Diagnostic | None:
     if clearance is None or clearance.distance is None or clearance.distance >= wanted:
         return None
     own, other = clearance.bodies
-    place = np.array(clearance.place)
     return Diagnostic(
         code="W404",
         severity=Severity.WARNING,
@@ -132,7 +131,7 @@ def clearance_warning(run: RunStage, wanted: float) -> Diagnostic | None:
         f"`{run.goal_names[-1]}`",
         span=run.span,
         label=f"at {run.t0 + clearance.time:.3f} s; the cell wants {wanted * 1e3:g} mm",
-        notes=(f"at {_position(place)} mm in the world",),
+        notes=(f"at {_position(np.array(clearance.point))} mm in the world",),
         helps=("a path farther away, by VIA, or a smaller `clearance_mm` under [motion] of the cell",),
     )
 
