@@ -138,7 +138,10 @@ BELOW = BLOCK.replace("at = [1,0,0, 0,1,0, 0,0,1, 0,0,0.04]", "at = [1,0,0, 0,0,
         (f'{SCENE}{BLOCK}{TOP}[visions]\nO = {{ part = "BLOCK", camera = "TOPP" }}\n', "did you mean TOP?"),
         (f'{BLOCK}[visions]\nO = {{ part = "BLOCK", on = "table" }}\n', "O, on: the scene has no table"),
         (f'{BLOCK}[visions]\nO = {{ part = "BLOCK", on = "tabel" }}\n', "did you mean 'table'?"),
-        (f'{SCENE}{BLOCK}[visions]\nO = {{ part = "BLOCK", marker = "GOAL" }}\n', "for a part or for a marker of the"),
+        (
+            f'{SCENE}{BLOCK}[visions]\nO = {{ part = "BLOCK", marker = "GOAL" }}\n',
+            "finds a part or a marker of the scene, not both",
+        ),
         (
             f'{BLOCK}{TOP}{TOP.replace("Top", "SIDE")}[visions]\nO = {{ part = "BLOCK" }}\n',
             "O, camera: missing; the cameras are TOP, SIDE",

@@ -144,7 +144,7 @@ def test_two_poses_of_a_square() -> None:
 def test_flat_rays() -> None:
     """A camera at the height of a marker does not tell where on its plane it is."""
     level = homogeneous([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], (-0.8, 0, 0.0401))
-    with pytest.raises(DeviceError, match="too flat over its plane"):
+    with pytest.raises(DeviceError, match="from too flat an angle"):
         target_pose(np.full((4, 2), 239.5) + np.eye(4)[:, :2], SIMPLE, level, TARGET)
 
 

@@ -1,4 +1,4 @@
-"""What an arm may look like of which only the joints are known: capsules along its Denavit-Hartenberg steps."""
+"""Guessed solids of an arm of which only the joints are known: capsules along its Denavit-Hartenberg steps."""
 
 from __future__ import annotations
 

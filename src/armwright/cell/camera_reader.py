@@ -1,4 +1,4 @@
-"""The cameras of a cell file, and what they look for."""
+"""The cameras of a cell file, and what they search for."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def read_visions(
     markers: Mapping[str, Marker],
     cameras: Mapping[str, Camera],
 ) -> tuple[dict[str, Sight], dict[str, tuple[Array, ...]]]:
-    """Read what a camera answers by frame: what it looks for, or a list of poses.
+    """Read what a camera answers by frame: what it searches for, or a list of poses.
 
     Raises:
         FileFormatError: there is no such part, marker or camera, or a pose is none.
@@ -130,7 +130,7 @@ def _sight(
     cameras: Mapping[str, Camera],
 ) -> Sight:
     if "part" in entry and "marker" in entry:
-        raise entry.error("marker", "a camera looks for a part or for a marker of the scene, not for both")
+        raise entry.error("marker", "a camera finds a part or a marker of the scene, not both")
     camera = known_name(entry, "camera", entry.text("camera"), cameras, "a camera") if "camera" in entry else None
     if camera is None and cameras:
         camera = CAMERA if CAMERA in cameras else next(iter(cameras)) if len(cameras) == 1 else None

@@ -1,4 +1,4 @@
-"""What the bodies of an arm look like for collisions, and which pairs of them are checked: as tables and as data."""
+"""The solids of the bodies of an arm in collisions, and which pairs of them are checked: as tables and as data."""
 
 from __future__ import annotations
 

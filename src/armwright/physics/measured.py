@@ -66,7 +66,7 @@ class Log:
                 self._tracks[name].append((tick * self._cell.period, X))
 
     def add_slip(self, arm: str, slip: float) -> None:
-        """Record how far a part has moved in the hand [m]."""
+        """Record how far a part has moved in the gripper [m]."""
         self.worst_slip[arm] = max(self.worst_slip[arm], slip)
 
     def streams(self) -> tuple[MeasuredStream, ...]:

@@ -36,7 +36,7 @@ _TOLD_APART = 2.0
 
 @attrs.frozen(kw_only=True, eq=False)
 class Target:
-    """What is looked for in a picture.
+    """What is searched for in a picture.
 
     Attributes:
         name: in messages.
@@ -55,7 +55,7 @@ class Target:
 
 
 def target_of(cell: Cell, sight: Sight) -> Target:
-    """Return what to look for in a picture for a sight of a cell.
+    """Return what is searched for in a picture for a sight of a cell.
 
     Raises:
         InvalidValueError: the part has no marker.
@@ -108,7 +108,7 @@ def _refined(brightness: Array, corners: Array, lens: Lens) -> Array | None:
 def _edge(brightness: Array, start: Array, end: Array, lens: Lens) -> Array | None:
     """Return the line n x + m y = d, (3,), of directions with z = 1 along an edge from black to white; None if none.
 
-    Across the edge, what is missing from white tells how far the black reaches, however blurred the edge is.
+    Across the edge, the brightness missing from white gives how far the black reaches, however blurred the edge is.
     """
     length = float(np.linalg.norm(end - start))
     outwards = np.array([end[1] - start[1], start[0] - end[0]]) / length
@@ -167,7 +167,7 @@ def _standing_pose(rays: Array, eye: Array, target: Target, height: float) -> Ar
     Args:
         rays: (4, 3) directions to the corners of the marker in the world.
         eye: (3,) position of the camera.
-        target: what is looked for.
+        target: what is searched for.
         height: of its origin [m].
     """
     name, number = target.name, target.marker.number
@@ -175,7 +175,7 @@ def _standing_pose(rays: Array, eye: Array, target: Target, height: float) -> Ar
     arms = (marker_corners(target.marker.size) @ marker[:3, :3].T + marker[:3, 3]) @ target.start[:3, :3].T
     heights = height + arms[:, 2]
     if (np.abs(rays[:, 2]) < _FLAT * np.linalg.norm(rays, axis=1)).any():
-        raise DeviceError(f"marker {number} of {name} is seen, but too flat over its plane to tell where it is")
+        raise DeviceError(f"marker {number} of {name} is seen, but from too flat an angle to compute its position")
     seen = eye[:2] + ((heights - eye[2]) / rays[:, 2])[:, None] * rays[:, :2]
     here, there = arms[:, :2] - arms[:, :2].mean(axis=0), seen - seen.mean(axis=0)
     cosine, sine = (here * there).sum(), (here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]).sum()
@@ -197,7 +197,7 @@ def _free_pose(rays: Array, X_WC: Array, target: Target) -> Array:
     """Return the pose of the marker of a target in the world of which nothing is known.
 
     Raises:
-        DeviceError: another pose looks nearly the same.
+        DeviceError: another pose gives nearly the same picture.
 
     Source:
         Collins & Bartoli (2014), Infinitesimal plane-based pose estimation.

@@ -95,7 +95,7 @@ def self_pairs(arm: Arm, bodies: Iterable[Body] | None = None, held: Iterable[Bo
 
 
 def random_configurations(arm: Arm) -> Array:
-    """Return the configurations (10000, n) that tell which bodies always touch: within limits, the same every time."""
+    """Return the configurations (10000, n) by which bodies always touch: within limits, the same every time."""
     lower, upper = ranges(arm)
     draws = np.random.default_rng(_SEED).random((CONFIGURATIONS, arm.n))
     return np.asarray(lower + draws * (upper - lower))
@@ -124,7 +124,7 @@ class _Touching:
         self._frames[:, arm.n + 1] = self._frames[:, arm.n]
 
     def always(self, a: int, b: int) -> bool:
-        """Whether two bodies touch in all configurations, as far as a motion can tell."""
+        """Whether two bodies touch in all configurations, to the resolution of motions."""
         return self._all(a, b, slice(0, _FIRST)) and self._all(a, b, slice(_FIRST, CONFIGURATIONS))
 
     def _all(self, a: int, b: int, some: slice) -> bool:
@@ -165,7 +165,7 @@ class _Rod(NamedTuple):
 def touch_bounds(one: Solid, other: Solid, frames: Array, others: Array) -> tuple[Flags, Flags]:
     """Return in which configurations (k,) two solids touch for sure, and in which they may.
 
-    Capsules within the solids, and capsules around them, tell: for capsules and spheres that is all.
+    Capsules within the solids, and capsules around them, bound their distance: for capsules and spheres exactly.
 
     Args:
         one: a solid.

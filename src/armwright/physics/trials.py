@@ -56,7 +56,7 @@ class Verdict:
         cause: why the trial fails, as a code or ``moving``, ``not let go``, ``misplaced``; empty where it succeeds.
         message: the cause in words; empty where it succeeds.
         distance: of the part that is farthest from its goal [m].
-        angle: of the part that is turned most from its goal [rad].
+        angle: of the part that is rotated farthest from its goal [rad].
     """
 
     cause: str = ""

@@ -1,4 +1,4 @@
-"""Why a camera does not see a marker: what a world tells of it that a picture does not."""
+"""Why a camera does not see a marker: known from the world, not from the picture."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _indistinct(camera: Camera, picture: Picture, corners: Array, elevation: flo
     """Return what a marker lacks that nothing hides.
 
     Args:
-        camera: that looks at it.
+        camera: that took the picture.
         picture: with the marker.
         corners: (4, 3) of the marker in the frame of the camera.
         elevation: sine of the angle under which it is looked at.

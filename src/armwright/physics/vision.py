@@ -1,4 +1,4 @@
-"""What the cameras of a cell answer when a program looks for a frame."""
+"""What the cameras of a cell answer when a program reads the vision of a frame."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armwright.physics.visibility import why_unseen
 
 
 class Look(NamedTuple):
-    """A look of a camera.
+    """A picture and what was found in it.
 
     Attributes:
         picture: that it took.

@@ -1,11 +1,11 @@
 """Contacts that a MOVE is meant to make: which pairs of bodies may touch, when, and how deep.
 
-- The fingers of an arm may touch the part that its MOVE goes to, and the part that they have just let go until they
+- The fingers of an arm may touch the part that its MOVE goes to, and the part that they have just released until they
   are clear of it.
 - A held part may touch what stands, to 0.5 mm, on the first and last 10 mm of each stage: what it is taken from and
   set down on.
 - The tool and what it holds may touch anything in a MOVE that a force ends, and in the next one until it is clear.
-- What the fingers hold belongs to the hand; parts rest on what they stand on.
+- What the fingers hold belongs to the gripper; parts rest on what they stand on.
 """
 
 from __future__ import annotations

@@ -157,7 +157,7 @@ def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
 
 
 def _add_cameras(spec: Any, cell: Cell, tools: Mapping[str, Any]) -> None:
-    """Add the cameras of a cell, light, and the markers that they look for."""
+    """Add the cameras of a cell, light, and the markers that they search for."""
     if not cell.cameras:
         return
     add_lights(spec)
@@ -219,7 +219,7 @@ def part_pose(data: Any, name: str) -> Array:
 
 
 def part_velocity(data: Any, name: str) -> Array:
-    """Return the velocity (6,) of a part: of its origin along the axes of the world, and how it turns about its own."""
+    """Return the velocity (6,) of a part: of its origin along the axes of the world, and angular about its own axes."""
     return np.array(data.joint(name).qvel)
 
 

@@ -55,7 +55,7 @@ def arm_figure(name: str, placed: Placed, q: Array, grip: Array, shapes: ShapeTa
 
     Args:
         name: its name.
-        placed: the arm and its place.
+        placed: the arm and where it stands.
         q: (M, n) joint positions at the instants of the animation [rad] or [m].
         grip: (M,) opening of the fingers, 0 to 1.
         shapes: collects the shapes of the page.

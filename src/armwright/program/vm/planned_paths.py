@@ -59,7 +59,7 @@ def replanned(
         move: the MOVE.
         stages: its stages.
         plan: plans a path instead of a stage to one of several configurations.
-        check: looks for what a MOVE runs into.
+        check: finds what a MOVE runs into.
         fixed_duration: whether no stage may take longer than it does.
     """
     done = Replanned(move, stages, {}, check(move))

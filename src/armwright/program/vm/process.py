@@ -135,7 +135,7 @@ class PendingStage(NamedTuple):
 
 
 class Threat(NamedTuple):
-    """What a MOVE under way would run into, because another arm was stopped.
+    """What a running MOVE would run into, because another arm was stopped.
 
     Attributes:
         tick: when that was [ticks].

@@ -1,4 +1,4 @@
-"""Convex hulls of meshes, which take their place in collisions, and where they lie."""
+"""Convex hulls of meshes, which replace them in collisions, and where the hulls differ much."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def hull_messages(bodies: Iterable[tuple[str, Shape]]) -> list[str]:
     messages = []
     if larger:
         messages.append(
-            f"in collisions, convex hulls take the place of meshes, and some are much larger: "
+            f"in collisions, convex hulls replace meshes, and some are much larger: "
             f"{listed(larger, _MAX_LISTED)}; name convex pieces of such a mesh as its pieces"
         )
     if unclosed:
