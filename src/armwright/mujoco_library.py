@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from armwright.errors import MissingExtraError
 from armwright.extras import import_extra
 
-# The environment variable by which MuJoCo is told of one.
+# The environment variable that names one for MuJoCo.
 VARIABLE = "MUJOCO_GL"
 
 
