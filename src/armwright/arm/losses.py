@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from armwright.arm.model import Arm, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm
 
 
 def mean_dry_friction(motor: Motor) -> float:

@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import body_names
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
 from armwright.arm.positions import known_arm
 from armwright.arm.tensors import impossible_moments
 from armwright.arm.uncertainty import Uncertainty

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.arm.model import Arm, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot, articulated_body

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armwright.arm.model import Arm, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.dynamics.arguments import Scalars
 from armwright.tracing.scalar import Scalar, select

@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arm.model import Arm, Joint, Link, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.dynamics.arguments import weighed
 from armwright.errors import UnsupportedArmError

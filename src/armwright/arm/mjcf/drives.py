@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from armwright.arm.model import Limits, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Limits
 from armwright.files.limits import limit
 
 # What MuJoCo takes as the largest number: a limit of this size says that there is none. Our own writer puts it there.

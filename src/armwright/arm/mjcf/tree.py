@@ -14,10 +14,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from armwright.arm.drive import Motor
 from armwright.arm.mjcf.couplings import couplings
 from armwright.arm.mjcf.drives import limits_of, motor_of
 from armwright.arm.mjcf.solids import ellipsoids_of, pose_of, solids_of
-from armwright.arm.model import Limits, Link, Motor
+from armwright.arm.model import Limits, Link
 from armwright.arm.tree.kinematic_tree import check_lock, listed
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, one_of

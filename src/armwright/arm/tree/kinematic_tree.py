@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-from armwright.arm.model import Limits, Link, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Limits, Link
 from armwright.arrays import Array, number
 from armwright.errors import FileFormatError, InvalidValueError, KindError, shown
 from armwright.spatial.shapes import Solid

@@ -10,7 +10,8 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from armwright.arm.model import Limits, Link, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Limits, Link
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.tree.kinematic_tree import check_lock, listed
 from armwright.arm.urdf.elements import Element, origin_of, read_elements
