@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.model import Motor
-from armwright.dynamics.drives import joint_coulomb_friction
+from armwright.dynamics.drives import joint_friction_law
 from armwright.tracing.derivatives import forward_mode, jacobian, replaced, reverse_mode
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph, Traced, operation_count
@@ -93,8 +93,8 @@ def test_random_equations(sample: Sample) -> None:
         (round_half_even, 0.5, 0.0),
         (lambda x: 1.0 * (x < 1.0), 1.0, 0.0),
         (lambda x: select(x > 0.0, x, 3.0 * x), 0.0, 3.0),
-        (lambda x: joint_coulomb_friction(Motor(coulomb_forward=2.0, coulomb_backward=3.0), x), 0.0, 0.0),
-        (lambda x: joint_coulomb_friction(Motor(coulomb_forward=2.0, coulomb_backward=3.0), x), 0.1, 0.0),
+        (lambda x: joint_friction_law(Motor(coulomb_forward=2.0, coulomb_backward=3.0)).dry(x, x), 0.0, 0.0),
+        (lambda x: joint_friction_law(Motor(coulomb_forward=2.0, coulomb_backward=3.0)).dry(x, x), 0.1, 0.0),
     ],
 )
 def test_edges(equation: Callable[[Scalar], Scalar], at: float, expected: float) -> None:

@@ -1,11 +1,11 @@
-"""Limits, drives and friction of joints of a model of MuJoCo."""
+"""Limits, drives, friction and springs of joints of a model of MuJoCo."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from armwright.arm.drive import Motor
+from armwright.arm.drive import Motor, Spring
 from armwright.arm.model import Limits
 from armwright.files.limits import limit
 
@@ -99,8 +99,22 @@ def motor_of(model: Any, joint: int, name: str) -> tuple[Motor, list[str]]:
             viscous += squared * float(model.actuator_damping[i])
     dry = float(model.dof_frictionloss[dof])
     notes = []
-    if model.jnt_stiffness[joint] or model.jnt_stiffnesspoly[joint].any():
-        notes.append(f"joint '{name}': its spring is not read")
     if model.dof_dampingpoly[dof].any():
         notes.append(f"joint '{name}': of its damping only what is proportional to the speed is read")
     return Motor(inertia=inertia, viscous=viscous, coulomb_forward=dry, coulomb_backward=dry), notes
+
+
+def spring_of(model: Any, joint: int, name: str) -> tuple[Spring, list[str]]:
+    """Return the spring of a hinge or a slide, and a sentence if it is not linear.
+
+    Args:
+        model: of MuJoCo.
+        joint: its number.
+        name: its name, for the sentence.
+    """
+    stiffness = float(model.jnt_stiffness[joint])
+    rest = float(model.qpos_spring[model.jnt_qposadr[joint]]) if stiffness else 0.0
+    notes = (
+        [f"joint '{name}': of its spring only the linear part is read"] if model.jnt_stiffnesspoly[joint].any() else []
+    )
+    return Spring(stiffness=stiffness, rest=rest), notes
