@@ -7,7 +7,7 @@ Accuracy, against correctly rounded values (tests/tracing/test_kernel.py): sine 
 rounds products before it adds has 2 ulp up to 1e6, and beyond an error of |x| · 1e-16. Arc tangent within 2 ulp for
 lengths from 1e-320 to 1e300. The sine of -0.0 is +0.0, the sign of an arc tangent at y = -0.0 is that of +0.0, and at
 x = -0.0 it is the arc tangent at +0.0. Exponentials within 2 ulp; those below 1e-307 are 0. Cube roots within 2 ulp for
-magnitudes from 1e-290 to 1e290. What is not a number goes on as such.
+magnitudes up to 1e300. What is not a number goes on as such.
 
 Source:
     Argument reduction in three parts: Cody & Waite (1980). Polynomials of sine and cosine: the fdlibm kernels (Sun
@@ -120,16 +120,16 @@ def cube_root(x: Traced) -> Traced:
 
     It begins with |x|^(1/4 + 1/16 + ... + 1/1024), whose exponent is 1/3 but for a thousandth of it.
     """
-    magnitude = abs(x)
+    # Only the root of 0 is 0; NaN goes on.
+    is_zero = abs(x) <= 0.0
+    magnitude = select(is_zero, 1.0, abs(x))
     y: Scalar = 1.0
     power = magnitude
     for _ in range(5):
         power = traced("sqrt", traced("sqrt", power))
         y = power * y
     for _ in range(3):
-        ratio = y * y * y / magnitude
-        y = y + y * ((1.0 - ratio) / fma(ratio, 2.0, 1.0))
-    signed: Traced = select(x < 0.0, -y, y)
-    # The ratio of 0 is no number.
-    result: Traced = select(magnitude <= 0.0, 0.0, signed)
-    return result
+        other = magnitude / (y * y)
+        y = y + y * ((other - y) / (y + y + other))
+    root: Traced = select(is_zero, 0.0, select(x < 0.0, -y, y))
+    return root
