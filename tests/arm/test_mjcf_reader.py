@@ -277,7 +277,9 @@ def test_what_is_left_out(tmp_path: Path) -> None:
     reading = read_mjcf(written(tmp_path, text))
 
     assert reading.arm.links[0].solids == ()
-    assert {"joint 'turn': of its spring only the linear part is read", "body 'arm': ellipsoids are not read"} <= {*reading.notes}
+    assert {"joint 'turn': of its spring only the linear part is read", "body 'arm': ellipsoids are not read"} <= {
+        *reading.notes
+    }
 
 
 def test_limits_are_raised(tmp_path: Path) -> None:
