@@ -50,7 +50,8 @@ class Motor:
 
         viscous v + Coulomb friction + stribeck exp(-(v / stribeck_speed)²) + cube_root |v|^(1/3)
 
-    and ``offset`` whatever the sign. At rest it holds against up to ``stribeck`` more than Coulomb friction.
+    and ``offset`` whatever the sign. Below 0.1 mrad/s or mm/s the cube root is replaced by a line, so that its slope is
+    finite. At rest friction holds against up to ``stribeck`` more than Coulomb friction.
 
     Attributes:
         inertia: of the rotor and gear at the load side [kg m²], or [kg] for a prismatic joint.

@@ -55,8 +55,8 @@ def inverse_dynamics_derivatives(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: Arr
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps;
-            there Stribeck friction and friction by the cube root of the velocity have it as well.
+        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps, and
+            Stribeck friction at rest.
         qdd: (..., n) joint accelerations.
 
     Returns:
@@ -81,8 +81,8 @@ def forward_dynamics_derivatives(arm: Arm, q: ArrayLike, qd: ArrayLike, tau: Arr
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps;
-            there Stribeck friction and friction by the cube root of the velocity have it as well.
+        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps, and
+            Stribeck friction at rest.
         tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
 
     Returns:

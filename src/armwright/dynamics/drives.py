@@ -13,6 +13,9 @@ from armwright.dynamics.arguments import Scalars
 from armwright.tracing.scalar import Scalar, cbrt, exp, select
 from armwright.tracing.scan import scan
 
+# Below this speed friction by the cube root of the speed is in proportion to the speed [rad/s, m/s].
+SLOW = 1e-4
+
 
 class FrictionLaw(NamedTuple):
     """The friction of a joint by its numbers, or of n joints by arrays (n,), as ``Motor`` describes it.
@@ -57,7 +60,7 @@ class FrictionLaw(NamedTuple):
         """Return the offset and the friction by the cube root of the velocity, which have no jump; 0.0 of none."""
         friction: Scalar = 0.0
         if self.cube_root is not None:
-            friction = self.cube_root * cbrt(velocity)
+            friction = self.cube_root * unit_cube_root_friction(velocity)
         return friction if self.offset is None else friction + self.offset
 
     def beyond_viscous(self, velocity: Scalar, direction: Scalar) -> Scalar:
@@ -66,6 +69,11 @@ class FrictionLaw(NamedTuple):
         if self.offset is None and self.cube_root is None:
             return friction
         return friction + self.smooth(velocity)
+
+
+def unit_cube_root_friction(velocity: Scalar) -> Scalar:
+    """Return the cube root of a velocity; below ``SLOW`` it is in proportion, so that its slope is finite at rest."""
+    return select(abs(velocity) < SLOW, velocity * SLOW ** (-2 / 3), cbrt(velocity))
 
 
 def with_drives(arm: Arm, efforts: Scalars, qd: Scalars, qdd: Scalars) -> list[Scalar]:

@@ -11,10 +11,10 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import Scalars, batch, stack_matrix, weighed
 from armwright.dynamics.bodies import body_of
-from armwright.dynamics.drives import FrictionLaw, joint_friction_law
+from armwright.dynamics.drives import FrictionLaw, joint_friction_law, unit_cube_root_friction
 from armwright.dynamics.joint_frames import joint_steps, lever_behind
 from armwright.dynamics.newton_euler import JointMotion, joint_motions, point_accelerations
-from armwright.tracing.scalar import Scalar, cbrt, select
+from armwright.tracing.scalar import Scalar, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, transpose
 
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -158,7 +158,7 @@ def _joint_columns(motor: Motor, state: Scalars, names: Sequence[str]) -> list[S
     others: dict[str, Callable[[], Scalar]] = {
         "offset": lambda: 1.0,
         "stribeck": lambda: _unit_stribeck(motor).dry(qd, qd),
-        "cube_root": lambda: cbrt(qd),
+        "cube_root": lambda: unit_cube_root_friction(qd),
         "stiffness": lambda: q,
         "preload": lambda: -1.0,
     }

@@ -17,11 +17,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.drives import friction_law
+from armwright.dynamics.drives import SLOW, friction_law
 from armwright.physics.plant import ArmIndices
-
-# Below this speed friction by the cube root is in proportion to the speed [rad/s, m/s].
-_SLOW = 1e-4
 
 
 def dry_offsets(arm: Arm) -> Array:
@@ -53,4 +50,4 @@ class SpeedFriction:
         if (fading := law.fading(speed)) is not None:
             model.dof_frictionloss[self._speeds] = self._dry + fading
         if law.cube_root is not None:
-            model.dof_damping[self._speeds] = law.viscous + law.cube_root * np.maximum(speed, _SLOW) ** (-2 / 3)
+            model.dof_damping[self._speeds] = law.viscous + law.cube_root * np.maximum(speed, SLOW) ** (-2 / 3)
