@@ -105,16 +105,18 @@ def motor_of(model: Any, joint: int, name: str) -> tuple[Motor, list[str]]:
 
 
 def spring_of(model: Any, joint: int, name: str) -> tuple[Spring, list[str]]:
-    """Return the spring of a hinge or a slide, and a sentence if it is not linear.
+    """Return the spring of a hinge or a slide, and sentences on what is not read of it.
 
     Args:
         model: of MuJoCo.
         joint: its number.
-        name: its name, for the sentence.
+        name: its name, for the sentences.
     """
-    stiffness = float(model.jnt_stiffness[joint])
+    stiffness, notes = float(model.jnt_stiffness[joint]), []
+    if stiffness < 0:
+        notes.append(f"joint '{name}': its spring, which pushes away with {-stiffness:g}, is not read")
+        stiffness = 0.0
+    if model.jnt_stiffnesspoly[joint].any():
+        notes.append(f"joint '{name}': of its spring only the linear part is read")
     rest = float(model.qpos_spring[model.jnt_qposadr[joint]]) if stiffness else 0.0
-    notes = (
-        [f"joint '{name}': of its spring only the linear part is read"] if model.jnt_stiffnesspoly[joint].any() else []
-    )
     return Spring(stiffness=stiffness, rest=rest), notes

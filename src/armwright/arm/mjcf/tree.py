@@ -101,7 +101,7 @@ class MjcfJoint:
         return motor_of(self.model, self.number, self.name)
 
     def spring(self) -> tuple[Spring, list[str]]:
-        """Return its spring, and a sentence if that is not linear."""
+        """Return its spring, and sentences on what an arm does not have."""
         return spring_of(self.model, self.number, self.name)
 
     def require_serial(self) -> None:
