@@ -79,7 +79,7 @@ def test_keys(tmp_path: Path) -> None:
     [
         (
             ("stribeck_speed_deg_per_s = 3\n", ""),
-            "joint 1, motor, stribeck_Nm: how it fades is missing: specify stribeck_speed_deg_per_s or stribeck_speed_rad_",
+            "joint 1, motor, stribeck_Nm: how it fades is missing: specify stribeck_speed_deg_per_s or ",
         ),
         (("stribeck_speed_deg_per_s = 3", "stribeck_speed_deg_per_s = 0"), "expected a number above 0, got 0"),
         (("cube_root_Nm = 0.7", "cube_root_Nm = -0.7"), "joint 1, motor, cube_root_Nm: "),
