@@ -152,7 +152,7 @@ def test_a_spring_in_the_way() -> None:
     strained = attrs.evolve(strained, joints=[joint])
     move = quintic([0.0], [3.0], 1.0)
 
-    with pytest.raises(ArmwrightError, match="gravity and Coulomb friction alone require 15 N of joint 1"):
+    with pytest.raises(ArmwrightError, match="gravity, springs and Coulomb friction alone require 15 N of joint 1"):
         slowing_for_efforts(strained, move)
     assert slowing_for_efforts(strained, quintic([0.0], [1.0], 0.8)).factor > 1
 

@@ -26,7 +26,7 @@ from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_hea
 from armwright.tracing.identifiers import identifier
 from armwright.tracing.scalar import Scalar, atan2, cbrt, exp, round_half_even, sqrt
 from oracles import compilers
-from oracles.arms import of_all_kinds, random_arm
+from oracles.arms import of_all_kinds, random_arm, with_all_friction, with_springs
 from oracles.compilers import (
     COMPILERS,
     FMA,
@@ -133,6 +133,22 @@ def test_loops_of_long_arms(name: str, tmp_path: Path, sample: Sample) -> None:
     assert loops[0] or language == "cuda"
     assert not loops[0] or len(texts[1]) < 1.7 * len(texts[0])
     sample.record(f"rows of an arm of 20 joints with the processor's bits, {name}", rows, 0)
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+@pytest.mark.parametrize("joints", [3, 20])
+@pytest.mark.drawn(0.25)
+def test_friction_of_all_kinds(name: str, joints: int, tmp_path: Path, sample: Sample) -> None:
+    """Exponentials and cube roots of an arm's friction have the bits of the processor, in loops over links, too."""
+    rng = np.random.default_rng(sample.seed)
+    arm = with_springs(with_all_friction(random_arm(rng, joints), rng), rng)
+    arm = attrs.evolve(arm, motors=[attrs.evolve(motor, stribeck=1.0, cube_root=2.0) for motor in arm.motors])
+    names = ["inverse_dynamics", "forward_dynamics", "potential_energy"]
+    names += ["inverse_dynamics_derivatives", "regressor"] if joints < 5 else []
+
+    rows = assert_same_bits(name, arm, names, tmp_path, rng)
+
+    sample.record(f"rows of arms with friction of all kinds with the processor's bits, {name}", rows, 0)
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "g++"])

@@ -200,8 +200,9 @@ def check_lasting(arm: Arm, lasting: Array, most: float, at: Array, location: Ca
     if use.max() > most:
         k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
         unit = arm.joints[joint].units.effort
+        causes = "gravity, springs" if any(x.spring.stiffness for x in arm.joints) else "gravity"
         raise IncapableArmError(
-            f"{location(float(at[k]))} gravity and Coulomb friction alone require {abs(lasting[k, joint]):.4g} {unit} "
+            f"{location(float(at[k]))} {causes} and Coulomb friction alone require {abs(lasting[k, joint]):.4g} {unit} "
             f"of {arm.joint_label(joint)}, {arm.joints[joint].limits.effort:.4g} {unit} are allowed: a slower motion "
             "is infeasible too"
         )
