@@ -9,7 +9,7 @@ import pytest
 
 from armwright.cell.model import Cell, ContactPlane
 from armwright.cell.scene import Fixture
-from armwright.physics.scene_contacts import kinematic_cell
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.physics.world import PhysicsCell
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.recording import Recording

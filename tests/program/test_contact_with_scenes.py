@@ -16,7 +16,7 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.jacobians import jacobian
 from armwright.physics.hand_solids import gripper_solids
-from armwright.physics.scene_contacts import kinematic_cell
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording

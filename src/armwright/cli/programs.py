@@ -43,7 +43,7 @@ def hardware_factory(*, physics: bool, seed: int) -> "HardwareFactory":
     """Return how cells are set up to run programs: with physics, or as their files state."""
     from functools import partial
 
-    from armwright.physics.scene_contacts import kinematic_cell
+    from armwright.physics.kinematic_cell import kinematic_cell
 
     if not physics:
         return kinematic_cell

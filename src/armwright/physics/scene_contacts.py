@@ -16,9 +16,9 @@ from armwright.arrays import Array
 from armwright.cell.contact_course import NOTHING, ContactCourse, Pair, Pressing
 from armwright.cell.model import Cell
 from armwright.cell.part_poses import PartPoses
-from armwright.cell.simulator import Simulator
 from armwright.motion.trajectory import Trajectory, hold
-from armwright.physics.clearance import Body, ClearanceChecker, Window
+from armwright.physics.cell_bodies import Body
+from armwright.physics.clearance import ClearanceChecker, Window
 from armwright.physics.collisions import CellCollisions
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
@@ -35,12 +35,6 @@ _RIM = 16
 _SAME_NORMAL = 0.9
 # Time of a first contact [ticks].
 _TIME_TOLERANCE = 1e-8
-
-
-def kinematic_cell(cell: Cell) -> Simulator:
-    """Return the kinematic simulator of a cell; where it has no plane of contact, what stands in it yields to tools."""
-    stands = bool(cell.fixtures or cell.parts) and cell.contact.height is None
-    return Simulator(cell, YieldingScene(cell) if stands else None)
 
 
 class YieldingScene:
@@ -107,8 +101,8 @@ class _ToolMotion:
         solids, radii, depths = self._checker.distances, self._checker.radii, np.full(len(self._pairs), -_TOUCH)
         for place, (own, other) in enumerate(self._pairs):
             if np.linalg.norm(poses[own, :3, 3] - poses[other, :3, 3]) < radii[own] + radii[other] + _TOUCH:
-                solids.place(own, poses[own])
-                solids.place(other, poses[other])
+                solids.set_pose(own, poses[own])
+                solids.set_pose(other, poses[other])
                 depths[place] = -solids.between(own, other, _TOUCH)
         return np.asarray(depths - self._free)
 
@@ -200,7 +194,7 @@ class _ToolMotion:
         """Return where two bodies press on each other (3,) [m], and the direction (3,) in which the tool is pushed."""
         solids = self._checker.distances
         for body in pair:
-            solids.place(body, poses[body])
+            solids.set_pose(body, poses[body])
         own, other = solids.nearest(*pair, within=_TOUCH).points
         normal = (other - own) / np.linalg.norm(other - own)
         centres = [

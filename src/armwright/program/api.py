@@ -15,7 +15,7 @@ from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, KindError, counted, one_of, shown
 from armwright.files.inputs import read_program, regular_file
 from armwright.files.limits import limit, limit_message
-from armwright.physics.scene_contacts import kinematic_cell
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.assembler import assemble
 from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code

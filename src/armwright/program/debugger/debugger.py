@@ -11,7 +11,7 @@ import numpy as np
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
-from armwright.physics.scene_contacts import kinematic_cell
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger import expressions, variables
 from armwright.program.debugger.breakpoints import Breakpoint, HitConditionError, Watch, matches_hit_count

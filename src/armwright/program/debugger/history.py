@@ -12,7 +12,7 @@ import attrs
 
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
-from armwright.physics.scene_contacts import kinematic_cell
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.vm.interpreter import advance, next_process, ready_process
 from armwright.program.vm.machine import Limits, Machine

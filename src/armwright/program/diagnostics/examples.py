@@ -17,7 +17,7 @@ from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Around, Cell, CellArm
 from armwright.cell.reader import read_cell
 from armwright.errors import FileFormatError
-from armwright.physics.scene_contacts import kinematic_cell
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.api import compile as translate, run
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source

@@ -6,7 +6,7 @@ import attrs
 
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell
-from armwright.physics.scene_contacts import kinematic_cell
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
