@@ -33,7 +33,6 @@ class Log:
         self._tracks: dict[str, list[tuple[float, Array]]] = {
             name: [(0.0, part.pose)] for name, part in world.parts.items()
         }
-        self.worst_slip = dict.fromkeys(cell.arms, 0.0)
 
     def copy(self) -> Log:
         """Return the same records; what is added to one does not change the other."""
@@ -42,7 +41,6 @@ class Log:
         other._full = {name: list(blocks) for name, blocks in self._full.items()}
         other._tracks = {name: list(track) for name, track in self._tracks.items()}
         other._rows = {name: rows.copy() for name, rows in self._rows.items()}
-        other.worst_slip = dict(self.worst_slip)
         return other
 
     def add(self, arm: str, tick: int, reference: Reference, measured: Measured, opening: float) -> None:
@@ -64,10 +62,6 @@ class Log:
             X = part_pose(data, name)
             if np.abs(X - self._tracks[name][-1][1]).max() > _STILL:
                 self._tracks[name].append((tick * self._cell.period, X))
-
-    def add_slip(self, arm: str, slip: float) -> None:
-        """Record how far a part has moved in the hand [m]."""
-        self.worst_slip[arm] = max(self.worst_slip[arm], slip)
 
     def streams(self) -> tuple[MeasuredStream, ...]:
         """Return what was recorded, one stream per arm."""

@@ -118,13 +118,14 @@ class Photographer:
         self._context.free()
 
     def _drawing_context(self, width: int, height: int) -> Any:
-        """Return what a drawing of MuJoCo needs, without smoothing of edges: pixels are averaged here."""
+        """Return what a drawing of MuJoCo needs, without shadows and smoothing of edges: pixels are averaged here."""
         quality = self.model.vis.quality
-        samples, quality.offsamples = quality.offsamples, 0
+        before = quality.offsamples, quality.shadowsize
+        quality.offsamples = quality.shadowsize = 0
         try:
             drawing = self._mujoco.MjrContext(self.model, self._mujoco.mjtFontScale.mjFONTSCALE_100.value)
         finally:
-            quality.offsamples = samples
+            quality.offsamples, quality.shadowsize = before
         self._mujoco.mjr_setBuffer(self._mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, drawing)
         self._mujoco.mjr_resizeOffscreen(width, height, drawing)
         return drawing

@@ -15,7 +15,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from armwright.arm.model import STANDARD_GRAVITY
 from armwright.arrays import Array
 from armwright.cell.hardware import DeviceError, Mishap, PeakContact
 from armwright.cell.model import Cell
@@ -28,23 +27,17 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics import mishaps
 from armwright.physics.contacts import Contacts
-from armwright.physics.gripper import GripperDrive
 from armwright.physics.measured import Log
 from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
 from armwright.physics.seeing import target_of
 from armwright.physics.servo import ArmServo, Sent, TorqueLaw
 from armwright.physics.vision import camera_in_world, look
-from armwright.physics.world_model import WorldModel, in_hand, part_pose, part_velocity, tool_pose, world_model
+from armwright.physics.watch import Watch
+from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
 from armwright.spatial.poses import homogeneous, inverse, to_noap
 from armwright.spatial.rotations import rotation_from_vector
 
-# How long a held part may be off the pads, and an arm off its track [s].
-_LOST, _OFF_TRACK = 0.05, 0.02
-# Held parts are looked at so often [s]; a contact counts as over after so long [s].
-_LOOK, _PAUSE = 0.01, 0.1
-# How long an arm is left alone that has had a mishap [s]: it brakes.
-_STOP = 0.2
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
 # Of very many pictures the last ones are kept.
@@ -53,41 +46,6 @@ _MAX_PICTURES = 500
 _MAX_MISHAPS = 1000
 # Ticks between poses of the tool that are compared.
 _TIP_TICKS = 10
-
-
-@attrs.define(eq=False)
-class _Hand:
-    """What an arm of a world holds.
-
-    Attributes:
-        drive: of its gripper.
-        part: in its hand; None without one.
-        pose: (4, 4) of the part seen from the tool when it was gripped.
-        off: for how many ticks it has not been between the pads.
-        closed_tick: at which the gripper will have closed; None where it is not closing.
-        expected: the part that it closes on; None where the program does not say.
-        guarded: whether the program looks out for contact during the motion.
-        off_track: for how many ticks the arm has not been where it was sent.
-        stopping_until: tick up to which the arm is stopped because of a mishap, and others are no news.
-        quiet_until: tick up to which contacts are no news.
-        deepest: how deep the arm has pressed into the plane since its motion began [m].
-    """
-
-    drive: GripperDrive
-    part: str | None = None
-    pose: Array | None = None
-    off: int = 0
-    closed_tick: int | None = None
-    expected: str | None = None
-    guarded: bool = False
-    off_track: int = 0
-    stopping_until: int = 0
-    quiet_until: int = 0
-    deepest: float = 0.0
-
-    def copy(self) -> _Hand:
-        """Return a hand in the same state."""
-        return attrs.evolve(self, drive=self.drive.copy())
 
 
 class PhysicsCell:
@@ -124,7 +82,8 @@ class PhysicsCell:
         self._contacts = Contacts(self._world)
         self._data = _initial_data(self._world)
         model, period = self._world.model, cell.period
-        self._servos, self._hands, self._sent = {}, {}, {}
+        self._watch = Watch(cell, self._world, self._contacts)
+        self._servos, self._sent = {}, {}
         laws = dict(laws or {})
         for name, arm in cell.arms.items():
             self._servos[name] = ArmServo(
@@ -137,15 +96,13 @@ class PhysicsCell:
                 laws.pop(name, None),
             )
             self._servos[name].start(self._data)
-            self._hands[name] = _Hand(GripperDrive(model, name, arm.gripper_or_usual))
-            self._hands[name].drive.start(self._data)
+            self._watch.hands[name].drive.start(self._data)
             self._sent[name] = Sent(hold(arm.start, 0.0), 0, period)
         for name in laws:
             near = closest(name, cell.arms)
             hint = f"; did you mean {near}?" if near else ""
             raise InvalidValueError(f"laws: {name} is no arm of cell '{cell.name}'{hint}")
-        self._every = max(1, round(_LOOK / period))
-        self._tick, self._held = 0, dict[str, str]()
+        self._tick = 0
         self._log = Log(cell, self._world)
         self._pictures: tuple[Picture, ...] = ()
         self._mishaps: tuple[Mishap, ...] = ()
@@ -153,7 +110,6 @@ class PhysicsCell:
         self._photographers: list[Photographer] = []
         # The latest readings of sensors of forces, with their numbers.
         self._forces: dict[str, tuple[int, Array]] = {}
-        self._tracking = {name: _tracking_limits(cell, name) for name in cell.arms}
         self._settle()
 
     def _settle(self) -> None:
@@ -178,12 +134,12 @@ class PhysicsCell:
         other._believed, other._data = self._believed.copy(), mujoco.MjData(self._world.model)
         mujoco.mj_copyData(other._data, self._world.model, self._data)
         other._servos = {name: servo.copy() for name, servo in self._servos.items()}
-        other._hands = {name: hand.copy() for name, hand in self._hands.items()}
-        other._sent, other._held = dict(self._sent), dict(self._held)
+        other._sent = dict(self._sent)
         other._forces = dict(self._forces)
         other._log, other._rng = self._log.copy(), np.random.default_rng()
         other._rng.bit_generator.state = self._rng.bit_generator.state
         other._contacts = copy.copy(self._contacts)
+        other._watch = self._watch.copy(other._contacts)
         return other
 
     # ---- time ----------------------------------------------------------------------------------------------------
@@ -192,21 +148,11 @@ class PhysicsCell:
         """Let time go by, until now or until something goes wrong."""
         end = math.floor(now / self._cell.period + _TICK_TOLERANCE)
         while self._tick < end:
-            mishap = self._step() or self._watch()
-            if mishap is not None and self._is_news(mishap):
+            mishap = self._step() or self._watch.look(self._data, self._tick, self._sent)
+            if mishap is not None:
                 self._mishaps = (*self._mishaps, mishap)[-_MAX_MISHAPS:]
                 return mishap
         return None
-
-    def _is_news(self, mishap: Mishap) -> bool:
-        """Whether a program must be told of a mishap: not while its arm is stopped because of another."""
-        hand = None if mishap.arm is None else self._hands[mishap.arm]
-        if hand is None:
-            return True
-        if self._tick < hand.stopping_until:
-            return False
-        hand.stopping_until = self._tick + round(_STOP / self._cell.period)
-        return True
 
     @property
     def now(self) -> float:
@@ -219,113 +165,22 @@ class PhysicsCell:
 
         data = self._data
         for name, servo in self._servos.items():
-            reference = self._sent[name].at(self._tick)
+            reference, drive = self._sent[name].at(self._tick), self._watch.hands[name].drive
+            servo.load = self._watch.known_load(name)
             try:
                 measured = servo.drive(data, self.now, reference)
             except InvalidValueError:
                 if np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all():
                     raise
                 return mishaps.unstable(self.now)
-            self._hands[name].drive.step(data)
+            drive.step(data)
             noise = self._cell.arms[name].sensors.effort_noise
             if noise:
                 measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
-            self._log.add(name, self._tick, reference, measured, self._hands[name].drive.opening(data))
+            self._log.add(name, self._tick, reference, measured, drive.opening(data))
         mujoco.mj_step(self._world.model, data, self._world.substeps)
         self._tick += 1
         self._log.add_parts(self._tick, data)
-        return None
-
-    # ---- mishaps -------------------------------------------------------------------------------------------------
-
-    def _watch(self) -> Mishap | None:
-        """Return what has gone wrong at this tick."""
-        data, look = self._data, self._tick % self._every == 0
-        if look and _is_unstable(data):
-            return mishaps.unstable(self.now)
-        for name, hand in self._hands.items():
-            if hand.closed_tick is not None and self._tick >= hand.closed_tick:
-                hand.closed_tick = None
-                if (mishap := self._grip(name, hand)) is not None:
-                    return mishap
-            elif look and hand.part is not None and (mishap := self._check_grip(name, hand)) is not None:
-                return mishap
-            if look and (mishap := self._check_track(name, hand)) is not None:
-                return mishap
-        return self._check_contacts()
-
-    def _grip(self, arm: str, hand: _Hand) -> Mishap | None:
-        """See what a gripper holds that has closed."""
-        part = self._contacts.gripped(self._data, arm)
-        if part is None or (hand.expected is not None and part != hand.expected):
-            if hand.expected is None:
-                return None
-            distance = self._distance(arm, hand.expected)
-            return mishaps.closed_on_nothing(self.now, arm, hand.expected, distance)
-        hand.part, hand.pose, hand.off = part, in_hand(self._data, arm, part), 0
-        self._held[arm] = part
-        if self._cell.arms[arm].servo.knows_parts:
-            self._servos[arm].load = self._cell.parts[part].mass
-        self._contacts.hold(self._held)
-        return None
-
-    def _distance(self, arm: str, part: str) -> float:
-        """Return how far the tool of an arm is from where it grips a part [m]."""
-        grasp = part_pose(self._data, part) @ self._cell.parts[part].grasp
-        return float(np.linalg.norm(grasp[:3, 3] - tool_pose(self._data, arm)[:3, 3]))
-
-    def _check_grip(self, arm: str, hand: _Hand) -> Mishap | None:
-        """See whether a part is still in the hand."""
-        assert hand.part is not None  # noqa: S101 - asked for only then
-        assert hand.pose is not None  # noqa: S101
-        there = in_hand(self._data, arm, hand.part)
-        slip = float(np.linalg.norm((inverse(hand.pose) @ there)[:3, 3]))
-        self._log.add_slip(arm, slip)
-        off = self._contacts.gripped(self._data, arm) != hand.part
-        hand.off = hand.off + self._every if off else 0
-        if hand.off * self._cell.period < _LOST and slip <= self._cell.alarms.slip:
-            return None
-        part, gripper = hand.part, hand.drive.gripper
-        self._let_go(arm)
-        pads = 2 if gripper.kind == "fingers" else 1
-        holds = pads * gripper.friction * gripper.force / STANDARD_GRAVITY
-        return mishaps.lost(self.now, arm, part, holds, self._world.parts[part].mass)
-
-    def _let_go(self, arm: str) -> None:
-        hand = self._hands[arm]
-        hand.part = hand.pose = None
-        self._servos[arm].load = 0.0
-        self._held.pop(arm, None)
-        self._contacts.hold(self._held)
-
-    def _check_track(self, arm: str, hand: _Hand) -> Mishap | None:
-        """See whether an arm is where it was sent."""
-        servo = self._servos[arm]
-        error = np.abs(self._sent[arm].at(self._tick).q - self._data.qpos[servo.indices.positions])
-        off = (error > self._tracking[arm]).any()
-        before, hand.off_track = hand.off_track, hand.off_track + self._every if off else 0
-        limit = _OFF_TRACK / self._cell.period
-        if not before < limit <= hand.off_track:
-            return None
-        return mishaps.off_track(self.now, arm, servo.arm, error, self._tracking[arm])
-
-    def _check_contacts(self) -> Mishap | None:
-        """See whether an arm, or what it holds, presses on what it should not, or too deep on the plane."""
-        touch = self._contacts.unwanted(self._data, self._cell.alarms.touch)
-        if touch is not None:
-            hand, quiet = self._hands[touch.arm], max(1, round(_PAUSE / self._cell.period))
-            news = self._tick > hand.quiet_until and not hand.guarded
-            hand.quiet_until = self._tick + quiet
-            if news:
-                return mishaps.touched(self.now, touch)
-        if self._world.plate:
-            depth = self._contacts.plate_depth(self._data)
-            for name, hand in self._hands.items():
-                if hand.guarded and depth > hand.deepest:
-                    allowed = self._cell.contact.max_depth
-                    first, hand.deepest = hand.deepest <= allowed, depth
-                    if depth > allowed and first:
-                        return mishaps.pressed_too_deep(self.now, name, depth, allowed)
         return None
 
     # ---- arms ----------------------------------------------------------------------------------------------------
@@ -344,12 +199,7 @@ class PhysicsCell:
         """Let an arm follow a trajectory that begins where it has been sent."""
         self._believed.start_motion(arm, trajectory, now, tip, guarded=guarded)
         self._sent[arm] = Sent(trajectory, round(now / self._cell.period), self._cell.period)
-        hand = self._hands[arm]
-        if not guarded:
-            # What it pressed on while it was guarded, it may press on until it is away.
-            quiet = self._tick + (round(_PAUSE / self._cell.period) if hand.guarded else 0)
-            hand.quiet_until = max(hand.quiet_until, quiet)
-        hand.guarded, hand.deepest = guarded, 0.0
+        self._watch.start_motion(arm, self._tick, guarded=guarded)
 
     def contact_time(self, arm: str) -> None:
         """Return None: when a motion comes into contact is not known beforehand."""
@@ -359,8 +209,7 @@ class PhysicsCell:
 
     def peak_contact(self, arm: str, now: float) -> PeakContact:  # noqa: ARG002 - it is now
         """Return the deepest contact of an arm with the plane since its latest motion began."""
-        depth = self._hands[arm].deepest
-        return PeakContact(depth, depth * self._cell.contact.stiffness)
+        return self._watch.peak_contact(arm)
 
     def contact_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
         """Return the force (3,) on the tool of an arm and what it holds, as its sensor reads it [N]."""
@@ -385,13 +234,14 @@ class PhysicsCell:
     ) -> float:
         """Close or open the gripper of an arm; return the time it takes."""
         seconds = self._believed.move_fingers(arm, now, closed=closed, width=width, frame=frame)
-        hand, ticks = self._hands[arm], math.ceil(seconds / self._cell.period - _TICK_TOLERANCE)
+        ticks = max(1, math.ceil(seconds / self._cell.period - _TICK_TOLERANCE))
         # It arrives a little earlier than it says.
-        hand.drive.send(self._data, closed=closed, width=width, ticks=max(1, round(0.7 * ticks)))
-        hand.closed_tick = self._tick + max(1, ticks) if closed else None
-        hand.expected = self._part_of(frame) if closed else None
-        if not closed:
-            self._let_go(arm)
+        drive = self._watch.hands[arm].drive
+        drive.send(self._data, closed=closed, width=width, ticks=max(1, round(0.7 * ticks)))
+        if closed:
+            self._watch.close(arm, self._tick + ticks, self._part_of(frame))
+        else:
+            self._watch.open(arm)
         return seconds
 
     def _part_of(self, frame: str | None) -> str | None:
@@ -483,7 +333,7 @@ class PhysicsCell:
                 stream.arm: np.abs(stream.q - stream.sent).max(axis=0, initial=0.0).tolist() for stream in measured
             },
             "tip": {stream.arm: _tip_error(self._cell, stream) for stream in measured},
-            "slip": self._log.worst_slip,
+            "slip": {name: hand.slip for name, hand in self._watch.hands.items()},
             "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
         }
         return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)
@@ -525,22 +375,6 @@ def _tip_error(cell: Cell, stream: MeasuredStream) -> float:
     return float(np.linalg.norm(sent - there, axis=1).max(initial=0.0))
 
 
-def _tracking_limits(cell: Cell, arm: str) -> Array:
-    """Return how far each joint may be from where it was sent, (n,) [rad] or [m]."""
-    alarms = cell.alarms
-    joints = cell.arms[arm].arm.joints
-    return np.array([alarms.tracking_angle if joint.revolute else alarms.tracking_length for joint in joints])
-
-
 def _position_text(X: Array) -> str:
     """Return the text of the position of a pose (4, 4) in the world."""
     return "({:.1f}, {:.1f}, {:.1f}) mm".format(*(X[:3, 3] * 1e3))
-
-
-def _is_unstable(data: Any) -> bool:
-    """Whether positions, speeds or accelerations are no numbers, or have grown beyond all bounds."""
-    import mujoco  # noqa: PLC0415 - only cells with physics need it
-
-    kinds = mujoco.mjtWarning
-    bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC, kinds.mjWARN_BADCTRL)
-    return any(data.warning[int(kind)].number for kind in bad)
