@@ -10,12 +10,11 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.cell.control import Sensors, Servo
+from armwright.cell.control import Servo
 from armwright.cell.hardware import Mishap
-from armwright.cell.model import Cell, CellArm
+from armwright.cell.model import Cell
 from armwright.cell.scene import Part
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError
@@ -285,30 +284,6 @@ def heavier(arm: Arm, factor: float) -> Arm:
     return attrs.evolve(arm, links=links)
 
 
-@pytest.mark.parametrize("name", ["stanford", "puma560", "ur5"])
-def test_another_arm_than_believed(name: str) -> None:
-    """With masses a tenth wrong, friction a third wrong, encoders of 13 bits and a late reading, arms stay on track."""
-    arm = load_arm(name)
-    rough = tuple(
-        attrs.evolve(it, coulomb_forward=1.3 * it.coulomb_forward, coulomb_backward=0.7 * it.coulomb_backward)
-        for it in arm.motors
-    )
-    plant = attrs.evolve(heavier(arm, 1.1), motors=rough)
-    start = np.clip(np.array([0.2, -0.4, 0.3, 0.2, 0.9, 0.1]), arm.limits.lower * 0.9, arm.limits.upper * 0.9)
-    placed = CellArm(arm=arm, start=start, plant=plant, sensors=Sensors(counts=8192, delay=1))
-    cell = Cell(name="off", arms={"ARM_1": placed})
-    world = PhysicsCell(cell)
-    goal = np.clip(start + 0.3 * np.array([1, 1, 0.2, 1, 1, 1]), arm.limits.lower * 0.95, arm.limits.upper * 0.95)
-    world.start_motion("ARM_1", quintic(start, goal, 2.0), 0.0, np.eye(4))
-
-    assert world.advance(3.0) is None
-
-    stream = world.observations().measured[0]
-    error = np.abs(stream.q - stream.sent)
-    assert error.max() < 0.015
-    assert error[-200:].max() < 5e-3
-
-
 def test_a_law_of_its_own(tmp_path: Path) -> None:
     """A user's controller is asked at every tick; one that holds nothing lets the arm fall, which is told."""
     cell, asked = blind(tmp_path), []
@@ -333,9 +308,12 @@ def test_a_weight_on_the_tool(tmp_path: Path) -> None:
     run(cell, program, world)
     arm = cell.arms["ARM_1"].arm
     rng, now = np.random.default_rng(0), world.now
-    for _ in range(5):
+    start = world.sent_configuration("ARM_1", now)
+    for _ in range(20):
         q = world.sent_configuration("ARM_1", now)
-        goal = np.clip(q + rng.uniform(-0.15, 0.15, arm.n) * (1, 1, 0.3, 1, 1, 1), arm.limits.lower, arm.limits.upper)
+        # The prismatic joint moves by less.
+        spread = rng.uniform(-0.6, 0.6, arm.n) * (1, 0.3, 0.1, 1, 1, 1)
+        goal = np.clip(start + spread, arm.limits.lower, arm.limits.upper)
         world.start_motion("ARM_1", quintic(q, goal, 1.5), now, np.eye(4))
         now += 2.5
         assert world.advance(now) is None
