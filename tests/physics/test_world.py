@@ -10,10 +10,7 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.cell.control import Servo
-from armwright.cell.hardware import Mishap
 from armwright.cell.model import Cell
 from armwright.cell.scene import Part
 from armwright.cell.simulator import Simulator
@@ -147,19 +144,6 @@ at = [1,0,0, 0,1,0, 0,0,1, 0.9, 0.5, 0.13]
 [parts.BLOCK]"""
 
 
-def test_an_arm_hits_what_nobody_knew(tmp_path: Path) -> None:
-    """A post that stands where the file has none is hit: R604 names both; the arm is stopped and can go on."""
-    cell = blind(tmp_path, ("[parts.BLOCK]", OBSTACLE))
-    post = attrs.evolve(cell.parts["POST"], pose=flat_pose(0.52, 0.0, 0.13, 0.0))
-
-    error = failure(cell, parts={**cell.parts, "POST": post})
-
-    assert error.diagnostic.code == "R604"
-    assert error.diagnostic.message.startswith(
-        ("ARM_1 palm hits POST with", "ARM_1 link 6 hits POST with", "BLOCK hits POST with")
-    )
-
-
 def test_a_part_too_heavy(tmp_path: Path) -> None:
     """Two fingers of 30 N hold 6.1 kg: 5 kg are carried, 7 kg are lost, R605, and a TRY goes on from there."""
     light = blind(tmp_path, ("mass_kg = 0.2", "mass_kg = 4.5"))
@@ -174,31 +158,6 @@ def test_a_part_too_heavy(tmp_path: Path) -> None:
     given_up = RETRIED.replace("    RETRY ;\n", "    HALT ;\n")
     recording = run(heavy, given_up)
     assert [effect.data["code"] for effect in recording.effects if effect.kind == "ERROR"] == ["R605"]
-
-
-def test_an_arm_that_does_not_follow(tmp_path: Path) -> None:
-    """A servo too weak for its motion leaves the arm behind: R606 names the joint."""
-    cell = blind(tmp_path)
-    soft = attrs.evolve(cell.arms["ARM_1"], servo=Servo(bandwidth=1.0, integral=False, law="pd"))
-    weak = attrs.evolve(cell, arms={"ARM_1": attrs.evolve(soft, plant=heavier(soft.arm, 1.5))})
-
-    error = failure(weak)
-
-    assert error.diagnostic.code == "R606"
-    assert "ARM_1 does not follow its motion: joint" in error.diagnostic.message
-
-
-def test_a_world_without_meaning(tmp_path: Path) -> None:
-    """A speed that is no number ends the run with R607."""
-    cell = blind(tmp_path)
-
-    class Broken(PhysicsCell):
-        def advance(self, now: float) -> Mishap | None:
-            if now > 0.5:
-                self._data.qvel[-1] = np.nan
-            return super().advance(now)
-
-    assert failure(cell, hardware=Broken(cell)).diagnostic.code == "R607"
 
 
 def test_things_inside_each_other(tmp_path: Path) -> None:
@@ -276,12 +235,6 @@ def test_drawn_parts(tmp_path: Path) -> None:
 
 
 # ---- servo and forces ------------------------------------------------------------------------------------------------
-
-
-def heavier(arm: Arm, factor: float) -> Arm:
-    """An arm of which all links weigh more."""
-    links = tuple(attrs.evolve(it, mass=factor * it.mass, inertia=factor * it.inertia) for it in arm.links)
-    return attrs.evolve(arm, links=links)
 
 
 def test_a_law_of_its_own(tmp_path: Path) -> None:
