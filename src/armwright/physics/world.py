@@ -283,6 +283,11 @@ class PhysicsCell:
         Raises:
             DeviceError: it is not found.
         """
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        # A step leaves the poses of its beginning: those of its end belong to what the arms read.
+        mujoco.mj_kinematics(self._world.model, self._data)
+        mujoco.mj_camlight(self._world.model, self._data)
         if not self._photographers:
             self._photographers.append(Photographer(self._world.model, self._cell.cameras))
         carrier = self._cell.cameras[camera].on
