@@ -96,7 +96,7 @@ def test_cameras_anywhere(arm: str, sample: Sample, tmp_path: Path) -> None:
     worst = {name: float(np.max(seen, axis=0)[0]) for name, seen in errors.items() if seen}
     sample.record(f"blocks seen beside {arm}", len(every), int(bad.sum()), hidden=hidden, **worst)
     assert bad.sum() <= max(1, 0.05 * len(every))
-    assert hidden < 0.3 * (len(every) + hidden)
+    assert hidden < 0.3 * (len(every) + hidden) or not sample.whole
 
 
 def test_a_camera_on_the_way(tmp_path: Path, rng: np.random.Generator) -> None:

@@ -179,8 +179,9 @@ class PhysicsCell:
                 measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
             self._log.add(name, self._tick, reference, measured, drive.opening(data))
         mujoco.mj_step(self._world.model, data, self._world.substeps)
-        self._tick += 1
+        # The step leaves the poses of its beginning.
         self._log.add_parts(self._tick, data)
+        self._tick += 1
         return None
 
     # ---- arms ----------------------------------------------------------------------------------------------------
