@@ -67,7 +67,7 @@ def test_placed_by_vision(arm: str, sample: Sample, tmp_path: Path) -> None:
     pytest.importorskip("cv2")
     cell = bench(tmp_path, arm)
     code = compiled(cell).code
-    off, tips, rejected = [], [], 0
+    off, tips, slips, rejected = [], [], [], 0
     for number, rng in enumerate(sample.cases(100)):
         drawn, parts, goal, refused = drawn_bench(cell, arm, rng)
         rejected += refused
@@ -75,15 +75,23 @@ def test_placed_by_vision(arm: str, sample: Sample, tmp_path: Path) -> None:
         recording = interpret(code, drawn, world)
         off.append(placing_error(world.true_pose("BLOCK"), goal))
         tips.append(recording.observations.facts["tip"]["ARM_1"])
+        slips.append(recording.observations.facts["slip"]["ARM_1"])
         same_trace(attrs.evolve(drawn, parts=parts), code, recording)
     distances = np.array(off)[:, 0]
     sample.record(
-        f"blocks placed by {arm}", len(off), int((distances > 2e-3).sum()), worst=distances.max(), rejected=rejected
+        f"blocks placed by {arm}",
+        len(off),
+        int((distances > 2e-3).sum()),
+        worst=distances.max(),
+        tip=max(tips),
+        slip=max(slips),
+        rejected=rejected,
     )
     assert distances.max() < 2e-3
     assert np.quantile(distances, 0.95) < 1e-3
     assert max(angle for _, angle in off) < np.radians(2.0)
     assert max(tips) < 1e-3
+    assert max(slips) < 3e-4
 
 
 def same_trace(cell: Cell, code: Any, recording: Recording) -> None:
