@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arm.model import Arm, Joint, Link, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.dynamics.arguments import weighed
 from armwright.errors import UnsupportedArmError
@@ -189,16 +190,13 @@ def _add_joint(body: Any, name: str, joint: Joint, motor: Motor, before: Array) 
         pos=before[:3, 3] if joint.revolute else np.zeros(3),
         armature=motor.inertia,
         damping=[motor.viscous, 0.0, 0.0],
-        # The part that both directions share; ``dry_offsets`` has the rest.
+        # The part that both directions share; ``friction`` has the rest.
         frictionloss=(motor.coulomb_forward + motor.coulomb_backward) / 2,
     )
+    if joint.spring.stiffness:
+        added.stiffness, added.springref = [joint.spring.stiffness, 0.0, 0.0], joint.spring.rest
     if np.isfinite((limits.lower, limits.upper)).all():
         added.limited, added.range = mujoco.mjtLimited.mjLIMITED_TRUE, (limits.lower, limits.upper)
-
-
-def dry_offsets(arm: Arm) -> Array:
-    """Return the constant efforts (n,) that make two-sided dry friction of friction alike in both directions."""
-    return (arm.motor_values("coulomb_backward") - arm.motor_values("coulomb_forward")) / 2
 
 
 def arm_indices(model: Any, name: str, n: int) -> ArmIndices:

@@ -14,11 +14,12 @@ from armwright.cell.model import Cell
 from armwright.cell.scene import Part
 from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import arm_bodies
+from armwright.physics.friction import SpeedFriction
 from armwright.physics.geoms import add_geom, placement, principal_inertia, quaternion
 from armwright.physics.gripper import add_gripper, grip
 from armwright.physics.markers import add_marker
 from armwright.physics.pictures import add_camera, add_lights
-from armwright.physics.plant import PlantArm, add_arm, finish, new_world
+from armwright.physics.plant import PlantArm, add_arm, arm_indices, finish, new_world
 from armwright.physics.vision import marker_name
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Solid, centroid, convex_solids, farthest, inertia
@@ -56,6 +57,7 @@ class WorldModel:
         cell: what it is the world of.
         model: the MjModel.
         substeps: of the world in one period of the servo.
+        frictions: of arms whose friction changes with the speed.
         parts: the parts as they are in it.
         plate: whether a plane that yields is in it.
     """
@@ -63,8 +65,21 @@ class WorldModel:
     cell: Cell
     model: Any
     substeps: int
+    frictions: tuple[SpeedFriction, ...]
     parts: Mapping[str, Part]
     plate: bool
+
+    def step(self, data: Any) -> None:
+        """Let one period of the servo go by."""
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        if not self.frictions:
+            mujoco.mj_step(self.model, data, self.substeps)
+            return
+        for _ in range(self.substeps):
+            for friction in self.frictions:
+                friction.set(self.model, data)
+            mujoco.mj_step(self.model, data)
 
 
 def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
@@ -80,7 +95,16 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     spec, plants = world_spec(cell, parts)
     substeps = round(cell.period / spec.option.timestep)
     plate = cell.contact.height is not None
-    return WorldModel(cell=cell, model=finish(spec, plants), substeps=substeps, parts=parts, plate=plate)
+    model = finish(spec, plants)
+    frictions = [SpeedFriction(arm.arm, arm_indices(model, arm.name, arm.arm.n)) for arm in plants]
+    return WorldModel(
+        cell=cell,
+        model=model,
+        substeps=substeps,
+        frictions=tuple(friction for friction in frictions if friction.is_there),
+        parts=parts,
+        plate=plate,
+    )
 
 
 def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantArm, ...]]:

@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-from armwright.arm.model import Limits, Link, Motor
+from armwright.arm.drive import Motor, Spring
+from armwright.arm.model import Limits, Link
 from armwright.arrays import Array, number
 from armwright.errors import FileFormatError, InvalidValueError, KindError, listed, shown
 from armwright.spatial.shapes import Solid
@@ -58,6 +59,9 @@ class TreeJoint(Protocol):
 
     def motor(self) -> tuple[Motor, list[str]]:
         """Return its drive, and sentences on what was not taken as it stands."""
+
+    def spring(self) -> tuple[Spring, list[str]]:
+        """Return its spring, and sentences on what was not taken as it stands."""
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.

@@ -10,7 +10,8 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from armwright.arm.model import Limits, Link, Motor
+from armwright.arm.drive import Motor, Spring
+from armwright.arm.model import Limits, Link
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.tree.kinematic_tree import check_lock, quoted
 from armwright.arm.urdf.elements import Element, origin_of, read_elements
@@ -87,6 +88,10 @@ class UrdfJoint:
     def motor(self) -> tuple[Motor, list[str]]:
         """Return its friction."""
         return motor_of(self), []
+
+    def spring(self) -> tuple[Spring, list[str]]:
+        """Return that it has none: URDF has no springs."""
+        return Spring(), []
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the joint."""
