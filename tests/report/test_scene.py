@@ -229,7 +229,9 @@ def planned_and_measured(error: Array) -> tuple[Stream, MeasuredStream]:
     planned = Stream(arm="ARM_1", t=times, q=q, qd=zeros, qdd=zeros, tau=zeros)
     at = 2.0 * t / t[-1] + error
     zero = np.zeros((len(t), 1))
-    return planned, MeasuredStream(arm="ARM_1", t=t, q=at[:, None], qd=zero, tau=zero, sent=zero, opening=zero[:, 0])
+    return planned, MeasuredStream(
+        arm="ARM_1", t=t, q=at[:, None], qd=zero, tau=zero, sent=zero, actual=zero, opening=zero[:, 0]
+    )
 
 
 def test_spikes_of_the_tracking_error_survive() -> None:
@@ -419,7 +421,14 @@ def test_measured_beside_planned(visit, stocked: Recording) -> None:
     off = np.zeros_like(stream.q)
     off[:, 0] = 2e-3 * np.sin(stream.t) * (stream.t < 3)
     measured = MeasuredStream(
-        arm=stream.arm, t=stream.t, q=stream.q + off, qd=stream.qd, tau=stream.tau, sent=stream.q, opening=0 * stream.t
+        arm=stream.arm,
+        t=stream.t,
+        q=stream.q + off,
+        qd=stream.qd,
+        tau=stream.tau,
+        sent=stream.q,
+        actual=stream.q,
+        opening=0 * stream.t,
     )
     opened = visit(page_of(observed(stocked, measured=(measured,))))
     plain = visit(page_of(stocked))
