@@ -150,7 +150,8 @@ def _mesh_hash(cell: "Cell") -> str:
     solids = [
         solid for arm in arms for solids in (arm.base_solids, *(it.solids for it in arm.links)) for solid in solids
     ]
-    shapes = [it.shape for it in (*cell.parts.values(), *cell.fixtures.values(), *solids)]
+    bodies = [it.shape for it in cell.parts.values()] + [it.shape for it in cell.fixtures.values()]
+    shapes = bodies + [it.shape for it in solids]
     total = sha256()
     for mesh in (mesh for it in shapes if isinstance(it, Mesh) for mesh in (it, *it.pieces)):
         total.update(mesh.vertices.tobytes())
