@@ -373,9 +373,14 @@ def _initial_data(world: WorldModel) -> Any:
 
 
 def _tip_error(cell: Cell, stream: MeasuredStream) -> float:
-    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m]."""
-    arm = cell.arms[stream.arm].arm
-    sent, there = (forward(arm, q[::_TIP_TICKS])[:, :3, 3] for q in (stream.sent, stream.q))
+    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m].
+
+    The tool is where the arm of the world has it, whatever the sensors read; where it was sent is what the controller
+    believes.
+    """
+    arm = cell.arms[stream.arm]
+    sent = forward(arm.arm, stream.sent[::_TIP_TICKS])[:, :3, 3]
+    there = forward(arm.plant or arm.arm, stream.actual[::_TIP_TICKS])[:, :3, 3]
     return float(np.linalg.norm(sent - there, axis=1).max(initial=0.0))
 
 
