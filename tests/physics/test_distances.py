@@ -25,8 +25,8 @@ def test_a_capsule_through_a_box(sample: Sample) -> None:
         centre = inside + R[:, 2] * rng.uniform(-0.5, 0.5) * capsule.length
         distances = Distances([Box(size=size), capsule])
         X = homogeneous(rotation_from_vector(rng.normal(size=3)), rng.normal(size=3))
-        distances.place(0, X)
-        distances.place(1, X @ homogeneous(R, centre))
+        distances.set_pose(0, X)
+        distances.set_pose(1, X @ homogeneous(R, centre))
 
         ends = [centre + R[:, 2] * side * capsule.length / 2 for side in (-1, 1)]
         corners = np.array(list(product(*((-x / 2, x / 2) for x in size))))
