@@ -124,17 +124,18 @@ def _surface(friction: float) -> dict[str, Any]:
     return {"friction": (friction, *_ROLLING), "condim": _CONDIM}
 
 
-def _furniture(friction: float) -> dict[str, Any]:
+def _furniture(friction: float, contact_time: float = _SOFT) -> dict[str, Any]:
     """Return the options of what stands: softer than pads, whose own stiffness would make every touch a blow."""
-    return {**_surface(friction), "priority": 2, "solref": (_SOFT, 1.0)}
+    return {**_surface(friction), "priority": 2, "solref": (contact_time, 1.0)}
 
 
 def _add_standing(spec: Any, cell: Cell) -> None:
     for name, fixture in cell.fixtures.items():
         solid = Solid(shape=fixture.shape, pose=fixture.pose)
         bits = {"contype": _STANDING, "conaffinity": _ALL}
+        surface = _furniture(fixture.friction, fixture.contact_time)
         for label, piece in _pieces(name, solid):
-            add_geom(spec, spec.worldbody, label, piece, rgba=_FURNITURE, **bits, **_furniture(fixture.friction))
+            add_geom(spec, spec.worldbody, label, piece, rgba=_FURNITURE, **bits, **surface)
 
 
 def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
