@@ -18,6 +18,8 @@ SightKind: TypeAlias = Literal["part", "marker"]
 
 # The name of the body of a table, and of the camera of a cell with one.
 TABLE, CAMERA = "TABLE", "CAMERA"
+# The time constant of contacts with what stands [s].
+USUAL_CONTACT_TIME = 0.02
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -37,7 +39,7 @@ class Fixture:
     shape: Shape
     pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     friction: float = 0.8
-    contact_time: float = 0.02
+    contact_time: float = USUAL_CONTACT_TIME
     on: str = WORLD
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from armwright.arm.solid_entries import shape_in
 from armwright.cell.entries import read_frame, read_name, read_pose, read_spread, refuse_too_many
 from armwright.cell.frames import FrameTree
-from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, table
+from armwright.cell.scene import TABLE, USUAL_CONTACT_TIME, Fixture, Gripper, Marker, Part, table
 from armwright.errors import counted
 from armwright.files.document import Table
 from armwright.spatial.shapes import LARGEST_SIZE, Mesh, Shape, is_closed, open_edges
@@ -46,7 +46,7 @@ def read_fixtures(scene: Table, frames: FrameTree) -> dict[str, Fixture]:
                 shape=shape_in(entry, shape),
                 pose=frames.world(on) @ read_pose(entry, "at"),
                 friction=_friction(entry),
-                contact_time=entry.number("contact_ms", default=20.0, lower=0.1, upper=1e3) * 1e-3,
+                contact_time=entry.number("contact_ms", default=USUAL_CONTACT_TIME * 1e3, lower=2.0, upper=1e3) * 1e-3,
                 on=on,
             )
             entry.refuse_unknown_keys()

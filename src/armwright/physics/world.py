@@ -342,6 +342,7 @@ class PhysicsCell:
             },
             "tip": {stream.arm: _tip_error(self._cell, stream) for stream in measured},
             "slip": {name: hand.slip for name, hand in self._watch.hands.items()},
+            "frames": {name: to_noap(self.true_frame(name)).tolist() for name in self._cell.spreads},
             "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
         }
         return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)

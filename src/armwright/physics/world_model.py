@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell
-from armwright.cell.scene import Part
+from armwright.cell.scene import USUAL_CONTACT_TIME, Part
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.geoms import add_geom, place, quaternion
 from armwright.physics.gripper import add_gripper, grip
@@ -32,8 +32,6 @@ _MAX_ARMS = 28
 # Contacts of parts and furniture: sliding, turning, rolling.
 _ROLLING = (0.005, 1e-4)
 _CONDIM = 4
-# Time constant of contacts with what stands [s].
-_SOFT = 0.02
 # How far below everything that stands the floor lies on which lost parts fall, and its half size [m].
 _BELOW, _FLOOR = 0.5, 20.0
 # The plate under a plane that yields: light, so that it adds nothing to what presses on it [kg], and damped.
@@ -124,7 +122,7 @@ def _surface(friction: float) -> dict[str, Any]:
     return {"friction": (friction, *_ROLLING), "condim": _CONDIM}
 
 
-def _furniture(friction: float, contact_time: float = _SOFT) -> dict[str, Any]:
+def _furniture(friction: float, contact_time: float = USUAL_CONTACT_TIME) -> dict[str, Any]:
     """Return the options of what stands: softer than pads, whose own stiffness would make every touch a blow."""
     return {**_surface(friction), "priority": 2, "solref": (contact_time, 1.0)}
 
