@@ -14,6 +14,7 @@ from armwright.cell.model import Cell
 from armwright.cell.scene import USUAL_CONTACT_TIME, Part
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.geoms import add_geom, place, quaternion
+from armwright.physics.graphics import load_mujoco
 from armwright.physics.gripper import add_gripper, grip
 from armwright.physics.markers import add_marker
 from armwright.physics.pictures import add_camera, add_lights
@@ -74,10 +75,14 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     Raises:
         UnsupportedArmError: masses of an arm are unknown.
     """
+    mujoco = load_mujoco()
     spec, plants = world_spec(cell, parts)
     substeps = round(cell.period / spec.option.timestep)
     plate = cell.contact.height is not None
-    return WorldModel(cell=cell, model=finish(spec, plants), substeps=substeps, parts=parts, plate=plate)
+    model = finish(spec, plants)
+    # Parts at rest are left out of the equations until something touches them; arms never are.
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    return WorldModel(cell=cell, model=model, substeps=substeps, parts=parts, plate=plate)
 
 
 def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantArm, ...]]:
