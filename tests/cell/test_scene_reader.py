@@ -233,9 +233,9 @@ boxes = [{{ name = "WALL", on = "rim", at = {HERE}, size_mm = [1, 1, 1], contact
 @pytest.mark.parametrize(
     ("frames", "body", "said"),
     [
-        ("", 'on = "BENCK"', "on: BENCK is not a frame of the file on which a body can stand; did you mean BENCH?"),
-        ("", 'on = "ARM_1"', "on: ARM_1 is not a frame of the file on which a body can stand"),
-        ("", 'on = "HELD"', "on: HELD is not a frame of the file on which a body can stand"),
+        ("", 'on = "BENCK"', "on: BENCK is not a standing frame of the cell; did you mean BENCH?"),
+        ("", 'on = "ARM_1"', "on: ARM_1 is not a standing frame of the cell; there is BENCH, STATION, WORLD"),
+        ("", 'on = "HELD"', "on: HELD is not a standing frame of the cell; there is BENCH, STATION, WORLD"),
         ("", "contact_ms = 0", "contact_ms: expected 2 to 1000, got 0"),
         ("TIP = { on = 'HELD', at = @, spread_mm = 1 }", "", "TIP: TIP moves with ARM_1; only a frame that stands"),
         ("TIP = { at = @, spread_mm = -1 }", "", "spread_mm: expected 0 to 1e+06, got -1"),

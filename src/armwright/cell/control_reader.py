@@ -53,7 +53,7 @@ def read_force_sensor(entry: Table) -> ForceSensor:
     return sensor
 
 
-def read_plant(entry: Table, believed: Arm, folder: Path) -> Arm:
+def read_plant(entry: Table, model: Arm, folder: Path) -> Arm:
     """Read the arm that stands in the world, where it is another than the controller believes.
 
     Raises:
@@ -64,8 +64,8 @@ def read_plant(entry: Table, believed: Arm, folder: Path) -> Arm:
         arm = weighed(load_arm(regular_file(folder / name) if is_path(name) else name))
     except ArmwrightError as error:
         raise entry.error("model", str(error)) from error
-    if [joint.kind for joint in arm.joints] != [joint.kind for joint in believed.joints]:
-        kinds = ", ".join(joint.kind for joint in believed.joints)
+    if [joint.kind for joint in arm.joints] != [joint.kind for joint in model.joints]:
+        kinds = ", ".join(joint.kind for joint in model.joints)
         raise entry.error("model", f"expected an arm with the joints of the model ({kinds}), got '{arm.name}'")
     entry.refuse_unknown_keys()
     return arm

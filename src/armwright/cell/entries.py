@@ -1,7 +1,7 @@
 """Entries that recur in cell files: names and poses."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
@@ -36,21 +36,33 @@ def read_name(table: Table, key: str, taken: Iterable[str], text: str | None = N
     return name
 
 
+def known_name(table: Table, key: str, name: str, known: Collection[str], kind: str) -> str:
+    """Return a name under a key, in upper case, that must be one of those of the cell.
+
+    Args:
+        table: with the key.
+        key: for the message.
+        name: as it is written.
+        known: names of the cell.
+        kind: what they are, with its article, such as ``a part``.
+
+    Raises:
+        FileFormatError: it is none of them.
+    """
+    name = read_name(table, key, (), name)
+    if name not in known:
+        near = closest(name, known)
+        there = f"there is {', '.join(sorted(known))}" if known else "there is none"
+        raise table.error(key, f"{name} is not {kind} of the cell; {f'did you mean {near}?' if near else there}")
+    return name
+
+
 def read_pose(table: Table, key: str, default: Array | None = None) -> Array:
     """Return a pose (4, 4), written as twelve numbers; the default where the key is missing."""
     if default is not None and key not in table:
         table.allow(key)
         return default
     return to_pose(table, key, table.vector(key, 12))
-
-
-def read_frame(table: Table, key: str, known: Iterable[str], kind: str) -> str:
-    """Return the name of one of some frames, WORLD where the key is missing; the kind is what is expected, in words."""
-    name = read_name(table, key, (), table.text(key, default=WORLD))
-    if name not in known:
-        near = closest(name, known)
-        raise table.error(key, f"{name} is not {kind}" + (f"; did you mean {near}?" if near else ""))
-    return name
 
 
 def read_spread(table: Table, position: str, yaw: str, tilt: str | None = None) -> Spread:

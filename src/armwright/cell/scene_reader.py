@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from armwright.arm.solid_entries import shape_in
-from armwright.cell.entries import read_frame, read_name, read_pose, read_spread, refuse_too_many
-from armwright.cell.frames import FrameTree
+from armwright.cell.entries import known_name, read_name, read_pose, read_spread, refuse_too_many
+from armwright.cell.frames import WORLD, FrameTree
 from armwright.cell.scene import TABLE, USUAL_CONTACT_TIME, Fixture, Gripper, Marker, Part, table
 from armwright.errors import counted
 from armwright.files.document import Table
@@ -40,7 +40,7 @@ def read_fixtures(scene: Table, frames: FrameTree) -> dict[str, Fixture]:
     for kind, shape in _FIXTURES.items():
         for entry in scene.tables(kind) if kind in scene else ():
             name = read_name(entry, "name", fixtures, entry.text("name"))
-            on = read_frame(entry, "on", frames, "a frame of the file on which a body can stand")
+            on = known_name(entry, "on", entry.text("on", default=WORLD), [*frames], "a standing frame")
             fixtures[name] = Fixture(
                 name=name,
                 shape=shape_in(entry, shape),

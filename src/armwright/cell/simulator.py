@@ -230,7 +230,7 @@ class Simulator:
         """Close or open the fingers of an arm; return the time it takes [s].
 
         The fingers of this simulator take the same time for every width, that of the file. A part that they close on
-        moves with the hand from now on, see ``PartPoses``; what they release stays where it is, and does not press on
+        moves with the tool from now on, see ``PartPoses``; what they release stays where it is, and does not press on
         the plane any more.
         """
         if self._cell.parts:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.cell.scene import Gripper
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.geoms import add_geom
 from armwright.physics.hand_solids import gripper_solids
 from armwright.spatial.poses import homogeneous
@@ -109,8 +110,7 @@ def _add_cup(spec: Any, name: str, tool: Any, gripper: Gripper, options: dict[st
 
 def _add_finger(spec: Any, tool: Any, name: str, sign: float, gripper: Gripper) -> Any:
     """Add a finger to a tool, with its slide and its drive, and return its body."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     finger = tool.add_body(name=name, gravcomp=1.0)
     finger.explicitinertial, finger.mass, finger.inertia = True, _FINGER_MASS, (_FINGER_INERTIA,) * 3
     finger.ipos = np.zeros(3)
@@ -130,8 +130,7 @@ def _add_finger(spec: Any, tool: Any, name: str, sign: float, gripper: Gripper) 
 
 def _couple(spec: Any, name: str) -> None:
     """Let both fingers of an arm be equally far open: without that a part floats between two forces."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     coupling = spec.add_equality(
         name=f"{name}/fingers",
         type=mujoco.mjtEq.mjEQ_JOINT,

@@ -165,8 +165,6 @@ class PhysicsCell:
 
     def _step(self) -> Mishap | None:
         """Let one period of the servo go by; return that this cannot be, if numbers without meaning come to a servo."""
-        import mujoco  # noqa: PLC0415 - only cells with physics need it
-
         data = self._data
         for name, servo in self._servos.items():
             reference, drive = self._sent[name].at(self._tick), self._watch.hands[name].drive
@@ -182,7 +180,7 @@ class PhysicsCell:
             if noise:
                 measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
             self._log.add(name, self._tick, reference, measured, drive.opening(data))
-        mujoco.mj_step(self._world.model, data, self._world.substeps)
+        self._world.step(data)
         self._tick += 1
         self._log.add_parts(self._tick, data)
         return None

@@ -9,14 +9,14 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell
-from armwright.cell.part_poses import PartTrack
+from armwright.cell.part_poses import PartTrack, width_across
 from armwright.cell.scene import Fixture
 from armwright.program.vm.recording import Effect, Recording
 from armwright.report.animation import Body, MovedPart
 from armwright.report.arm_figure import Placed
 from armwright.report.shape_table import ShapeTable, shape_data
 from armwright.spatial.poses import to_noap
-from armwright.spatial.shapes import Box, support
+from armwright.spatial.shapes import Box
 
 # Bodies of the scene that the view draws at most, and as many parts.
 MAX_BODIES = 400
@@ -32,14 +32,13 @@ def placed_arms(cell: Cell) -> dict[str, Placed]:
 
     Their guessed links are drawn as they are checked for collisions, wherever there is anything to collide with.
     """
-    checked = bool(cell.fixtures or cell.parts) or len(cell.arms) > 1
     return {
         name: Placed(
             arm=arm.arm,
             base=arm.base,
             floor=_floor_below((arm.base @ arm.arm.base)[:3, 3], cell.fixtures),
             gripper=arm.gripper,
-            as_checked=checked,
+            as_checked=cell.collisions_matter,
         )
         for name, arm in cell.arms.items()
     }
@@ -139,10 +138,8 @@ def _held_width(recording: Recording, tracks: Mapping[str, PartTrack], grasp: Ef
     for name, track in tracks.items():
         i = int(np.searchsorted(track.times, grasp.t1 + 1e-9, side="right")) - 1
         if i >= 0 and track.arms[i] == grasp.arm:
-            shape, X = recording.cell.parts[name].shape, track.poses[i]
-            o = X[:3, :3].T[:, 1]
-            widths.append(2 * max(X[1, 3] + support(shape, o), support(shape, -o) - X[1, 3]))
-    return float(max(widths))
+            widths.append(width_across(recording.cell.parts[name].shape, track.poses[i]))
+    return max(widths)
 
 
 def scene_data(cell: Cell) -> list[dict[str, Any]]:
