@@ -26,6 +26,8 @@ from armwright.spatial.shapes import Solid, centroid, convex_solids, farthest, i
 
 # No step of the world is longer [s].
 _MAX_STEP = 1e-3
+# Parts slower than this are at rest [m/s]: with less care they would stop before they have settled.
+_AT_REST = 1e-6
 # What meets what: bits of geoms. Arms have one each, from the third on.
 _STANDING, _PART = 1, 2
 _HAND = 1 << 30
@@ -97,6 +99,7 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     model = finish(spec, plants)
     # Parts at rest are left out of the equations until something touches them; arms never are.
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    model.opt.sleep_tolerance = _AT_REST
     frictions = [SpeedFriction(arm.arm, arm_indices(model, arm.name, arm.arm.n)) for arm in plants]
     return WorldModel(
         cell=cell,
