@@ -28,7 +28,7 @@ _FINGER_MASS, _FINGER_INERTIA = 5e-3, 1e-6
 # What the drive of a finger moves, and its damping; gains with which it is positioned.
 _DRIVE_INERTIA, _DRIVE_DAMPING, _STIFFNESS, _SPEED_GAIN = 0.1, 20.0, 4000.0, 60.0
 # Damping of friction of held parts, by the step of the world.
-_FRICTION_DAMPING = 1.8
+_FRICTION_DAMPING = 1.9
 # So far inside what they hold fingers are sent [m]: the limit of their force decides.
 _INSIDE = 0.01
 # A soft constraint of one geom with what it touches: rolling and torsional friction are small.

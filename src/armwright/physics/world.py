@@ -181,8 +181,9 @@ class PhysicsCell:
                 measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
             self._log.add(name, self._tick, reference, measured, drive.opening(data))
         self._world.step(data)
-        self._tick += 1
+        # A step leaves the poses of its beginning.
         self._log.add_parts(self._tick, data)
+        self._tick += 1
         return None
 
     # ---- arms ----------------------------------------------------------------------------------------------------
@@ -285,6 +286,11 @@ class PhysicsCell:
         Raises:
             DeviceError: it is not found.
         """
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        # A step leaves the poses of its beginning: those of its end belong to what the arms read.
+        mujoco.mj_kinematics(self._world.model, self._data)
+        mujoco.mj_camlight(self._world.model, self._data)
         if not self._photographers:
             self._photographers.append(Photographer(self._world.model, self._cell.cameras))
         carrier = self._cell.cameras[camera].on

@@ -71,8 +71,7 @@ class WorldModel:
 
     def step(self, data: Any) -> None:
         """Let one period of the servo go by."""
-        import mujoco  # noqa: PLC0415 - only cells with physics need it
-
+        mujoco = load_mujoco()
         if not self.frictions:
             mujoco.mj_step(self.model, data, self.substeps)
             return
