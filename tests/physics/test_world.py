@@ -15,7 +15,6 @@ from armwright.cell.model import Cell
 from armwright.cell.scene import Part
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError
-from armwright.motion.quintic_polynomials import quintic
 from armwright.physics.servo import Reference
 from armwright.physics.world import PhysicsCell, drawn_parts
 from armwright.program.debugger.history import Timeline
@@ -259,28 +258,6 @@ def test_a_law_of_its_own(tmp_path: Path) -> None:
     np.testing.assert_allclose([t for t, _ in asked[:3]], [0.0, 1e-3, 2e-3])
     with pytest.raises(InvalidValueError, match="ARM_2 is no arm of cell 'bench'; did you mean ARM_1"):
         PhysicsCell(cell, laws={"ARM_2": limp})
-
-
-def test_a_weight_on_the_tool(tmp_path: Path) -> None:
-    """A part that its controller does not know is read as its weight, within 1 %, wherever the arm has taken it."""
-    unknown = "gripper = { force_N = 30 }\nservo = { knows_parts = false }\n"
-    cell = blind(tmp_path, ("mass_kg = 0.2", "mass_kg = 2"), ("gripper = { force_N = 30 }\n", unknown))
-    world = PhysicsCell(cell)
-    program = PROGRAM[: PROGRAM.index("  MOVE obj TO goal")] + "  MOVE ARM_1 TO stop WITH DEPARTURE = apo ;\nEND.\n"
-    run(cell, program, world)
-    arm = cell.arms["ARM_1"].arm
-    rng, now = np.random.default_rng(0), world.now
-    start = world.sent_configuration("ARM_1", now)
-    for _ in range(20):
-        q = world.sent_configuration("ARM_1", now)
-        # The prismatic joint moves by less.
-        spread = rng.uniform(-0.6, 0.6, arm.n) * (1, 0.3, 0.1, 1, 1, 1)
-        goal = np.clip(start + spread, arm.limits.lower, arm.limits.upper)
-        world.start_motion("ARM_1", quintic(q, goal, 1.5), now, np.eye(4))
-        now += 2.5
-        assert world.advance(now) is None
-        force = world.contact_wrench("ARM_1", now)[:3]
-        np.testing.assert_allclose(force, (0, 0, -2 * 9.80665), atol=0.01 * 2 * 9.80665)
 
 
 def test_sensors_of_forces_and_efforts(tmp_path: Path) -> None:
