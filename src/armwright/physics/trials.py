@@ -150,7 +150,7 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
     cause, message = ended_by or _fault(world, cell, moving, errors) or ("", "")
     return Verdict(
         cause=cause,
-        message=f"{message}{_before(world)}" if cause in {MOVING, HELD, MISPLACED} else message,
+        message=f"{message}{_before(world)}" if cause in {MOVING, UNRELEASED, MISPLACED} else message,
         distance=max((distance for distance, _ in errors.values()), default=0.0),
         angle=max((angle for _, angle in errors.values()), default=0.0),
     )
