@@ -11,13 +11,11 @@ import numpy as np
 from armwright.arm.collision_pairs import collision_pairs_in
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.drive import Motor, Spring
-from armwright.arm.mjcf.reader import load_mjcf
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
 from armwright.arm.solid_entries import solids_in
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
-from armwright.arm.urdf.reader import load_urdf
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
 from armwright.files.inputs import file_path
@@ -54,8 +52,14 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
     if is_path(name):
         suffix = Path(name).suffix.lower()
         if suffix in _URDF:
+            from armwright.arm.urdf.reader import load_urdf  # noqa: PLC0415 - few arms are in such files
+
             return load_urdf(name, packages=packages)
-        return load_mjcf(name) if suffix == _MJCF else read_arm(name)
+        if suffix == _MJCF:
+            from armwright.arm.mjcf.reader import load_mjcf  # noqa: PLC0415 - few arms are in such files
+
+            return load_mjcf(name)
+        return read_arm(name)
     if name not in arm_names():
         raise UnknownNameError("arm", str(name), arm_names())
     return read_arm(_CATALOGUE / f"{name}.toml")

@@ -17,6 +17,7 @@ from armwright.calibration.board import BoardView, BoardViews, board_views
 from armwright.errors import InvalidValueError, TooFewError, counted
 from armwright.extras import opencv
 from armwright.spatial.lens import Lens
+from armwright.spatial.poses import homogeneous
 
 # The numbers of a lens, in the order of its attributes.
 LENS_NUMBERS = ("focal.x", "focal.y", "centre.x", "centre.y", "k1", "k2", "p1", "p2", "k3")
@@ -155,9 +156,7 @@ def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
     except cv2.error as error:
         raise _undetermined(views, None, None) from error
     values = np.concatenate([matrix[[0, 1, 0, 1], [0, 1, 2, 2]], np.ravel(distortion)[:5]])
-    poses = np.broadcast_to(np.eye(4), (len(views), 4, 4)).copy()
-    for pose, rotation, translation in zip(poses, rotations, translations, strict=True):
-        pose[:3, :3], pose[:3, 3] = cv2.Rodrigues(rotation)[0], np.ravel(translation)
+    poses = homogeneous([cv2.Rodrigues(rotation)[0] for rotation in rotations], np.reshape(translations, (-1, 3)))
     errors = np.ravel(errors)[:9]
     low, high = np.multiply(_FOCAL_RANGE, max(size))
     largest = np.array([high, high, high, high, *[_MAX_DISTORTION] * 5])

@@ -47,6 +47,8 @@ def read_force_sensor(entry: Table) -> ForceSensor:
     sensor = ForceSensor(
         noise=entry.number("noise_N", default=0.0, lower=0.0, upper=1e4),
         bias=entry.number("bias_N", default=0.0, lower=-1e4, upper=1e4),
+        moment_noise=entry.number("noise_Nm", default=0.0, lower=0.0, upper=1e4),
+        moment_bias=entry.number("bias_Nm", default=0.0, lower=-1e4, upper=1e4),
         rate=entry.number("rate_hz", default=0.0, lower=0.0, upper=1e5),
     )
     entry.refuse_unknown_keys()

@@ -123,6 +123,8 @@ class ArmServo:
         self._offsets = constant_efforts(plant)
         # What is known of a part in the hand: its mass [kg] at the tool point.
         self.load = 0.0
+        # Whether errors are not to be integrated: against what an arm leans on the integral would grow and grow.
+        self.leaning = False
         self._sums = np.zeros(arm.n)
         self._effort = arm.limits.effort
         # Noise is a part of the largest efforts; there is none of those that are not known.
@@ -161,7 +163,8 @@ class ArmServo:
                     tau = tau + self._load_efforts(q, reference.qdd + correction)
             tau = tau + self._friction(reference.qd)
             # What a motor cannot give is not to be asked for twice.
-            self._sums += error * self._period * (np.abs(tau) < self._effort)
+            if not self.leaning:
+                self._sums += error * self._period * (np.abs(tau) < self._effort)
         tau = np.minimum(np.maximum(tau, -self._effort), self._effort)
         data.ctrl[self.indices.motors] = tau
         return Measured(q, qd, tau, actual)

@@ -20,13 +20,14 @@ from armwright.cell.hardware import DeviceError, Mishap, PeakContact
 from armwright.cell.model import Cell
 from armwright.cell.observations import MeasuredStream, Observations, Picture
 from armwright.cell.part_poses import PartPoses
-from armwright.cell.scene import Part, Spread
+from armwright.cell.scene import Part
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError, closest
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics import mishaps
 from armwright.physics.contacts import Contacts
+from armwright.physics.draws import drawn_frames, drawn_parts, placed_fixtures
 from armwright.physics.measured import Log
 from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
@@ -35,8 +36,8 @@ from armwright.physics.servo import ArmServo, Sent, TorqueLaw
 from armwright.physics.vision import camera_in_world, look
 from armwright.physics.watch import Watch
 from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
-from armwright.spatial.poses import homogeneous, inverse, to_noap
-from armwright.spatial.rotations import rotation_from_vector
+from armwright.physics.wrist_sensor import WristSensor
+from armwright.spatial.poses import inverse, to_noap
 
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
@@ -58,6 +59,7 @@ class PhysicsCell:
         seed: int = 0,
         laws: Mapping[str, TorqueLaw] | None = None,
         parts: Mapping[str, Part] | None = None,
+        frames: Mapping[str, Array] | None = None,
     ) -> None:
         """Set up the initial state.
 
@@ -66,6 +68,7 @@ class PhysicsCell:
             seed: what is random is drawn from it: where parts stand, and the noise of sensors and cameras.
             laws: controllers of arms by name, instead of the servos of the cell.
             parts: as they are in this world; drawn from their spreads where they are left out.
+            frames: (4, 4) where the frames of the cell are in this world; drawn likewise. Programs know nothing of it.
 
         Raises:
             UnsupportedArmError: masses of an arm are unknown.
@@ -78,7 +81,9 @@ class PhysicsCell:
                 target_of(cell, sight)
         self._cell, self._believed = cell, Simulator(cell)
         self._seed, self._rng = seed, np.random.default_rng(seed)
-        self._world = world_model(cell, drawn_parts(cell, self._rng) if parts is None else parts)
+        parts = drawn_parts(cell, self._rng) if parts is None else parts
+        self._frames = drawn_frames(cell, self._rng) if frames is None else frames
+        self._world = world_model(attrs.evolve(cell, fixtures=placed_fixtures(cell, self._frames)), parts)
         self._contacts = Contacts(self._world)
         self._data = _initial_data(self._world)
         model, period = self._world.model, cell.period
@@ -108,8 +113,7 @@ class PhysicsCell:
         self._mishaps: tuple[Mishap, ...] = ()
         # Made for the first picture, and shared by copies.
         self._photographers: list[Photographer] = []
-        # The latest readings of sensors of forces, with their numbers.
-        self._forces: dict[str, tuple[int, Array]] = {}
+        self._wrists = {name: WristSensor(arm.force_sensor) for name, arm in cell.arms.items()}
         self._settle()
 
     def _settle(self) -> None:
@@ -135,7 +139,7 @@ class PhysicsCell:
         mujoco.mj_copyData(other._data, self._world.model, self._data)
         other._servos = {name: servo.copy() for name, servo in self._servos.items()}
         other._sent = dict(self._sent)
-        other._forces = dict(self._forces)
+        other._wrists = {name: wrist.copy() for name, wrist in self._wrists.items()}
         other._log, other._rng = self._log.copy(), np.random.default_rng()
         other._rng.bit_generator.state = self._rng.bit_generator.state
         other._contacts = copy.copy(self._contacts)
@@ -164,7 +168,7 @@ class PhysicsCell:
         data = self._data
         for name, servo in self._servos.items():
             reference, drive = self._sent[name].at(self._tick), self._watch.hands[name].drive
-            servo.load = self._watch.known_load(name)
+            servo.load, servo.leaning = self._watch.known_load(name), self._watch.hands[name].guarded
             try:
                 measured = servo.drive(data, self.now, reference)
             except InvalidValueError:
@@ -177,8 +181,9 @@ class PhysicsCell:
                 measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
             self._log.add(name, self._tick, reference, measured, drive.opening(data))
         self._world.step(data)
-        self._tick += 1
+        # A step leaves the poses of its beginning.
         self._log.add_parts(self._tick, data)
+        self._tick += 1
         return None
 
     # ---- arms ----------------------------------------------------------------------------------------------------
@@ -209,17 +214,17 @@ class PhysicsCell:
         """Return the deepest contact of an arm with the plane since its latest motion began."""
         return self._watch.peak_contact(arm)
 
-    def contact_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
-        """Return the force (3,) on the tool of an arm and what it holds, as its sensor reads it [N]."""
-        sensor = self._cell.arms[arm].force_sensor
-        reading = math.floor(self.now * sensor.rate + _TICK_TOLERANCE) if sensor.rate else self._tick
-        if arm in self._forces and self._forces[arm][0] == reading:
-            return self._forces[arm][1]
-        force = self._contacts.tool_force(self._data, arm) + sensor.bias
-        if sensor.noise:
-            force = force + self._rng.normal(scale=sensor.noise, size=3)
-        self._forces[arm] = (reading, np.asarray(force))
-        return self._forces[arm][1]
+    def contact_wrench(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Return the wrench (6,) on the tool of an arm and what it holds, as its sensor reads it [N] and [N m]."""
+        return self._wrists[arm].read(self._tick, self.now, lambda: self._true_wrench(arm), self._rng)
+
+    def zero_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Let what the sensor of an arm reads count as zero from now on; return it (6,)."""
+        return self._wrists[arm].zero(self._tick, self.now, lambda: self._true_wrench(arm), self._rng)
+
+    def _true_wrench(self, arm: str) -> Array:
+        """Return the wrench (6,) on a tool and what it holds, without the weights that the controller knows."""
+        return self._contacts.tool_wrench(self._data, arm) - self._watch.known_wrench(self._data, arm)
 
     def tool_wrenches(self, arm: str, now: float) -> Array:  # noqa: ARG002 - nobody knows beforehand
         """Return no wrenches (1, 6): planned efforts are those of free motion."""
@@ -281,6 +286,11 @@ class PhysicsCell:
         Raises:
             DeviceError: it is not found.
         """
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        # A step leaves the poses of its beginning: those of its end belong to what the arms read.
+        mujoco.mj_kinematics(self._world.model, self._data)
+        mujoco.mj_camlight(self._world.model, self._data)
         if not self._photographers:
             self._photographers.append(Photographer(self._world.model, self._cell.cameras))
         carrier = self._cell.cameras[camera].on
@@ -302,6 +312,10 @@ class PhysicsCell:
     def true_pose(self, part: str) -> Array:
         """Return the pose (4, 4) of a part in the world, as it is now."""
         return part_pose(self._data, part)
+
+    def true_frame(self, frame: str) -> Array:
+        """Return the pose (4, 4) of a frame of the cell in the world, which is not where programs believe it."""
+        return self._frames[frame]
 
     def speed(self, part: str) -> tuple[float, float]:
         """Return how fast a part moves [m/s] and turns [rad/s]."""
@@ -332,24 +346,10 @@ class PhysicsCell:
             },
             "tip": {stream.arm: _tip_error(self._cell, stream) for stream in measured},
             "slip": {name: hand.slip for name, hand in self._watch.hands.items()},
+            "frames": {name: to_noap(self.true_frame(name)).tolist() for name in self._cell.spreads},
             "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
         }
         return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)
-
-
-def drawn_parts(cell: Cell, rng: np.random.Generator) -> dict[str, Part]:
-    """Return the parts of a cell where they stand in a world: each drawn from its spread."""
-    parts = {}
-    for name, part in cell.parts.items():
-        parts[name] = attrs.evolve(part, pose=drawn_pose(part.pose, part.spread, rng))
-    return parts
-
-
-def drawn_pose(X: Array, spread: Spread, rng: np.random.Generator) -> Array:
-    """Return a pose (4, 4) in the world near another one."""
-    x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (spread.position, spread.position, spread.yaw)
-    turned = rotation_from_vector(np.array([0.0, 0.0, yaw])) @ X[:3, :3]
-    return homogeneous(turned, X[:3, 3] + (x, y, 0.0))
 
 
 def _initial_data(world: WorldModel) -> Any:
