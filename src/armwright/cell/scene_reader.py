@@ -39,6 +39,7 @@ def read_fixtures(scene: Table) -> dict[str, Fixture]:
     scene.allow("table")
     for kind, shape in _FIXTURES.items():
         for entry in scene.tables(kind) if kind in scene else ():
+            entry.add_amount("fixtures", 1, "name")
             name = _body_name(entry, fixtures)
             fixtures[name] = Fixture(
                 name=name,
@@ -107,7 +108,7 @@ def read_parts(parts: Table, taken: Collection[str] = ()) -> dict[str, Part]:
     """
     result: dict[str, Part] = {}
     numbers: dict[int, str] = {}
-    refuse_too_many(parts, "entries")
+    refuse_too_many(parts, "parts")
     for key in parts:
         entry = parts.table(key)
         name = read_name(parts, key, result)
