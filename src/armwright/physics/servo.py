@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, exact_shape
 from armwright.cell.control import Sensors, Servo
 from armwright.compiled.arm import compile_arm
 from armwright.motion.trajectory import Trajectory
@@ -58,6 +58,8 @@ class Sent:
         self._q, self._qd, self._qdd = (trajectory(t, order) for order in range(3))
         # Then the arm stands.
         self._qd[-1] = self._qdd[-1] = 0.0
+        for rows in (self._q, self._qd, self._qdd):
+            rows.setflags(write=False)
 
     def at(self, tick: int) -> Reference:
         """Return where the joints are sent at a tick."""
@@ -135,7 +137,7 @@ class ArmServo:
         """Read the sensors, and command the motors until the next tick."""
         q, qd = self._read(data)
         if self._law is not None:
-            tau = np.asarray(self._law(t, q, qd, reference), dtype=np.float64)
+            tau = exact_shape(self._law(t, q, qd, reference), (self.arm.n,), f"efforts of the law at {t:g} s")
         else:
             error = reference.q - q
             correction = self._kd * (reference.qd - qd) + self._kp * error + self._ki * self._sums

@@ -32,6 +32,7 @@ from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
 from armwright.physics.seeing import target_of
 from armwright.physics.servo import ArmServo, Sent, TorqueLaw
+from armwright.physics.start import buried_bases, check_arguments
 from armwright.physics.vision import camera_in_world, look
 from armwright.physics.watch import Watch
 from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
@@ -68,11 +69,13 @@ class PhysicsCell:
             parts: as they are in this world; drawn from their spreads where they are left out.
 
         Raises:
+            KindError: an argument is of another kind.
             UnsupportedArmError: masses of an arm are unknown.
             InvalidValueError: things stand inside each other at the start, a camera looks for a part without a marker,
-                or a law is for no arm of the cell.
+                a law is for no arm of the cell, or the parts are not those of the cell.
             MissingExtraError: a camera takes pictures, and OpenCV is missing.
         """
+        check_arguments(cell, seed, laws, parts)
         for sight in cell.sights.values():
             if sight.camera is not None:
                 target_of(cell, sight)
@@ -118,6 +121,7 @@ class PhysicsCell:
 
         mujoco.mj_forward(self._world.model, self._data)
         overlaps = self._contacts.overlaps(self._data)
+        overlaps += buried_bases(self._cell, self._contacts, self._world.model, self._data)
         if overlaps:
             worst = max(overlaps, key=lambda overlap: overlap.depth)
             raise InvalidValueError(
