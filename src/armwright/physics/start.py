@@ -36,9 +36,7 @@ def check_arguments(cell: Cell, seed: int, laws: object, parts: object) -> None:
             raise KindError(f"laws: expected a function of t, q, qd and reference for {shown(name)}, got {shown(law)}")
     if parts is not None and (not isinstance(parts, Mapping) or parts.keys() != cell.parts.keys()):
         known = ", ".join(cell.parts) or "none"
-        raise InvalidValueError(
-            f"parts: expected the parts of cell '{cell.name}' by name ({known}), got {shown(parts)}"
-        )
+        raise InvalidValueError(f"parts: expected those of cell '{cell.name}' by name ({known}), got {shown(parts)}")
 
 
 def buried_bases(cell: Cell, contacts: Contacts, model: Any, data: Any) -> list[Overlap]:
