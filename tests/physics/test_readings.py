@@ -15,6 +15,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.physics.contacts import Contacts
 from armwright.physics.world import PhysicsCell
 from armwright.spatial.poses import homogeneous
+from armwright.spatial.shapes import Box
 
 CELL = """[arms.ARM_1]
 joint_positions = [0, -1.5, 0.4, 0, 0.5, 0]
@@ -72,3 +73,25 @@ def test_a_part_is_gripped_by_both_fingers(width: float, aside: float, gripped: 
 
     assert touching.gripped(world._data, "ARM_1") == ("BLOCK" if gripped else None)
     assert touching.touching_arms(world._data, "BLOCK") == (("ARM_1",) if gripped or aside else ())
+
+
+def test_a_cup_pulls_at_its_own_axis(tmp_path: Path) -> None:
+    """A cup pulls a part and its arm together along its axis, however far from the middle of the part it lies."""
+    cell = bench(tmp_path, kind="suction", width=60)
+    arm = cell.arms["ARM_1"]
+    tool = arm.base @ forward(arm.arm, arm.start)
+    plate = Box(size=(0.06, 0.06, 0.02))
+    part = attrs.evolve(cell.parts["BLOCK"], shape=plate, pose=tool @ homogeneous(np.eye(3), (0.0, 0.015, 0.0098)))
+    world = PhysicsCell(cell, parts={"BLOCK": part})
+    world.move_fingers("ARM_1", 0.0, closed=True)
+    world.advance(2e-3)
+
+    data = world._data
+    here, hand = data.body("BLOCK").id, data.body("ARM_1/tool").id
+    place = data.xpos[hand]
+    for body, sign in ((here, -1.0), (hand, 1.0)):
+        force, torque = data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:]
+        np.testing.assert_allclose(force, sign * 30.0 * tool[:3, 2], atol=0.05)
+        moment = torque + np.cross(data.xipos[body] - place, force)
+        # The arm has moved by less than a tenth of a millimetre since.
+        np.testing.assert_allclose(moment, 0.0, atol=30.0 * 1e-4)

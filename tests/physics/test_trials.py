@@ -223,3 +223,18 @@ def test_a_touch_is_a_cause_even_where_the_program_goes_on(cell: Cell) -> None:
     assert verdict.cause == "R604"
     assert "TABLE" in verdict.message
     assert verdict.distance < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("speed", "turn", "cause"),
+    [(1.9e-3, 0.0, ""), (2.1e-3, 0.0, "moving"), (0.0, 0.049, ""), (0.0, 0.051, "moving"), (np.nan, 0.0, "moving")],
+)
+def test_a_part_at_rest_neither_moves_nor_turns(cell: Cell, speed: float, turn: float, cause: str) -> None:
+    """Faster than 2 mm/s or 0.05 rad/s is no rest, and so is what is no number."""
+
+    class Restless(PhysicsCell):
+        def speed(self, part: str) -> tuple[float, float]:  # noqa: ARG002 - of any part
+            return speed, turn
+
+    parts = {"BLOCK": attrs.evolve(cell.parts["BLOCK"], pose=goal_pose(cell, "BLOCK"))}
+    assert judge(Restless(cell, parts=parts), cell, 0.0).cause == cause
