@@ -285,13 +285,13 @@ def test_hostile_files(what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_what_is_left_out(tmp_path: Path) -> None:
-    """Textures, height fields and sensors take no memory; that springs and ellipsoids are not read is said."""
+    """Textures, height fields and sensors take no memory; that ellipsoids and parts of springs are not read is said."""
     before = """<size memory="1000G" nkey="1000000000"/><asset>
         <texture name="t" builtin="flat" width="99999" height="99999"/>
         <hfield name="h" nrow="99999" ncol="99999" size="1 1 1 1"/><material name="m" texture="t"/></asset>"""
     text = one(
         before,
-        joint='<joint name="turn" stiffness="3"/>',
+        joint='<joint name="turn" stiffness="3 1 0"/>',
         geom='<geom type="ellipsoid" size="0.1 0.2 0.3" material="m"/><geom type="hfield" hfield="h"/>',
         after='<sensor><jointpos joint="turn"/></sensor>',
     )
@@ -299,7 +299,9 @@ def test_what_is_left_out(tmp_path: Path) -> None:
     reading = read_mjcf(written(tmp_path, text))
 
     assert reading.arm.links[0].solids == ()
-    assert {"joint 'turn': its spring is not read", "body 'arm': ellipsoids are not read"} <= {*reading.notes}
+    assert {"joint 'turn': of its spring only the linear part is read", "body 'arm': ellipsoids are not read"} <= {
+        *reading.notes
+    }
 
 
 def test_limits_are_raised(tmp_path: Path) -> None:

@@ -137,12 +137,15 @@ BELOW = BLOCK.replace("at = [1,0,0, 0,1,0, 0,0,1, 0,0,0.04]", "at = [1,0,0, 0,0,
         (f"{TOP}fov = 3\n", "cameras, Top, fov: unknown key"),
         (
             f'{SCENE}[visions]\nG = {{ marker = "GAOL" }}\n',
-            "G, marker: GAOL is not a marker of the scene of the cell; did",
+            "G, marker: GAOL is not a marker of the cell; did",
         ),
         (f'{SCENE}{BLOCK}{TOP}[visions]\nO = {{ part = "BLOCK", camera = "TOPP" }}\n', "did you mean TOP?"),
         (f'{BLOCK}[visions]\nO = {{ part = "BLOCK", on = "table" }}\n', "O, on: the scene has no table"),
         (f'{BLOCK}[visions]\nO = {{ part = "BLOCK", on = "tabel" }}\n', "did you mean 'table'?"),
-        (f'{SCENE}{BLOCK}[visions]\nO = {{ part = "BLOCK", marker = "GOAL" }}\n', "for a part or for a marker of the"),
+        (
+            f'{SCENE}{BLOCK}[visions]\nO = {{ part = "BLOCK", marker = "GOAL" }}\n',
+            "finds a part or a marker of the scene, not both",
+        ),
         (
             f'{BLOCK}{TOP}{TOP.replace("Top", "SIDE")}[visions]\nO = {{ part = "BLOCK" }}\n',
             "O, camera: missing; the cameras are TOP, SIDE",

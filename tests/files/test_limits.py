@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from armwright.arm.load import load_arm, load_urdf, read_arm
+from armwright.arm.load import load_arm, read_arm
+from armwright.arm.urdf.reader import load_urdf
 from armwright.cell.reader import read_cell
 from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
 from armwright.clearance.reader import read_linkage

@@ -10,7 +10,7 @@ import pytest
 from armwright.errors import InvalidValueError
 from armwright.motion.efforts import effort_peaks
 from armwright.motion.quintic_polynomials import TOP_SPEED
-from armwright.physics.clearance import Body
+from armwright.physics.cell_bodies import Body
 from armwright.physics.planner import PlannedPath, PlanningError, plan_path
 from armwright.spatial.shapes import Box, Solid, Sphere
 from physics.cluttered import (

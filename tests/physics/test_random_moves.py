@@ -16,10 +16,11 @@ from armwright.cell.scene import Fixture, Gripper
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.motion.quintic_polynomials import quintic
 from armwright.motion.trajectory import Trajectory
-from armwright.physics.clearance import RESOLUTION, Body
+from armwright.physics.cell_bodies import Body
+from armwright.physics.clearance import RESOLUTION
 from armwright.physics.collisions import CellCollisions
 from armwright.physics.placed_bodies import CellBodies
-from armwright.physics.wanted_contacts import PlannedMove
+from armwright.physics.planned_move import PlannedMove
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import Box, farthest
 from oracles.arms import random_configurations, random_pose

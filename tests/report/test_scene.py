@@ -440,6 +440,48 @@ def test_measured_beside_planned(visit, stocked: Recording) -> None:
 
 
 @pytest.mark.browser
+def test_the_measured_world_is_drawn(visit, stocked: Recording) -> None:
+    """Arms are drawn as measured, fingers as far open as they were, parts on their way; planned arms can be hidden."""
+    stream = stocked.streams[0]
+    arm = stocked.cell.arms[stream.arm]
+    off = np.zeros(stream.q.shape[1])
+    off[0] = 0.2
+    opening = np.linspace(0.01, 0.07, len(stream.t))
+    measured = MeasuredStream(
+        arm=stream.arm, t=stream.t, q=stream.q + off, qd=stream.qd, tau=stream.tau, sent=stream.q, opening=opening
+    )
+    # It stands for 1 s, and then goes 0.3 m in 0.02 s.
+    ends = homogeneous(np.eye(3), np.array([[0.5, 0, 0.1], [0.5, 0, 0.1], [0.5, 0.3, 0.1], [0.5, 0.3, 0.1]]))
+    falls = PartTrack(times=(0.0, 1.0, 1.02, 2.0), arms=(None,) * 4, poses=tuple(ends))
+    opened = visit(page_of(observed(stocked, measured=(measured,), parts={"BLOCK": falls})))
+
+    def drawn(name: str) -> list[Array]:
+        return [np.array(it["pose"]) for it in opened.page.evaluate("armwright.bodies()") if it["name"] == name]
+
+    for row in (0, len(stream.t) // 2, len(stream.t) - 1):
+        opened.seek(float(stream.t[row]))
+        hand = np.linalg.inv(arm.base @ forward(arm.arm, stream.q[row] + off))
+        fingers = [hand @ np.array([*pose[9:], 1]) for pose in drawn(f"{stream.arm} finger")]
+        # Each finger is as far aside as half the opening and half its own thickness.
+        apart = abs(fingers[0][1] - fingers[1][1])
+        assert apart == pytest.approx(opening[row] + 0.01, abs=1e-3)
+        np.testing.assert_allclose(np.mean(fingers, axis=0)[:2], 0.0, atol=1e-3)
+    for t, y in ((0.5, 0.0), (1.0, 0.0), (1.01, 0.15), (1.5, 0.3)):
+        opened.seek(t)
+        assert drawn("BLOCK")[0][10] == pytest.approx(y, abs=1e-3)
+    joints = opened.page.locator("#readout")
+    assert joints.locator("h3").inner_text() == f"Joints of {stream.arm}, measured"
+    assert "mm open" in joints.inner_text()
+    before = opened.pixels()
+    opened.page.click("#planned")
+    assert opened.pixels() != before
+    opened.page.click("#planned")
+    assert opened.pixels() == before
+    assert not visit(page_of(stocked)).page.locator("#planned").is_visible()
+    assert opened.complaints == []
+
+
+@pytest.mark.browser
 def test_strip_of_pictures(visit, stocked: Recording, rng: np.random.Generator) -> None:
     """Pictures are shown with time, camera and what was found, as plain text; a click goes to their time."""
     pictures = (picture(0.5, png=png(rng=rng)), picture(2.25, camera=NASTY, frame=NASTY, found=False, text=NASTY))

@@ -60,7 +60,7 @@ def shape_in(entry: Table, kind: str) -> Shape:
 
 
 def _mesh(entry: Table) -> Mesh:
-    """Read a mesh, and the convex pieces that count in its place in collisions."""
+    """Read a mesh, and the convex pieces that replace it in collisions."""
     from armwright.spatial.meshes.reader import UNITS, has_unit  # noqa: PLC0415 - few files have meshes
 
     unit = entry.choice("unit", UNITS) if "unit" in entry else None

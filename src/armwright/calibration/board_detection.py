@@ -13,7 +13,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.calibration.board import Board, BoardView, BoardViews, board_views
 from armwright.errors import FileFormatError, InvalidValueError, TooFewError, UnknownNameError
-from armwright.extras import import_extra
+from armwright.extras import opencv
 from armwright.files.inputs import file_path
 from armwright.files.limits import limit, limit_message
 from armwright.files.pictures import GreyPicture, read_grey_picture
@@ -41,7 +41,7 @@ def board_finder(board: Board) -> Callable[[str, GreyPicture], BoardView | None]
         InvalidValueError: the dictionary has too few markers.
         MissingExtraError: OpenCV is not installed.
     """
-    cv2 = import_extra("cv2", "calibrating a camera", "physics", "opencv-python-headless")
+    cv2 = opencv("calibrating a camera")
     if board.marker is None:
         return lambda name, picture: _find_chessboard(cv2, board, name, picture)
     detector = cv2.aruco.CharucoDetector(_charuco_board(cv2, board))
@@ -85,11 +85,11 @@ def views_of_pictures(
             first = f"{size[0]} x {size[1]} pixels as in {Path(paths[0]).name}"
             message = f"expected {first}, got {width} x {height}; all pictures must be from one camera at one setting"
             raise FileFormatError(path, None, "", message)
-        found = find(path.name, picture)
-        if found is None:
+        view = find(path.name, picture)
+        if view is None:
             missing[path.name] = "the board is not found"
         else:
-            views.append(found)
+            views.append(view)
     if not views:
         raise TooFewError(
             f"the board is not found in any of {len(paths)} pictures; check the numbers of squares (columns x rows, "

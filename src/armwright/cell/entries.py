@@ -1,13 +1,14 @@
 """Entries that recur in cell files: names and poses."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.names import arm_name
+from armwright.errors import closest
 from armwright.files.document import Table
 from armwright.files.limits import limit, limit_message
 from armwright.spatial.poses import from_noap, homogeneous
@@ -31,6 +32,27 @@ def read_name(table: Table, key: str, taken: Iterable[str], text: str | None = N
         )
     if name in taken:
         raise table.error(key, f"{name} occurs twice; case does not distinguish names")
+    return name
+
+
+def known_name(table: Table, key: str, name: str, known: Collection[str], kind: str) -> str:
+    """Return a name under a key, in upper case, that must be one of those of the cell.
+
+    Args:
+        table: with the key.
+        key: for the message.
+        name: as it is written.
+        known: names of the cell.
+        kind: what they are, with its article, such as ``a part``.
+
+    Raises:
+        FileFormatError: it is none of them.
+    """
+    name = read_name(table, key, (), name)
+    if name not in known:
+        near = closest(name, known)
+        there = f"there is {', '.join(sorted(known))}" if known else "there is none"
+        raise table.error(key, f"{name} is not {kind} of the cell; {f'did you mean {near}?' if near else there}")
     return name
 
 

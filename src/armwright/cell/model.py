@@ -103,7 +103,7 @@ class Cell:
         parts: bodies that grippers hold and move, by name.
         markers: of the scene, by name, with their poses in the world.
         cameras: that take pictures, by name.
-        sights: by frame name, what a camera looks for: parts, and markers of the scene.
+        sights: by frame name, what a camera searches for: parts, and markers of the scene.
         visions: other answers of the camera by frame name, in order, (4, 4) relative to the camera.
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.

@@ -132,12 +132,12 @@ class Camera:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Sight:
-    """What a camera looks for when a program asks for a frame.
+    """What a camera searches for when a program reads a frame.
 
     Attributes:
         kind: whether the frame is on a part or at a marker of the scene.
         name: of the part or of the marker.
-        camera: that looks; None where the cell has no camera that takes pictures.
+        camera: that takes the picture; None where the cell has no camera that takes pictures.
         height: at which the part stands or the marker lies [m]; None where nothing is known of that.
         relation: (4, 4) pose of the frame on the part or at the marker.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TypeAlias
 
@@ -20,12 +21,12 @@ class Goal:
     Attributes:
         at: the frame or marker of the cell, z out of the surface, on whose origin the part stands upright.
         distance: how far from there it may be [m].
-        angle: how far it may be turned from there, or from an equal orientation of its symmetry [rad].
+        angle: how far it may be rotated from there, or from an equal orientation of its symmetry [rad].
     """
 
     at: str
     distance: float = 2e-3
-    angle: float = 0.05235987755982989
+    angle: float = math.radians(3.0)
 
 
 @attrs.frozen(kw_only=True)

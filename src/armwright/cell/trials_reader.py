@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from armwright.cell.entries import read_name, refuse_too_many
+from armwright.cell.entries import known_name, read_name, refuse_too_many
 from armwright.cell.scene import Spread
 from armwright.cell.trials import Goal, Interval, Noise, Trials
-from armwright.errors import closest
 from armwright.files.document import Table
 
 # Bounds of what is drawn; those of the keys whose values are replaced.
@@ -45,7 +44,7 @@ def _poses(table: Table, known: Collection[str]) -> dict[str, Spread]:
     poses: dict[str, Spread] = {}
     refuse_too_many(table, "entries")
     for key in table:
-        name = _known_name(table, key, read_name(table, key, poses), known, "part or marker")
+        name = known_name(table, key, read_name(table, key, poses), known, "a part or marker")
         entry = table.table(key)
         poses[name] = Spread(
             position=entry.number("xy_mm", default=0.0, lower=0.0, upper=1e6) * 1e-3,
@@ -55,17 +54,15 @@ def _poses(table: Table, known: Collection[str]) -> dict[str, Spread]:
     return poses
 
 
-def _goals(table: Table, parts: Collection[str], places: Collection[str]) -> dict[str, Goal]:
+def _goals(table: Table, parts: Collection[str], frames: Collection[str]) -> dict[str, Goal]:
     goals: dict[str, Goal] = {}
     refuse_too_many(table, "entries")
     for key in table:
-        name = _known_name(table, key, read_name(table, key, goals), parts, "part")
+        name = known_name(table, key, read_name(table, key, goals), parts, "a part")
         entry = table.table(key)
-        text, others = entry.text("at"), [other for other in parts if other != name]
+        others = [*frames, *(other for other in parts if other != name)]
         goals[name] = Goal(
-            at=_known_name(
-                entry, "at", read_name(entry, "at", (), text), [*places, *others], "marker, frame or other part"
-            ),
+            at=known_name(entry, "at", entry.text("at"), others, "a marker, frame or other part"),
             distance=entry.number("mm", default=2.0, lower=1e-3, upper=1e4) * 1e-3,
             angle=math.radians(entry.number("deg", default=3.0, lower=1e-3, upper=180.0)),
         )
@@ -94,13 +91,3 @@ def _interval(table: Table, key: str, upper: float, unit: float = 1.0) -> Interv
             key, f"expected two numbers from 0 to {upper:g}, the lower one first, got [{low:g}, {high:g}]"
         )
     return low * unit, high * unit
-
-
-def _known_name(table: Table, key: str, name: str, known: Collection[str], kind: str) -> str:
-    """Return a name that must be one of those of the cell."""
-    if name not in known:
-        near = closest(name, known)
-        names = ", ".join(sorted(known)) or "none"
-        hint = f"did you mean {near}?" if near else f"known: {names}"
-        raise table.error(key, f"{name} is no {kind} of the cell; {hint}")
-    return name

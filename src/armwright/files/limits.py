@@ -33,7 +33,6 @@ class Limit(NamedTuple):
 
 LIMITS: Mapping[str, Limit] = {
     "file_mb": Limit(4, "MB", "size of an arm, cell, linkage, URDF, MJCF, poses or estimate file"),
-    "meshes_mb": Limit(100, "MB", "size of the mesh files of an MJCF file together"),
     "program_mb": Limit(
         1, "MB", "size of a program in RLO, or of its intermediate code, also from standard input (`-`)"
     ),
@@ -66,7 +65,12 @@ LIMITS: Mapping[str, Limit] = {
     "pictures": Limit(1000, "pictures", "pictures that a camera is calibrated with"),
     "picture_mb": Limit(50, "MB", "size of the file of a picture"),
     "picture_megapixels": Limit(100, "megapixels", "width times height of a picture, which its file names"),
-    "mesh_mb": Limit(100, "MB", "size of an STL, OBJ, glTF or STEP file, with all buffers that a glTF file names"),
+    "mesh_mb": Limit(
+        100,
+        "MB",
+        "size of an STL, OBJ, glTF or STEP file, with all buffers that a glTF file names; of all mesh files of an MJCF "
+        "file together",
+    ),
     "mesh_triangles": Limit(1_000_000, "triangles", "triangles of a mesh, its instances counted one by one"),
     "file_triangles": Limit(
         2_000_000, "triangles", "triangles of the meshes that an arm, cell or URDF file names, together"

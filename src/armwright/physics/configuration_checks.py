@@ -52,7 +52,7 @@ class ConfigurationChecks:
             near = np.flatnonzero(nearest[i] < margins)
             moving = set(self._pairs[near].ravel().tolist()) - standing
             for body in moving:
-                self._checker.distances.place(body, poses[i, body])
+                self._checker.distances.set_pose(body, poses[i, body])
             standing |= {body for body in moving if self._checker.bodies[body].arm is None}
             for (a, b), margin in zip(self._pairs[near].tolist(), margins[near].tolist(), strict=True):
                 distance = self._checker.distances.between(a, b, max(margin, TOLERANCE))
@@ -65,7 +65,7 @@ class ConfigurationChecks:
         poses = self._poses_at(configurations)
         result = np.full(len(self._pairs), within)
         for body, pose in enumerate(poses[0]):
-            self._checker.distances.place(body, pose)
+            self._checker.distances.set_pose(body, pose)
         for k in np.flatnonzero(self._least_distances(poses)[0] < within).tolist():
             a, b = self._pairs[k].tolist()
             result[k] = self._checker.distances.between(a, b, within)

@@ -8,8 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.geoms import add_geom
-from armwright.physics.graphics import load_mujoco
+from armwright.spatial.poses import homogeneous
+from armwright.spatial.rotations import rotation_from_quaternion
 from armwright.spatial.shapes import Shape, Solid
 
 # Distances between convex solids are found by iteration, to this [m].
@@ -41,7 +43,6 @@ class Distances:
             shapes: of the solids, in the order of their numbers.
         """
         mujoco = load_mujoco()
-
         self._mujoco = mujoco
         spec = mujoco.MjSpec()
         spec.option.ccd_tolerance = TOLERANCE
@@ -53,7 +54,7 @@ class Distances:
         # MuJoCo moves the frame of a mesh into its centre of mass and turns it to its axes of inertia.
         self._inner = [_inner_pose(self._model, i) for i in range(len(shapes))]
 
-    def place(self, number: int, X: Array) -> None:
+    def set_pose(self, number: int, X: Array) -> None:
         """Put a solid at a pose (4, 4)."""
         inner = self._inner[number]
         if inner is not None:
@@ -77,8 +78,4 @@ def _inner_pose(model: Any, number: int) -> Array | None:
     position, quaternion = model.geom_pos[number], model.geom_quat[number]
     if not position.any() and np.array_equal(quaternion, (1.0, 0.0, 0.0, 0.0)):
         return None
-    from armwright.spatial.rotations import rotation_from_quaternion  # noqa: PLC0415
-
-    X = np.eye(4)
-    X[:3, :3], X[:3, 3] = rotation_from_quaternion(quaternion), position
-    return X
+    return homogeneous(rotation_from_quaternion(quaternion), position)

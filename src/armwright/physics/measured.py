@@ -61,7 +61,11 @@ class Log:
         for name in self._parts:
             X = part_pose(data, name)
             if np.abs(X - self._tracks[name][-1][1]).max() > _STILL:
-                self._tracks[name].append((tick * self._cell.period, X))
+                track, before = self._tracks[name], (tick - self._every) * self._cell.period
+                if track[-1][0] < before:
+                    # It stood still until then.
+                    track.append((before, track[-1][1]))
+                track.append((tick * self._cell.period, X))
 
     def streams(self) -> tuple[MeasuredStream, ...]:
         """Return what was recorded, one stream per arm."""

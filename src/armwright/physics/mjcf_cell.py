@@ -18,6 +18,7 @@ from armwright.cell.model import Cell, CellArm, ContactPlane
 from armwright.cell.scene import Fixture, Gripper, Part
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.inputs import file_path
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.mjcf import START
 from armwright.physics.world_model import FLOOR, PIECE, PLATE
 from armwright.spatial.poses import homogeneous
@@ -50,7 +51,7 @@ def read_cell_mjcf(path: Path | str) -> CellReading:
     keyframe ``start``, arms and parts stand as there.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
+        MissingExtraError: MuJoCo cannot be loaded.
         FileFormatError: the file is missing, broken, has no arm of such a name, or things that no cell has.
     """
     path = file_path(path)
@@ -158,8 +159,7 @@ def _fixtures(model: Any) -> dict[str, Fixture]:
 
 def _parts(model: Any, q: Array) -> dict[str, Part]:
     """Return the free bodies of one geom that have names of frames, where they stand."""
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     parts = {}
     for body in range(1, model.nbody):
         name, joint, geom = model.body(body).name, int(model.body_jntadr[body]), int(model.body_geomadr[body])

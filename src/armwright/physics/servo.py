@@ -8,16 +8,19 @@ from typing import Any, NamedTuple, Protocol
 import attrs
 import numpy as np
 
+from armwright.arm.drive import Motor
 from armwright.arm.model import Arm
 from armwright.arrays import Array, exact_shape
 from armwright.cell.control import Sensors, Servo
 from armwright.compiled.arm import compile_arm
+from armwright.dynamics.drives import friction_law
 from armwright.motion.trajectory import Trajectory
-from armwright.physics.plant import ArmIndices, dry_offsets
+from armwright.physics.friction import constant_efforts, dry_offsets
+from armwright.physics.plant import ArmIndices
 
 # The integral of errors is fed back with this part of the cube of the bandwidth.
 _INTEGRAL = 0.2
-# Dry friction is compensated where the reference moves faster than this [rad/s, m/s].
+# Dry friction is compensated in full where the reference moves faster than this [rad/s, m/s].
 _MOVING = 1e-3
 # Part of a new difference of positions in the estimated speed.
 _SMOOTHING = 0.2
@@ -105,14 +108,17 @@ class ArmServo:
             law: another controller; None for that of the settings.
         """
         self.arm, self.indices, self._period, self._settings, self._law = arm, indices, period, settings, law
-        # Compensated dry friction would chatter at rest with the measured speed: it follows the reference.
-        smooth = tuple(attrs.evolve(motor, coulomb_forward=0.0, coulomb_backward=0.0) for motor in arm.motors)
+        # Compensated friction would chatter at rest with the measured speed: what is not viscous follows the reference.
+        smooth = tuple(Motor(inertia=x.inertia, viscous=x.viscous, gear_ratio=x.gear_ratio) for x in arm.motors)
         self._compiled = compile_arm(attrs.evolve(arm, motors=smooth), quickly=True)
+        self._friction_law = friction_law(arm)
         forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
         self._dry, self._lean = (forward + backward) / 2, -dry_offsets(arm)
-        self._offsets = dry_offsets(plant)
+        self._offsets = constant_efforts(plant)
         # What is known of a part in the hand: its mass [kg] at the tool point.
         self.load = 0.0
+        # Whether errors are not to be integrated: against what an arm leans on the integral would grow and grow.
+        self.leaning = False
         self._sums = np.zeros(arm.n)
         self._effort = arm.limits.effort
         # Noise is a part of the largest efforts; there is none of those that are not known.
@@ -148,13 +154,19 @@ class ArmServo:
                 tau = self._compiled.inverse_dynamics(q, qd, reference.qdd + correction)
                 if self.load:
                     tau = tau + self._load_efforts(q, reference.qdd + correction)
-            direction = np.tanh(reference.qd / _MOVING)
-            tau = tau + self._dry * direction + self._lean * np.abs(direction)
+            tau = tau + self._friction(reference.qd)
             # What a motor cannot give is not to be asked for twice.
-            self._sums += error * self._period * (np.abs(tau) < self._effort)
+            if not self.leaning:
+                self._sums += error * self._period * (np.abs(tau) < self._effort)
         tau = np.minimum(np.maximum(tau, -self._effort), self._effort)
         data.ctrl[self.indices.motors] = tau
         return Measured(q, qd, tau)
+
+    def _friction(self, qd: Array) -> Array:
+        """Return the friction (n,) at the speeds of the reference, but the viscous one."""
+        direction, fading = np.tanh(qd / _MOVING), self._friction_law.fading(qd)
+        dry = self._dry if fading is None else self._dry + fading
+        return np.asarray(dry * direction + self._lean * np.abs(direction) + self._friction_law.smooth(qd))
 
     def _load_efforts(self, q: Array, qdd: Array) -> Array:
         """Return what a part in the hand asks for beside the arm (n,); its centripetal acceleration is left out."""

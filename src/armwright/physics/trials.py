@@ -22,11 +22,11 @@ from armwright.spatial.shapes import support
 _MAX_DRAWS = 100
 # A part is at rest that is no faster than this [m/s], [rad/s], for so long [s]; the world goes on for so long [s].
 _REST_SPEED, _REST_TURN, _REST_TIME, _PATIENCE = 2e-3, 0.05, 0.1, 1.0
-# How often it is looked at [s].
-_LOOK = 0.01
+# How often that is checked [s].
+_INTERVAL = 0.01
 # What is wrong where an arm has pressed on what it should not.
 _TOUCHED = "R604"
-MOVING, HELD, MISPLACED = "moving", "not let go", "misplaced"
+MOVING, UNRELEASED, MISPLACED = "moving", "not let go", "misplaced"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -56,7 +56,7 @@ class Verdict:
         cause: why the trial fails, as a code or ``moving``, ``not let go``, ``misplaced``; empty where it succeeds.
         message: the cause in words; empty where it succeeds.
         distance: of the part that is farthest from its goal [m].
-        angle: of the part that is turned most from its goal [rad].
+        angle: of the part that is rotated farthest from its goal [rad].
     """
 
     cause: str = ""
@@ -145,7 +145,7 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
     moving = _come_to_rest(world, cell, now)
     errors = {
         part: placing_error(world.true_pose(part), goal_pose(cell, part, world), cell.parts[part])
-        for part in _goals(cell)
+        for part in cell.trials.goals
     }
     cause, message = ended_by or _fault(world, cell, moving, errors) or ("", "")
     return Verdict(
@@ -154,10 +154,6 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
         distance=max((distance for distance, _ in errors.values()), default=0.0),
         angle=max((angle for _, angle in errors.values()), default=0.0),
     )
-
-
-def _goals(cell: Cell) -> tuple[str, ...]:
-    return tuple(cell.trials.goals)
 
 
 def _fault(
@@ -169,9 +165,9 @@ def _fault(
             return _TOUCHED, f"{mishap.message} at {mishap.time:.3f} s"
     for part in moving:
         return MOVING, f"{part} still moves {_PATIENCE:g} s after the end"
-    for part in _goals(cell):
+    for part in cell.trials.goals:
         if arms := world.touching_arms(part):
-            return HELD, f"{part} is touched by {', '.join(arms)}"
+            return UNRELEASED, f"{part} is touched by {', '.join(arms)}"
     for part, (distance, angle) in errors.items():
         goal = cell.trials.goals[part]
         if distance > goal.distance or angle > goal.angle:
@@ -182,13 +178,13 @@ def _fault(
 
 def _come_to_rest(world: PhysicsCell, cell: Cell, now: float) -> tuple[str, ...]:
     """Let a world go on until all parts with a goal have been at rest for some time; return those that still move."""
-    moving, rest = _goals(cell), 0
-    for look in range(1, round(_PATIENCE / _LOOK) + 1):
-        while world.advance(now + look * _LOOK) is not None:
+    moving, resting = tuple(cell.trials.goals), 0
+    for check in range(1, round(_PATIENCE / _INTERVAL) + 1):
+        while world.advance(now + check * _INTERVAL) is not None:
             pass
-        fast = tuple(part for part in _goals(cell) if _moves(world, part))
-        rest = 0 if fast else rest + 1
-        if rest * _LOOK >= _REST_TIME:
+        fast = tuple(part for part in cell.trials.goals if _moves(world, part))
+        resting = 0 if fast else resting + 1
+        if resting * _INTERVAL >= _REST_TIME:
             return ()
         moving = fast or moving
     return moving

@@ -36,6 +36,7 @@ from armwright.physics.start import buried_bases, check_arguments
 from armwright.physics.vision import camera_in_world, look
 from armwright.physics.watch import Watch
 from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
+from armwright.physics.wrist_sensor import WristSensor
 from armwright.spatial.poses import homogeneous, inverse, to_noap
 from armwright.spatial.rotations import rotation_from_vector
 
@@ -111,8 +112,7 @@ class PhysicsCell:
         self._mishaps: tuple[Mishap, ...] = ()
         # Made for the first picture, and shared by copies.
         self._photographers: list[Photographer] = []
-        # The latest readings of sensors of forces, with their numbers.
-        self._forces: dict[str, tuple[int, Array]] = {}
+        self._wrists = {name: WristSensor(arm.force_sensor) for name, arm in cell.arms.items()}
         self._settle()
 
     def _settle(self) -> None:
@@ -139,7 +139,7 @@ class PhysicsCell:
         mujoco.mj_copyData(other._data, self._world.model, self._data)
         other._servos = {name: servo.copy() for name, servo in self._servos.items()}
         other._sent = dict(self._sent)
-        other._forces = dict(self._forces)
+        other._wrists = {name: wrist.copy() for name, wrist in self._wrists.items()}
         other._log, other._rng = self._log.copy(), np.random.default_rng()
         other._rng.bit_generator.state = self._rng.bit_generator.state
         other._contacts = copy.copy(self._contacts)
@@ -165,12 +165,10 @@ class PhysicsCell:
 
     def _step(self) -> Mishap | None:
         """Let one period of the servo go by; return that this cannot be, if numbers without meaning come to a servo."""
-        import mujoco  # noqa: PLC0415 - only cells with physics need it
-
         data = self._data
         for name, servo in self._servos.items():
             reference, drive = self._sent[name].at(self._tick), self._watch.hands[name].drive
-            servo.load = self._watch.known_load(name)
+            servo.load, servo.leaning = self._watch.known_load(name), self._watch.hands[name].guarded
             try:
                 measured = servo.drive(data, self.now, reference)
             except InvalidValueError:
@@ -182,9 +180,10 @@ class PhysicsCell:
             if noise:
                 measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
             self._log.add(name, self._tick, reference, measured, drive.opening(data))
-        mujoco.mj_step(self._world.model, data, self._world.substeps)
-        self._tick += 1
+        self._world.step(data)
+        # A step leaves the poses of its beginning.
         self._log.add_parts(self._tick, data)
+        self._tick += 1
         return None
 
     # ---- arms ----------------------------------------------------------------------------------------------------
@@ -215,17 +214,17 @@ class PhysicsCell:
         """Return the deepest contact of an arm with the plane since its latest motion began."""
         return self._watch.peak_contact(arm)
 
-    def contact_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
-        """Return the force (3,) on the tool of an arm and what it holds, as its sensor reads it [N]."""
-        sensor = self._cell.arms[arm].force_sensor
-        reading = math.floor(self.now * sensor.rate + _TICK_TOLERANCE) if sensor.rate else self._tick
-        if arm in self._forces and self._forces[arm][0] == reading:
-            return self._forces[arm][1]
-        force = self._contacts.tool_force(self._data, arm) + sensor.bias
-        if sensor.noise:
-            force = force + self._rng.normal(scale=sensor.noise, size=3)
-        self._forces[arm] = (reading, np.asarray(force))
-        return self._forces[arm][1]
+    def contact_wrench(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Return the wrench (6,) on the tool of an arm and what it holds, as its sensor reads it [N] and [N m]."""
+        return self._wrists[arm].read(self._tick, self.now, lambda: self._true_wrench(arm), self._rng)
+
+    def zero_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Let what the sensor of an arm reads count as zero from now on; return it (6,)."""
+        return self._wrists[arm].zero(self._tick, self.now, lambda: self._true_wrench(arm), self._rng)
+
+    def _true_wrench(self, arm: str) -> Array:
+        """Return the wrench (6,) on a tool and what it holds, without the weights that the controller knows."""
+        return self._contacts.tool_wrench(self._data, arm) - self._watch.known_wrench(self._data, arm)
 
     def tool_wrenches(self, arm: str, now: float) -> Array:  # noqa: ARG002 - nobody knows beforehand
         """Return no wrenches (1, 6): planned efforts are those of free motion."""
@@ -287,6 +286,11 @@ class PhysicsCell:
         Raises:
             DeviceError: it is not found.
         """
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        # A step leaves the poses of its beginning: those of its end belong to what the arms read.
+        mujoco.mj_kinematics(self._world.model, self._data)
+        mujoco.mj_camlight(self._world.model, self._data)
         if not self._photographers:
             self._photographers.append(Photographer(self._world.model, self._cell.cameras))
         carrier = self._cell.cameras[camera].on

@@ -41,6 +41,12 @@ def measured_motion(planned: Stream, measured: MeasuredStream) -> MeasuredMotion
     )
 
 
+def nearest_ticks(ticks: Array, t: Array) -> npt.NDArray[np.intp]:
+    """Return the numbers of the evenly spaced ticks (k,) next to some instants, the last one behind the end."""
+    period = ticks[1] - ticks[0] if len(ticks) > 1 else 1.0
+    return np.clip(np.round(t / period).astype(np.intp), 0, len(ticks) - 1)
+
+
 def tracking_error(planned: Stream, measured: MeasuredStream) -> Array:
     """Return the measured less the planned positions (k, n), the planned ones linear between their ticks."""
     columns = [np.interp(measured.t, planned.t, q) for q in planned.q.T]

@@ -28,7 +28,7 @@ class Trial(NamedTuple):
         cause: why it failed; empty where it succeeded.
         message: the cause in words.
         distance: of the part that is farthest from its goal [m]; not a number where nothing is known of that.
-        angle: of the part that is turned most from its goal [rad].
+        angle: of the part that is rotated farthest from its goal [rad].
         duration: until the program ended [s].
         ended: whether the program came to its end.
     """

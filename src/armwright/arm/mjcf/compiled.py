@@ -10,9 +10,9 @@ from typing import Any
 
 from armwright.arm.mjcf.elements import MjcfText, Node, path_below
 from armwright.errors import FileFormatError, shown
-from armwright.extras import import_extra
 from armwright.files.inputs import read_bytes
 from armwright.files.limits import MEGABYTE, limit, limit_message
+from armwright.mujoco_library import load_mujoco
 
 _MESH_FILES = (".stl", ".obj")
 _LINE = re.compile(r"line (\d+)")
@@ -22,10 +22,10 @@ def compile_mjcf(path: Path, text: MjcfText) -> Any:
     """Return the model that MuJoCo makes of a text.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
+        MissingExtraError: MuJoCo cannot be loaded.
         FileFormatError: MuJoCo refuses the text, or a mesh file is missing or beyond a limit.
     """
-    mujoco = import_extra("mujoco", "reading MJCF", "physics", "mujoco-core")
+    mujoco = load_mujoco()
     try:
         spec = mujoco.MjSpec.from_string(text.text)
         spec.compiler.usethread = False
@@ -86,25 +86,25 @@ def _mesh_files(spec: Any, path: Path, text: MjcfText) -> dict[str, bytes]:
         if place not in names:
             names[place] = f"{len(names)}{kind}"
             try:
-                files[names[place]] = read_bytes(place, "meshes_mb")
+                files[names[place]] = read_bytes(place, "mesh_mb")
             except FileFormatError as error:
                 raise node.error("file", str(error)) from error
         # A file that two meshes are made of takes memory twice.
         total += len(files[names[place]])
-        if total > limit("meshes_mb") * MEGABYTE:
-            raise node.error("file", f"the meshes are too large together: {limit_message('meshes_mb')}")
+        if total > limit("mesh_mb") * MEGABYTE:
+            raise node.error("file", f"the meshes are too large together: {limit_message('mesh_mb')}")
         mesh.file = names[place]
     return files
 
 
 def _as_ours(error: Exception, path: Path, text: MjcfText) -> FileFormatError:
     """Return the error of MuJoCo, which counts the lines of the text that it got, in one line."""
-    said = " ".join(str(error).split())
+    message = " ".join(str(error).split())
     for start in ("XML Error: ", "Schema violation: ", "Error: "):
-        said = said.removeprefix(start)
-    number = _LINE.search(said)
+        message = message.removeprefix(start)
+    number = _LINE.search(message)
     node: Node | None = None
     if number and 0 < int(number[1]) <= len(text.nodes):
         node = text.nodes[int(number[1]) - 1]
-        said = said.partition(" Element ")[0]
-    return FileFormatError(path, None, "", said) if node is None else node.error("", said)
+        message = message.partition(" Element ")[0]
+    return FileFormatError(path, None, "", message) if node is None else node.error("", message)

@@ -63,7 +63,7 @@ class ProgramTrials:
         """How a trial ended; its cause of failure is its message."""
         return {
             "distance": Output(description="of the part that is farthest from its goal", units="m"),
-            "angle": Output(description="of the part that is turned most from its goal", units="rad"),
+            "angle": Output(description="of the part that is rotated farthest from its goal", units="rad"),
             "duration": Output(description="until the program ended", units="s"),
             "ended": Output(description="1 where the program has come to its end, 0 where an error ended it"),
         }
