@@ -4,10 +4,9 @@ Targets are `arm`, `linkage`, `urdf`, `mjcf`, `cell`, `world` (cells with physic
 `poses`, `iso9283`, `calibration` and `clearance` (measured tables), `pictures`, `corners`, `picture_joints` and `lens`
 (of a camera). It needs nothing beside armwright; `world`, `step` and `pictures` need its extras.
 
-An input is a valid file in which keys, numbers, types, lines and
-cells were changed, lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised,
-when it takes more than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it
-again.
+An input is a valid file in which keys, numbers, types, lines and cells were changed, lost, doubled, nested or put
+elsewhere. It fails when anything but the reader's own error is raised, when it takes more than five seconds, or when
+memory grows beyond 1 GB. The seed and the number of an input make it again.
 """
 
 import base64

@@ -5,12 +5,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 import pytest
 
 from armwright.cell.model import Cell
+from armwright.cell.observations import Picture
 from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, InvalidValueError, KindError, ShapeError
+from armwright.physics import world
 from armwright.physics.servo import Reference
 from armwright.physics.world import PhysicsCell
 
@@ -110,3 +113,12 @@ def test_a_law_changes_nothing_but_efforts(tmp_path: Path) -> None:
         each.advance(0.01)
 
     np.testing.assert_array_equal(world.configuration("ARM_1", 0.01), plain.configuration("ARM_1", 0.01))
+
+
+def test_the_latest_pictures_are_kept() -> None:
+    """Of more pictures than are kept, and of larger ones, the last ones stay."""
+    small = [Picture(time=float(k), camera="C", frame="F", png=b"x", found=True, text="") for k in range(502)]
+    large = [attrs.evolve(picture, png=bytes(80_000_000)) for picture in small[:3]]
+
+    assert [picture.time for picture in world._latest(tuple(small))] == list(range(2, 502))
+    assert [picture.time for picture in world._latest(tuple(large))] == [1.0, 2.0]

@@ -42,8 +42,8 @@ from armwright.spatial.rotations import rotation_from_vector
 
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
-# Of very many pictures the last ones are kept.
-_MAX_PICTURES = 500
+# Of very many pictures the last ones are kept, and of large ones those of so many bytes together.
+_MAX_PICTURES, _MAX_PICTURE_BYTES = 500, 200_000_000
 # So are they of very many mishaps.
 _MAX_MISHAPS = 1000
 # Ticks between poses of the tool that are compared.
@@ -302,7 +302,7 @@ class PhysicsCell:
         taken = Picture(
             time=self.now, camera=camera, frame=frame, png=png(seen.picture), found=seen.pose is not None, text=text
         )
-        self._pictures = (*self._pictures, taken)[-_MAX_PICTURES:]
+        self._pictures = _latest((*self._pictures, taken))
         if seen.pose is None:
             raise DeviceError(seen.message)
         return seen.pose
@@ -360,6 +360,14 @@ def drawn_pose(X: Array, spread: Spread, rng: np.random.Generator) -> Array:
     x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (spread.position, spread.position, spread.yaw)
     turned = rotation_from_vector(np.array([0.0, 0.0, yaw])) @ X[:3, :3]
     return homogeneous(turned, X[:3, 3] + (x, y, 0.0))
+
+
+def _latest(pictures: tuple[Picture, ...]) -> tuple[Picture, ...]:
+    """Return the last pictures, as many as are kept."""
+    pictures = pictures[-_MAX_PICTURES:]
+    while sum(len(picture.png) for picture in pictures) > _MAX_PICTURE_BYTES:
+        pictures = pictures[1:]
+    return pictures
 
 
 def _initial_data(world: WorldModel) -> Any:
