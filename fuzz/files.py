@@ -28,8 +28,9 @@ import numpy as np
 from PIL import Image
 
 from armwright.accuracy.measurement_file import read_measurements as read_accuracy
-from armwright.arm.load import load_arm, load_urdf, read_arm
+from armwright.arm.load import load_arm, read_arm
 from armwright.arm.mjcf.reader import load_mjcf
+from armwright.arm.urdf.reader import load_urdf
 from armwright.calibration.board import Board
 from armwright.calibration.camera_tables import read_corners, read_lens, read_picture_joints
 from armwright.calibration.measurements import read_measurements

@@ -11,10 +11,12 @@ import trimesh
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.cell.model import Cell, CellArm
+from armwright.cell.part_poses import PartPoses
 from armwright.cell.reader import read_cell
 from armwright.cell.scene import Part
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.hand_solids import before_hand
+from armwright.physics.placed_bodies import CellBodies
 from armwright.physics.world import PhysicsCell
 from armwright.physics.world_model import world_model
 from armwright.spatial.poses import homogeneous
@@ -90,3 +92,17 @@ def test_a_link_ends_where_the_gripper_begins(middle: float, ends: tuple[float, 
     half = left.shape.length / 2 * left.pose[:3, 2]
     heights = [float((np.linalg.inv(arm.tool) @ [*(left.pose[:3, 3] + side * half), 1.0])[2]) for side in (-1, 1)]
     np.testing.assert_allclose(sorted(heights), ends, atol=1e-9)
+
+
+def test_every_link_is_checked_against_what_stands() -> None:
+    """Fixtures and parts are checked against each link and the gripper of an arm, and not against its base."""
+    path = Path(__file__).parents[2] / "examples" / "vision_cell.toml"
+    bodies = CellBodies(cell := read_cell(path))
+    arranged = bodies.arranged(PartPoses(cell))
+
+    pairs = {frozenset((arranged[i].name, arranged[j].name)) for i, j in bodies.pairs(arranged)}
+
+    moving = {"ARM_1 finger", "ARM_1 palm", *(f"ARM_1 link {number}" for number in range(1, 7))}
+    assert {"ARM_1 base", *moving} == {body.name for body in arranged if body.arm}
+    for other in ("TABLE", "BLOCK_1", "BLOCK_2", "BLOCK_3"):
+        assert {name for name in (*moving, "ARM_1 base") if frozenset((name, other)) in pairs} == moving
