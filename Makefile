@@ -61,6 +61,7 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/hand_over_sideways.rlo --cell examples/two_arms.toml -o out/hand_over_sideways
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[physics]'
 	$(BIN)/armwright run examples/hand_over.rlo --cell examples/hand_over_cell.toml --physics -o out/hand_over_nest
+	$(BIN)/armwright run examples/insert_peg.rlo --cell examples/socket_cell.toml --physics --seed 1 -o out/insert_peg
 	$(BIN)/armwright run examples/stack_by_vision.rlo --cell examples/vision_cell.toml --physics --seed 1 -o out/stack_by_vision
 	$(BIN)/armwright move joint puma560-seed examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post

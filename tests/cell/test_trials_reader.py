@@ -66,7 +66,7 @@ def test_a_frame_may_be_the_place_and_tolerances_have_defaults(tmp_path: Path) -
         ("friction = [0, 11]", "from 0 to 10"),
         ("friction = 0.5", "trials, friction: expected a list of 2 numbers"),
         ("mass_pct = 95", "0 to 90"),
-        ("pose = { BLOK = { xy_mm = 1 } }", "BLOK is not a part or marker of the cell; did you mean BLOCK?"),
+        ("pose = { BLOK = { xy_mm = 1 } }", "BLOK is not a part, frame or marker of the cell; did you mean BLOCK?"),
         ("pose = { BLOCK = { xy = 1 } }", "did you mean 'xy_mm'"),
         ("pose = { BLOCK = { yaw_deg = 181 } }", "0 to 180"),
         ('goal = { SLOT = { at = "BLOCK" } }', "SLOT is not a part of the cell"),

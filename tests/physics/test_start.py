@@ -92,7 +92,7 @@ def test_laws_that_return_no_efforts(
     """A law of a user's own returns a finite number for each joint; anything else is told, with its time."""
     world = PhysicsCell(boxed(tmp_path), laws={"ARM_1": lambda t, *rest: law(t, *rest) if t else np.zeros(6)})
 
-    with pytest.raises(error, match=r"efforts of the law at 0\.001 s: ") as caught:
+    with pytest.raises(error, match=r"efforts of the torque law of 'stanford' at 0\.001 s: ") as caught:
         world.advance(0.01)
 
     assert message in str(caught.value)
@@ -102,9 +102,7 @@ def test_a_law_changes_nothing_but_efforts(tmp_path: Path) -> None:
     """A law that writes into what it is given moves neither the arm nor where it is sent."""
 
     def writes(_t: float, q: Any, qd: Any, reference: Reference) -> Any:
-        q[:], qd[:] = 5.0, 5.0
-        with pytest.raises(ValueError, match="read-only"):
-            reference.q[:] = 5.0
+        q[:], qd[:], reference.q[:] = 5.0, 5.0, 5.0
         return np.zeros(6)
 
     cell = boxed(tmp_path)

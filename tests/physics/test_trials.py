@@ -1,6 +1,7 @@
 """What is drawn for trials, and the verdict on worlds that are set up to fail or succeed."""
 
 import json
+import re
 
 import attrs
 import numpy as np
@@ -189,6 +190,22 @@ def test_a_part_that_a_gripper_touches_is_not_let_go(cell: Cell) -> None:
     assert (verdict.cause, verdict.message) == ("not let go", "BLOCK is touched by ARM_1")
     world.move_fingers("ARM_1", world.now, closed=False)
     assert judge(world, aloft, world.now).cause in {"", "moving"}
+
+
+def test_the_last_mishap_is_named_where_a_part_is_not_at_its_goal(cell: Cell) -> None:
+    """A hand that has closed on nothing may be why a part is elsewhere; where the part is at its goal it is no news."""
+    for x, words in (
+        (0.02, r"from its goal at SLOT; 1 mishap before, the last R603 at 0.\d{3} s: ARM_1 closed"),
+        (0, ""),
+    ):
+        world = _placed(cell, x=x)
+        seconds = world.move_fingers("ARM_1", 0.0, closed=True, frame="BLOCK")
+        mishap = world.advance(seconds + 0.1)
+        assert mishap is not None
+        assert mishap.code == "R603"
+        verdict = judge(world, cell, world.now)
+        assert verdict.cause == ("misplaced" if x else "")
+        assert re.search(words, verdict.message)
 
 
 def test_the_error_of_a_program_is_the_cause(cell: Cell) -> None:

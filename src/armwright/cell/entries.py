@@ -8,6 +8,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.names import arm_name
+from armwright.cell.scene import Spread
 from armwright.errors import closest
 from armwright.files.document import Table
 from armwright.files.limits import limit, limit_message
@@ -62,6 +63,15 @@ def read_pose(table: Table, key: str, default: Array | None = None) -> Array:
         table.allow(key)
         return default
     return to_pose(table, key, table.vector(key, 12))
+
+
+def read_spread(table: Table, position: str, yaw: str, tilt: str | None = None) -> Spread:
+    """Return how far from its place something may be, by the keys of its offset [mm] and of its rotations [deg]."""
+    return Spread(
+        position=table.number(position, default=0.0, lower=0.0, upper=1e6) * 1e-3,
+        yaw=np.radians(table.number(yaw, default=0.0, lower=0.0, upper=180.0)),
+        tilt=0.0 if tilt is None else np.radians(table.number(tilt, default=0.0, lower=0.0, upper=90.0)),
+    )
 
 
 def to_pose(table: Table, key: str, numbers: Array, index: int | None = None) -> Array:

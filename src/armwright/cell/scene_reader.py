@@ -7,9 +7,9 @@ from collections.abc import Collection
 import numpy as np
 
 from armwright.arm.solid_entries import shape_in
-from armwright.cell.entries import ARM_NAME, read_name, read_pose, refuse_too_many
-from armwright.cell.frames import WORLD
-from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, Spread, table
+from armwright.cell.entries import ARM_NAME, known_name, read_name, read_pose, read_spread, refuse_too_many
+from armwright.cell.frames import WORLD, FrameTree
+from armwright.cell.scene import TABLE, USUAL_CONTACT_TIME, Fixture, Gripper, Marker, Part, table
 from armwright.errors import counted
 from armwright.files.document import Table
 from armwright.spatial.shapes import LARGEST_SIZE, Mesh, Shape, inertia, is_closed, open_edges
@@ -27,11 +27,15 @@ _SHAPES = ("box", "cylinder", "mesh", "sphere")
 _FIXTURES = {"boxes": "box", "cylinders": "cylinder", "meshes": "mesh", "spheres": "sphere"}
 
 
-def read_fixtures(scene: Table) -> dict[str, Fixture]:
+def read_fixtures(scene: Table, frames: FrameTree) -> dict[str, Fixture]:
     """Read the bodies that stand where they are, by name.
 
+    Args:
+        scene: an empty table where the file has none.
+        frames: those that bodies can be on.
+
     Raises:
-        FileFormatError: a key is unknown, missing or out of range, or a name occurs twice.
+        FileFormatError: a key is unknown, missing or out of range, a name occurs twice, or a frame does not exist.
     """
     fixtures: dict[str, Fixture] = {}
     if "table" in scene:
@@ -41,11 +45,14 @@ def read_fixtures(scene: Table) -> dict[str, Fixture]:
         for entry in scene.tables(kind) if kind in scene else ():
             entry.add_amount("fixtures", 1, "name")
             name = _body_name(entry, fixtures)
+            on = known_name(entry, "on", entry.text("on", default=WORLD), [*frames], "a standing frame")
             fixtures[name] = Fixture(
                 name=name,
                 shape=shape_in(entry, shape),
-                pose=read_pose(entry, "at"),
+                pose=frames.world(on) @ read_pose(entry, "at"),
                 friction=_friction(entry),
+                contact_time=entry.number("contact_ms", default=USUAL_CONTACT_TIME * 1e3, lower=2.0, upper=1e3) * 1e-3,
+                on=on,
             )
             entry.refuse_unknown_keys()
         scene.allow(kind)
@@ -127,10 +134,7 @@ def read_parts(parts: Table, taken: Collection[str] = ()) -> dict[str, Part]:
             mass=_part_mass(entry, shape),
             friction=_friction(entry),
             pose=read_pose(entry, "at"),
-            spread=Spread(
-                position=entry.number("spread_mm", default=0.0, lower=0.0, upper=1e6) * 1e-3,
-                yaw=np.radians(entry.number("spread_deg", default=0.0, lower=0.0, upper=180.0)),
-            ),
+            spread=read_spread(entry, "spread_mm", "spread_deg"),
             grasp=read_pose(entry, "grasp", np.eye(4)),
             marker=marker,
             symmetry=entry.whole("symmetry", 1, _MAX_SYMMETRY, default=1),

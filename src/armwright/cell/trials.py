@@ -51,7 +51,8 @@ class Trials:
     Attributes:
         friction: coefficient of every part; None for that of the cell.
         mass: by how much of its mass a part may be lighter or heavier, as a ratio.
-        poses: by name, how far parts and markers of the scene may be from their places, instead of their own spread.
+        poses: by name, how far parts, frames and markers of the scene may be from their places, instead of their own
+            spread.
         goals: by part.
         noise: of sensors.
     """

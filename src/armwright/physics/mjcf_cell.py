@@ -15,7 +15,7 @@ from armwright.arm.mjcf.tree import WORLD, MjcfTree
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.model import Cell, CellArm, ContactPlane
-from armwright.cell.scene import Fixture, Gripper, Part
+from armwright.cell.scene import USUAL_CONTACT_TIME, Fixture, Gripper, Part
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.inputs import file_path
 from armwright.mujoco_library import load_mujoco
@@ -152,8 +152,15 @@ def _fixtures(model: Any) -> dict[str, Fixture]:
     for geom, name in enumerate(names):
         solid = solid_of(model, geom)
         if name not in cut and name != FLOOR and solid is not None and _NAME.fullmatch(name):
-            friction = float(model.geom_friction[geom][0])
-            fixtures[name] = Fixture(name=name, shape=solid.shape, pose=solid.pose, friction=friction)
+            # A time constant is above 0; other numbers are a stiffness and a damping.
+            time = float(model.geom_solref[geom][0])
+            fixtures[name] = Fixture(
+                name=name,
+                shape=solid.shape,
+                pose=solid.pose,
+                friction=float(model.geom_friction[geom][0]),
+                contact_time=time if time > 0 else USUAL_CONTACT_TIME,
+            )
     return fixtures
 
 

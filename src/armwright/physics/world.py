@@ -20,13 +20,14 @@ from armwright.cell.hardware import DeviceError, Mishap, PeakContact
 from armwright.cell.model import Cell
 from armwright.cell.observations import MeasuredStream, Observations, Picture
 from armwright.cell.part_poses import PartPoses
-from armwright.cell.scene import Part, Spread
+from armwright.cell.scene import Part
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError, closest
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics import mishaps
 from armwright.physics.contacts import Contacts
+from armwright.physics.draws import drawn_frames, drawn_parts, placed_fixtures
 from armwright.physics.measured import Log
 from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
@@ -37,8 +38,7 @@ from armwright.physics.vision import camera_in_world, look
 from armwright.physics.watch import Watch
 from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
 from armwright.physics.wrist_sensor import WristSensor
-from armwright.spatial.poses import homogeneous, inverse, to_noap
-from armwright.spatial.rotations import rotation_from_vector
+from armwright.spatial.poses import inverse, to_noap
 
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
@@ -60,6 +60,7 @@ class PhysicsCell:
         seed: int = 0,
         laws: Mapping[str, TorqueLaw] | None = None,
         parts: Mapping[str, Part] | None = None,
+        frames: Mapping[str, Array] | None = None,
     ) -> None:
         """Set up the initial state.
 
@@ -68,6 +69,7 @@ class PhysicsCell:
             seed: what is random is drawn from it: where parts stand, and the noise of sensors and cameras.
             laws: controllers of arms by name, instead of the servos of the cell.
             parts: as they are in this world; drawn from their spreads where they are left out.
+            frames: (4, 4) where the frames of the cell are in this world; drawn likewise. Programs know nothing of it.
 
         Raises:
             KindError: an argument is of another kind.
@@ -82,7 +84,9 @@ class PhysicsCell:
                 target_of(cell, sight)
         self._cell, self._believed = cell, Simulator(cell)
         self._seed, self._rng = seed, np.random.default_rng(seed)
-        self._world = world_model(cell, drawn_parts(cell, self._rng) if parts is None else parts)
+        parts = drawn_parts(cell, self._rng) if parts is None else parts
+        self._frames = drawn_frames(cell, self._rng) if frames is None else frames
+        self._world = world_model(attrs.evolve(cell, fixtures=placed_fixtures(cell, self._frames)), parts)
         self._contacts = Contacts(self._world)
         self._data = _initial_data(self._world)
         model, period = self._world.model, cell.period
@@ -313,6 +317,10 @@ class PhysicsCell:
         """Return the pose (4, 4) of a part in the world, as it is now."""
         return part_pose(self._data, part)
 
+    def true_frame(self, frame: str) -> Array:
+        """Return the pose (4, 4) of a frame of the cell in the world, which is not where programs believe it."""
+        return self._frames[frame]
+
     def speed(self, part: str) -> tuple[float, float]:
         """Return how fast a part moves [m/s] and turns [rad/s]."""
         velocity = part_velocity(self._data, part)
@@ -342,24 +350,10 @@ class PhysicsCell:
             },
             "tip": {stream.arm: _tip_error(self._cell, stream) for stream in measured},
             "slip": {name: hand.slip for name, hand in self._watch.hands.items()},
+            "frames": {name: to_noap(self.true_frame(name)).tolist() for name in self._cell.spreads},
             "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
         }
         return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)
-
-
-def drawn_parts(cell: Cell, rng: np.random.Generator) -> dict[str, Part]:
-    """Return the parts of a cell where they stand in a world: each drawn from its spread."""
-    parts = {}
-    for name, part in cell.parts.items():
-        parts[name] = attrs.evolve(part, pose=drawn_pose(part.pose, part.spread, rng))
-    return parts
-
-
-def drawn_pose(X: Array, spread: Spread, rng: np.random.Generator) -> Array:
-    """Return a pose (4, 4) in the world near another one."""
-    x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (spread.position, spread.position, spread.yaw)
-    turned = rotation_from_vector(np.array([0.0, 0.0, yaw])) @ X[:3, :3]
-    return homogeneous(turned, X[:3, 3] + (x, y, 0.0))
 
 
 def _latest(pictures: tuple[Picture, ...]) -> tuple[Picture, ...]:
@@ -385,9 +379,14 @@ def _initial_data(world: WorldModel) -> Any:
 
 
 def _tip_error(cell: Cell, stream: MeasuredStream) -> float:
-    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m]."""
-    arm = cell.arms[stream.arm].arm
-    sent, there = (forward(arm, q[::_TIP_TICKS])[:, :3, 3] for q in (stream.sent, stream.q))
+    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m].
+
+    The tool is where the arm of the world has it, whatever the sensors read; where it was sent is what the controller
+    believes.
+    """
+    arm = cell.arms[stream.arm]
+    sent = forward(arm.arm, stream.sent[::_TIP_TICKS])[:, :3, 3]
+    there = forward(arm.plant or arm.arm, stream.actual[::_TIP_TICKS])[:, :3, 3]
     return float(np.linalg.norm(sent - there, axis=1).max(initial=0.0))
 
 

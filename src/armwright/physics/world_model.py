@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell
-from armwright.cell.scene import Part
+from armwright.cell.scene import USUAL_CONTACT_TIME, Part
 from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.friction import SpeedFriction
@@ -26,6 +26,8 @@ from armwright.spatial.shapes import Solid, centroid, convex_solids, farthest, i
 
 # No step of the world is longer [s].
 _MAX_STEP = 1e-3
+# Parts slower than this are at rest [m/s]: with less care they would stop before they have settled.
+_AT_REST = 1e-6
 # What meets what: bits of geoms. Arms have one each, from the third on.
 _STANDING, _PART = 1, 2
 _HAND = 1 << 30
@@ -34,8 +36,6 @@ _MAX_ARMS = 28
 # Contacts of parts and furniture: sliding, turning, rolling.
 _ROLLING = (0.005, 1e-4)
 _CONDIM = 4
-# Time constant of contacts with what stands [s].
-_SOFT = 0.02
 # How far below everything that stands the floor lies on which lost parts fall, and its half size [m].
 _BELOW, _FLOOR = 0.5, 20.0
 # The plate under a plane that yields: light, so that it adds nothing to what presses on it [kg], and damped.
@@ -91,10 +91,14 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     Raises:
         UnsupportedArmError: masses of an arm are unknown.
     """
+    mujoco = load_mujoco()
     spec, plants = world_spec(cell, parts)
     substeps = round(cell.period / spec.option.timestep)
     plate = cell.contact.height is not None
     model = finish(spec, plants)
+    # Parts at rest are left out of the equations until something touches them; arms never are.
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    model.opt.sleep_tolerance = _AT_REST
     frictions = [SpeedFriction(arm.arm, arm_indices(model, arm.name, arm.arm.n)) for arm in plants]
     return WorldModel(
         cell=cell,
@@ -148,17 +152,18 @@ def _surface(friction: float) -> dict[str, Any]:
     return {"friction": (friction, *_ROLLING), "condim": _CONDIM}
 
 
-def _furniture(friction: float) -> dict[str, Any]:
+def _furniture(friction: float, contact_time: float = USUAL_CONTACT_TIME) -> dict[str, Any]:
     """Return the options of what stands: softer than pads, whose own stiffness would make every touch a blow."""
-    return {**_surface(friction), "priority": 2, "solref": (_SOFT, 1.0)}
+    return {**_surface(friction), "priority": 2, "solref": (contact_time, 1.0)}
 
 
 def _add_standing(spec: Any, cell: Cell) -> None:
     for name, fixture in cell.fixtures.items():
         solid = Solid(shape=fixture.shape, pose=fixture.pose)
         bits = {"contype": _STANDING, "conaffinity": _ALL}
+        surface = _furniture(fixture.friction, fixture.contact_time)
         for label, piece in _pieces(name, solid):
-            add_geom(spec, spec.worldbody, label, piece, rgba=_FURNITURE, **bits, **_furniture(fixture.friction))
+            add_geom(spec, spec.worldbody, label, piece, rgba=_FURNITURE, **bits, **surface)
 
 
 def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
