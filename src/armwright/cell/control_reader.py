@@ -33,8 +33,11 @@ def read_servo(entry: Table) -> Servo:
 
 def read_sensors(entry: Table) -> Sensors:
     """Read what the controller of an arm knows of its joints."""
+    counts = entry.number("encoder_counts", default=0.0, lower=0.0, upper=1e12)
+    if 0.0 < counts < 1.0:
+        raise entry.error("encoder_counts", f"expected 1 or more, or 0 for exact positions, got {counts:g}")
     sensors = Sensors(
-        counts=entry.number("encoder_counts", default=0.0, lower=0.0, upper=1e12),
+        counts=counts,
         effort_noise=entry.number("effort_noise_pct", default=0.0, lower=0.0, upper=100.0) * 1e-2,
         delay=entry.whole("delay_ticks", 0, _MAX_DELAY, default=0),
     )

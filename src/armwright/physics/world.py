@@ -33,6 +33,7 @@ from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
 from armwright.physics.seeing import target_of
 from armwright.physics.servo import ArmServo, Sent, TorqueLaw
+from armwright.physics.start import buried_bases, check_arguments
 from armwright.physics.vision import camera_in_world, look
 from armwright.physics.watch import Watch
 from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
@@ -41,8 +42,8 @@ from armwright.spatial.poses import inverse, to_noap
 
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
-# Of very many pictures the last ones are kept.
-_MAX_PICTURES = 500
+# Of very many pictures the last ones are kept, and of large ones those of so many bytes together.
+_MAX_PICTURES, _MAX_PICTURE_BYTES = 500, 200_000_000
 # So are they of very many mishaps.
 _MAX_MISHAPS = 1000
 # Ticks between poses of the tool that are compared.
@@ -71,11 +72,13 @@ class PhysicsCell:
             frames: (4, 4) where the frames of the cell are in this world; drawn likewise. Programs know nothing of it.
 
         Raises:
+            KindError: an argument is of another kind.
             UnsupportedArmError: masses of an arm are unknown.
             InvalidValueError: things stand inside each other at the start, a camera looks for a part without a marker,
-                or a law is for no arm of the cell.
+                a law is for no arm of the cell, or the parts are not those of the cell.
             MissingExtraError: a camera takes pictures, and OpenCV is missing.
         """
+        check_arguments(cell, seed, laws, parts)
         for sight in cell.sights.values():
             if sight.camera is not None:
                 target_of(cell, sight)
@@ -122,6 +125,7 @@ class PhysicsCell:
 
         mujoco.mj_forward(self._world.model, self._data)
         overlaps = self._contacts.overlaps(self._data)
+        overlaps += buried_bases(self._cell, self._contacts, self._world.model, self._data)
         if overlaps:
             worst = max(overlaps, key=lambda overlap: overlap.depth)
             raise InvalidValueError(
@@ -302,7 +306,7 @@ class PhysicsCell:
         taken = Picture(
             time=self.now, camera=camera, frame=frame, png=png(seen.picture), found=seen.pose is not None, text=text
         )
-        self._pictures = (*self._pictures, taken)[-_MAX_PICTURES:]
+        self._pictures = _latest((*self._pictures, taken))
         if seen.pose is None:
             raise DeviceError(seen.message)
         return seen.pose
@@ -350,6 +354,14 @@ class PhysicsCell:
             "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
         }
         return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)
+
+
+def _latest(pictures: tuple[Picture, ...]) -> tuple[Picture, ...]:
+    """Return the last pictures, as many as are kept."""
+    pictures = pictures[-_MAX_PICTURES:]
+    while sum(len(picture.png) for picture in pictures) > _MAX_PICTURE_BYTES:
+        pictures = pictures[1:]
+    return pictures
 
 
 def _initial_data(world: WorldModel) -> Any:
