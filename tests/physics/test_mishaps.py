@@ -10,8 +10,8 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.cell.control import Servo
+from armwright.cell.hardware import Mishap
 from armwright.cell.model import Cell
-from armwright.physics.servo import Reference
 from armwright.physics.world import PhysicsCell
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import RunError
@@ -69,15 +69,13 @@ def weak(cell: Cell) -> PhysicsCell:
     return PhysicsCell(attrs.evolve(cell, arms={"ARM_1": placed}))
 
 
-def without_meaning(cell: Cell) -> PhysicsCell:
-    """A world with a controller that asks for efforts that are no numbers."""
+class WithoutMeaning(PhysicsCell):
+    """A world in which a speed is no number from some time on."""
 
-    def law(t: float, q: Array, qd: Array, reference: Reference) -> Array:  # noqa: ARG001 - what a law is given
-        return np.full(len(q), np.nan if t > 0.5 else 0.0)
-
-    # That the arm falls meanwhile is no mishap.
-    alarms = attrs.evolve(cell.alarms, tracking_angle=9.0, tracking_length=9.0)
-    return PhysicsCell(attrs.evolve(cell, alarms=alarms), laws={"ARM_1": law})
+    def advance(self, now: float) -> Mishap | None:  # noqa: D102 - as that of any world
+        if now > 0.5:
+            self._data.qvel[-1] = np.nan
+        return super().advance(now)
 
 
 class Case(NamedTuple):
@@ -96,7 +94,7 @@ CASES = {
     "too heavy": Case("R605", "ARM_1 has lost BLOCK", change=("mass_kg = 0.2", "mass_kg = 7")),
     "oiled pads": Case("R605", "ARM_1 has lost BLOCK", change=OILED),
     "a weak servo": Case("R606", "ARM_1 does not follow its motion: joint", weak),
-    "no numbers": Case("R607", "the simulated world has become unstable", without_meaning),
+    "no numbers": Case("R607", "the simulated world has become unstable", WithoutMeaning),
 }
 
 

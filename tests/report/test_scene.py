@@ -490,7 +490,14 @@ def test_the_measured_world_is_drawn(visit, stocked: Recording) -> None:
     off[0] = 0.2
     opening = np.linspace(0.01, 0.07, len(stream.t))
     measured = MeasuredStream(
-        arm=stream.arm, t=stream.t, q=stream.q + off, qd=stream.qd, tau=stream.tau, sent=stream.q, opening=opening
+        arm=stream.arm,
+        t=stream.t,
+        q=stream.q + off,
+        actual=stream.q + off,
+        qd=stream.qd,
+        tau=stream.tau,
+        sent=stream.q,
+        opening=opening,
     )
     # It stands for 1 s, and then goes 0.3 m in 0.02 s.
     ends = homogeneous(np.eye(3), np.array([[0.5, 0, 0.1], [0.5, 0, 0.1], [0.5, 0.3, 0.1], [0.5, 0.3, 0.1]]))

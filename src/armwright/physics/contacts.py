@@ -109,7 +109,7 @@ class Contacts:
             return None
         geoms = data.contact.geom
         suspicious = self._unwanted[geoms[:, 0], geoms[:, 1]]
-        if not suspicious.any():
+        if not np.count_nonzero(suspicious):
             return None
         worst = None
         for number in np.flatnonzero(suspicious).tolist():

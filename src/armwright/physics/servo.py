@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 import attrs
@@ -29,11 +30,19 @@ _TICK_TOLERANCE = 1e-9
 
 
 class Reference(NamedTuple):
-    """Where the joints of an arm are sent at a moment: positions, speeds and accelerations, (n,) each."""
+    """Where the joints of an arm are sent at a moment, (n,) each.
+
+    Attributes:
+        q: positions [rad] or [m].
+        qd: speeds.
+        qdd: accelerations.
+        friction: of the believed arm at these speeds, but the viscous one [N m] or [N].
+    """
 
     q: Array
     qd: Array
     qdd: Array
+    friction: Array
 
 
 class TorqueLaw(Protocol):
@@ -53,19 +62,29 @@ class TorqueLaw(Protocol):
 class Sent:
     """A trajectory on the ticks of the servo."""
 
-    def __init__(self, trajectory: Trajectory, tick: int, period: float) -> None:
-        """Begin at a tick."""
+    def __init__(
+        self, trajectory: Trajectory, tick: int, period: float, friction: Callable[[Array], Array] = np.zeros_like
+    ) -> None:
+        """Begin at a tick.
+
+        Args:
+            trajectory: from that tick on.
+            tick: of the servo.
+            period: of the servo [s].
+            friction: returns the friction at speeds (k, n), see ``Reference``; none where it is left out.
+        """
         self.trajectory, self.tick = trajectory, tick
         count = math.ceil(trajectory.duration / period - _TICK_TOLERANCE) + 1
         t = np.minimum(np.arange(count) * period, trajectory.duration)
         self._q, self._qd, self._qdd = (trajectory(t, order) for order in range(3))
         # Then the arm stands.
         self._qd[-1] = self._qdd[-1] = 0.0
+        self._friction = friction(self._qd)
 
     def at(self, tick: int) -> Reference:
         """Return where the joints are sent at a tick."""
         index = min(max(tick - self.tick, 0), len(self._q) - 1)
-        return Reference(self._q[index], self._qd[index], self._qdd[index])
+        return Reference(self._q[index], self._qd[index], self._qdd[index], self._friction[index])
 
     def configuration(self, time: float, period: float) -> Array:
         """Return the positions (n,) at any time from its beginning on."""
@@ -161,7 +180,7 @@ class ArmServo:
                 tau = self._compiled.inverse_dynamics(q, qd, reference.qdd + correction)
                 if self.load:
                     tau = tau + self._load_efforts(q, reference.qdd + correction)
-            tau = tau + self._friction(reference.qd)
+            tau = tau + reference.friction
             # What a motor cannot give is not to be asked for twice.
             if not self.leaning:
                 self._sums += error * self._period * (np.abs(tau) < self._effort)
@@ -181,11 +200,17 @@ class ArmServo:
         efforts = law(t, q.copy(), qd.copy(), Reference(*(row.copy() for row in reference)))
         return exact_shape(efforts, (self.arm.n,), f"efforts of the torque law of '{self.arm.name}' at {t:.3f} s")
 
-    def _friction(self, qd: Array) -> Array:
-        """Return the friction (n,) at the speeds of the reference, but the viscous one."""
+    def friction(self, qd: Array) -> Array:
+        """Return the friction (k, n) of the believed arm at speeds (k, n) of its reference, but the viscous one."""
         direction, fading = np.tanh(qd / _MOVING), self._friction_law.fading(qd)
         dry = self._dry if fading is None else self._dry + fading
         return np.asarray(dry * direction + self._lean * np.abs(direction) + self._friction_law.smooth(qd))
+
+    def configuration(self, data: Any) -> Array:
+        """Return the joint positions (n,) as the sensors read them at the latest tick."""
+        if self._sensors.exact or not self._readings:
+            return np.array(data.qpos[self.indices.positions])
+        return self._latest().copy()
 
     def _load_efforts(self, q: Array, qdd: Array) -> Array:
         """Return what a part in the hand asks for beside the arm (n,); its centripetal acceleration is left out."""
@@ -200,10 +225,14 @@ class ArmServo:
             q = np.round(q / self._count) * self._count
         keep = self._sensors.delay + 2
         self._readings = (*self._readings, q)[-keep:]
-        latest, before = self._readings[max(0, len(self._readings) - 1 - self._sensors.delay)], self._readings[0]
+        latest, before = self._latest(), self._readings[0]
         # Speed is known by differences alone, smoothed over a few ticks.
         self._speed += _SMOOTHING * ((latest - before) / self._period - self._speed)
         return latest, self._speed
+
+    def _latest(self) -> Array:
+        """Return the reading that has come to the controller last."""
+        return self._readings[max(0, len(self._readings) - 1 - self._sensors.delay)]
 
     def copy(self) -> ArmServo:
         """Return a servo in the same state."""

@@ -105,7 +105,7 @@ class PhysicsCell:
             )
             self._servos[name].start(self._data)
             self._watch.hands[name].drive.start(self._data)
-            self._sent[name] = Sent(hold(arm.start, 0.0), 0, period)
+            self._sent[name] = Sent(hold(arm.start, 0.0), 0, period, self._servos[name].friction)
         for name in laws:
             near = closest(name, cell.arms)
             hint = f"; did you mean {near}?" if near else ""
@@ -193,10 +193,10 @@ class PhysicsCell:
     # ---- arms ----------------------------------------------------------------------------------------------------
 
     def configuration(self, arm: str, now: float) -> Array:
-        """Return the joint positions (n,) of an arm: as they are now, as they are sent at a time to come."""
+        """Return the joint positions (n,) of an arm: as its sensors read them, as they are sent at a time to come."""
         if now > self.now + self._cell.period * _TICK_TOLERANCE:
             return self.sent_configuration(arm, now)
-        return np.array(self._data.qpos[self._servos[arm].indices.positions])
+        return self._servos[arm].configuration(self._data)
 
     def sent_configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) that an arm is sent to, now or at a time to come."""
@@ -205,7 +205,8 @@ class PhysicsCell:
     def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array, *, guarded: bool = False) -> None:
         """Let an arm follow a trajectory that begins where it has been sent."""
         self._believed.start_motion(arm, trajectory, now, tip, guarded=guarded)
-        self._sent[arm] = Sent(trajectory, round(now / self._cell.period), self._cell.period)
+        friction = self._servos[arm].friction
+        self._sent[arm] = Sent(trajectory, round(now / self._cell.period), self._cell.period, friction)
         self._watch.start_motion(arm, self._tick, guarded=guarded)
 
     def contact_time(self, arm: str) -> None:
