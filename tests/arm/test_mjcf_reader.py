@@ -129,6 +129,20 @@ def test_drawn_geoms_and_meshes(tmp_path: Path) -> None:
     np.testing.assert_allclose(world.max(axis=0), (0.2, 1.1, 1.3), atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["./block.stl", "a//block.stl", "a/./block.stl", "a/../block.stl", ".//./block.stl"])
+def test_names_of_mesh_files(name: str, tmp_path: Path) -> None:
+    """A mesh is found by any name of its file, though MuJoCo shortens it."""
+    (tmp_path / "a").mkdir()
+    for folder in (tmp_path, tmp_path / "a"):
+        trimesh.creation.box((0.1, 0.2, 0.3)).export(folder / "block.stl")
+    text = one(f'<asset><mesh name="m" file="{name}"/></asset>', geom='<geom type="mesh" mesh="m"/>')
+
+    (solid,) = load_mjcf(written(tmp_path, text)).links[0].solids
+
+    assert isinstance(solid.shape, Mesh)
+    np.testing.assert_allclose(np.sort(np.ptp(solid.shape.vertices, axis=0)), (0.1, 0.2, 0.3), atol=1e-6)
+
+
 def test_includes(tmp_path: Path) -> None:
     """What a file includes is read as if it stood there."""
     (tmp_path / "parts").mkdir()
@@ -201,6 +215,14 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;&a;">]><mujoco model
 HOSTILE = {
     "nothing": ("", "arm.xml:1: not valid XML: no element found"),
     "no XML": ("<mujoco", "arm.xml:1: not valid XML: unclosed token"),
+    "a mesh of another scheme": (
+        one('<asset><mesh name="m" file="http://x/y.stl"/></asset>', geom='<geom type="mesh" mesh="m"/>'),
+        "y.stl: no such file",
+    ),
+    "a mesh with a slash at its end": (
+        one('<asset><mesh name="m" file="y.stl/"/></asset>', geom='<geom type="mesh" mesh="m"/>'),
+        "y.stl: no such file",
+    ),
     "another format": ("<robot/>", "arm.xml:1: expected <mujoco>, as MJCF files have, got <robot>"),
     "entities": (BOMB, "arm.xml:1: <!DOCTYPE>: a document type is not read, and MJCF files need none"),
     "depth": (NESTED, "arm.xml:1: <body>: nested too deeply: the limit is 60 levels"),

@@ -15,6 +15,7 @@ ARM = """[arms.ARM_1]
 hand = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.25]
 """
 HERE = "[1,0,0, 0,1,0, 0,0,1, 0.5,0.1,0.2]"
+PART = f"[parts.{{}}]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\n"
 
 
 def cell(folder: Path, text: str) -> Cell:
@@ -108,10 +109,35 @@ def test_grippers(tmp_path: Path) -> None:
             "parts, B, marker, id: the parts A and B have the same marker 7",
         ),
         (
+            f"[parts.A]\nsize_mm = [1e-3, 1e-3, 1e-3]\nmass_kg = 1e-6\nat = {HERE}\n",
+            "parts, A, mass_kg: too small for such a shape; about an axis its moment of inertia is 1.67e-19 kg m²",
+        ),
+        (
             f"[parts.A]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\nsymmetry = 1.5\n",
             "symmetry: expected a whole number, got 1.5",
         ),
         ('[visions]\nOBJ = { part = "BLOK" }\n', "OBJ, part: BLOK is not a part of the cell"),
+        (
+            f'[scene]\nspheres = [{{ name = "Post", at = {HERE}, diameter_mm = 1 }}]\n{PART.format("POST")}',
+            "parts, POST: POST is the name of a body or a marker of the scene too; rename one of them",
+        ),
+        (
+            f"[scene]\ntable = {{ z = 0, from = [0, 0], to = [1, 1] }}\n{PART.format('table')}",
+            "parts, table: TABLE is the name of a body",
+        ),
+        (
+            f'[scene]\nmarkers = [{{ name = "A", id = 3, size_mm = 9, at = {HERE} }}]\n{PART.format("A")}',
+            "parts, A: A is the name of a body or a marker",
+        ),
+        (
+            f'[scene]\nspheres = [{{ name = "arm-01", at = {HERE}, diameter_mm = 1 }}]\n',
+            "ARM_1 cannot name a body or a marker of the scene",
+        ),
+        (
+            f'[scene]\nmarkers = [{{ name = "World", id = 3, size_mm = 9, at = {HERE} }}]\n',
+            "WORLD cannot name a body or a marker of the scene",
+        ),
+        ("[arms.ARM_1.sensors]\nencoder_counts = 1e-320\n", "encoder_counts: expected 1 or more, or 0 for exact"),
         ("[arms.ARM_1.gripper]\nforce_N = 0\n", "gripper, force_N: expected 0.001 to 100000, got 0"),
     ],
 )

@@ -51,7 +51,7 @@ def turntable(radius: float) -> Any:
     disc.add_joint(name="disc", type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0, 0, 1), armature=1e6)
     disc.explicitinertial, disc.mass, disc.inertia, disc.ipos = True, 1.0, (1.0,) * 3, np.zeros(3)
     tool = disc.add_body(name="A/tool", pos=(radius, 0, 0), quat=(0, 1, 0, 0))
-    add_gripper(spec, "A", tool, Gripper(), STEP, contype=4, conaffinity=3)
+    add_gripper(spec, "A", tool, Gripper(), contype=4, conaffinity=3)
     block = spec.worldbody.add_body(name="BLOCK", pos=(radius, 0, 0.5))
     block.add_freejoint()
     block.explicitinertial, block.mass, block.inertia, block.ipos = True, 0.2, (1e-4,) * 3, np.zeros(3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -20,6 +21,10 @@ from armwright.files.pictures import GreyPicture, read_grey_picture
 _PREFIX = "DICT_"
 # The least length of the side of a picture in which a board may be [px].
 _MIN_SIDE = 32
+# OpenCV takes some 200 bytes a pixel to look for a chessboard, so it looks in pictures of no more pixels than this.
+_MAX_PIXELS = 6_000_000
+# Corners found in a smaller picture are looked for within so many of its pixels, until they move by less [px].
+_AROUND, _STILL, _MOST_STEPS = 2, 1e-3, 40
 
 
 def board_finder(board: Board) -> Callable[[str, GreyPicture], BoardView | None]:
@@ -134,10 +139,18 @@ def _find_charuco(detector: Any, name: str, picture: GreyPicture) -> BoardView |
 def _find_chessboard(cv2: ModuleType, board: Board, name: str, picture: GreyPicture) -> BoardView | None:
     size = board.columns - 1, board.rows - 1
     flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
-    done, corners = cv2.findChessboardCornersSB(picture, size, flags=flags)
+    shrink = math.ceil(math.sqrt(picture.size / _MAX_PIXELS))
+    height, width = picture.shape
+    smaller = width // shrink, height // shrink
+    small = picture if shrink == 1 else cv2.resize(picture, smaller, interpolation=cv2.INTER_AREA)
+    done, corners = cv2.findChessboardCornersSB(small, size, flags=flags)
     if not done:
         return None
     pixels = _pixels(corners)
+    if shrink > 1:
+        near = ((pixels + 0.5) * (width / smaller[0], height / smaller[1]) - 0.5).astype(np.float32)
+        criteria = cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, _MOST_STEPS, _STILL
+        pixels = _pixels(cv2.cornerSubPix(picture, near, (_AROUND * shrink,) * 2, (-1, -1), criteria))
     if not board.looks_the_same_upside_down and _first_square_is_white(board, picture, pixels):
         pixels = pixels[::-1]
     return BoardView(name=name, corners=np.arange(len(pixels)), pixels=pixels)

@@ -17,6 +17,8 @@ from armwright.spatial.shapes import LARGEST_SIZE, Shape, Solid, contains, suppo
 
 # Sides of pictures [px], and how many pixels one may have.
 _SIDES, _MAX_PIXELS = (16, 4096), 4_194_304
+# How many pixels all cameras may have: where a lens distorts, each needs some 32 bytes.
+_MAX_ALL_PIXELS = 4 * _MAX_PIXELS
 _FOVY_DEG = (1.0, 150.0)
 _MAX_FOCAL = 1e6
 _MAX_DISTORTION = 10.0
@@ -54,6 +56,9 @@ def read_cameras(main: Table, others: Table, arms: Collection[str]) -> dict[str,
         entry.allow("on")
         cameras[name] = _camera(entry, name, read_pose(entry, "pose"), on)
         entry.refuse_unknown_keys()
+        pixels = sum(camera.lens.width * camera.lens.height for camera in cameras.values())
+        if pixels > _MAX_ALL_PIXELS:
+            raise entry.error("width", f"expected no more than {_MAX_ALL_PIXELS:,} pixels of all cameras together")
     return cameras
 
 

@@ -49,16 +49,20 @@ class Sensors:
 
 @attrs.frozen(kw_only=True)
 class ForceSensor:
-    """The sensor of forces between an arm and its tool.
+    """The sensor of forces and moments between an arm and its tool.
 
     Attributes:
         noise: standard deviation of each force [N].
         bias: constant error of each force [N].
+        moment_noise: standard deviation of each moment [N m].
+        moment_bias: constant error of each moment [N m].
         rate: readings per second [1/s]; 0 for one at every servo tick.
     """
 
     noise: float = 0.0
     bias: float = 0.0
+    moment_noise: float = 0.0
+    moment_bias: float = 0.0
     rate: float = 0.0
 
 

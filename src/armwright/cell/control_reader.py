@@ -33,8 +33,11 @@ def read_servo(entry: Table) -> Servo:
 
 def read_sensors(entry: Table) -> Sensors:
     """Read what the controller of an arm knows of its joints."""
+    counts = entry.number("encoder_counts", default=0.0, lower=0.0, upper=1e12)
+    if 0.0 < counts < 1.0:
+        raise entry.error("encoder_counts", f"expected 1 or more, or 0 for exact positions, got {counts:g}")
     sensors = Sensors(
-        counts=entry.number("encoder_counts", default=0.0, lower=0.0, upper=1e12),
+        counts=counts,
         effort_noise=entry.number("effort_noise_pct", default=0.0, lower=0.0, upper=100.0) * 1e-2,
         delay=entry.whole("delay_ticks", 0, _MAX_DELAY, default=0),
     )
@@ -47,6 +50,8 @@ def read_force_sensor(entry: Table) -> ForceSensor:
     sensor = ForceSensor(
         noise=entry.number("noise_N", default=0.0, lower=0.0, upper=1e4),
         bias=entry.number("bias_N", default=0.0, lower=-1e4, upper=1e4),
+        moment_noise=entry.number("noise_Nm", default=0.0, lower=0.0, upper=1e4),
+        moment_bias=entry.number("bias_Nm", default=0.0, lower=-1e4, upper=1e4),
         rate=entry.number("rate_hz", default=0.0, lower=0.0, upper=1e5),
     )
     entry.refuse_unknown_keys()

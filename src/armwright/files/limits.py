@@ -59,6 +59,8 @@ LIMITS: Mapping[str, Limit] = {
     ),
     "hanging": Limit(1000, "frames", "depth of the frame tree of a cell, from a frame to WORLD"),
     "arms": Limit(20, "arms", "arms of a cell"),
+    "parts": Limit(1000, "parts", "parts of a cell"),
+    "fixtures": Limit(2000, "fixtures", "bodies of the scene of a cell"),
     "revolutions": Limit(1000, "revolutions", "limits of a revolute joint, as revolutions from zero"),
     "pictures": Limit(1000, "pictures", "pictures that a camera is calibrated with"),
     "picture_mb": Limit(50, "MB", "size of the file of a picture"),
@@ -70,6 +72,9 @@ LIMITS: Mapping[str, Limit] = {
         "file together",
     ),
     "mesh_triangles": Limit(1_000_000, "triangles", "triangles of a mesh, its instances counted one by one"),
+    "file_triangles": Limit(
+        2_000_000, "triangles", "triangles of the meshes that an arm, cell or URDF file names, together"
+    ),
     "mesh_m": Limit(20, "m", "length of a mesh along any axis; a longer one is probably in another unit"),
     "gltf_values": Limit(1_000_000, "values", "values in the JSON of a glTF file"),
     "step_s": Limit(60, "s", "computing time for the triangles of a STEP file"),

@@ -255,9 +255,22 @@ class ClearanceChecker:
             row[near.indices] = near.distances
         return result
 
+    def poses(self, motions: Mapping[str, Trajectory], times: Array) -> Array:
+        """Return the poses (k, b, 4, 4) of all bodies in the world at times (k,) [s]."""
+        poses = np.empty((len(times), len(self._bodies), 4, 4))
+        for name, placed in self.arms.items():
+            frames = placed.base @ placed.arm.link_poses(motions[name](times))
+            for number, body in enumerate(self._bodies):
+                if body.arm == name:
+                    poses[:, number] = frames[:, body.link] @ body.solid.pose
+        for number, body in enumerate(self._bodies):
+            if body.arm is None:
+                poses[:, number] = body.solid.pose
+        return poses
+
     def nearest_points(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:
         """Return the points (2, 3) of two bodies that are nearest to each other, or deepest in each other [m]."""
-        poses, _ = self._placed(motions, np.array([time]), np.array([time]))
+        poses = self.poses(motions, np.array([time]))
         for body in bodies:
             self.distances.set_pose(body, poses[0, body])
         return self.distances.nearest(*bodies, within=_FAR).points

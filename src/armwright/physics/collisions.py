@@ -253,6 +253,23 @@ class CellCollisions:
             margin=Margins(*(contacts.margins_at(begin + part * old.duration) for part in (0.0, 0.5, 1.0))),
         )
 
+    def tool_pairs(self, arm: str, parts: PartPoses) -> tuple[ClearanceChecker, list[tuple[int, int]]]:
+        """Return the pairs of what stands and of the tool of an arm, or what it holds; and a checker of them.
+
+        Args:
+            arm: its name.
+            parts: where the parts are.
+        """
+        bodies, roles = self._bodies.arranged(parts), self._bodies.roles
+        tool = [
+            i
+            for i, (body, role) in enumerate(zip(bodies, roles, strict=True))
+            if body.arm == arm and (role.in_hand or role.part is not None)
+        ]
+        standing = [i for i, body in enumerate(bodies) if body.arm is None]
+        pairs = [(i, j) for i in tool for j in standing if (min(i, j), max(i, j)) not in self._left_out]
+        return self._checker.rearranged(bodies, pairs), pairs
+
     def _contacts(
         self,
         move: PlannedMove,

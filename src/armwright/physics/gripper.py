@@ -34,9 +34,11 @@ _INSIDE = 0.01
 # A soft constraint of one geom with what it touches: rolling and torsional friction are small.
 _ROLLING = (0.005, 1e-4)
 _STIFF = (0.95, 0.99, 0.001, 0.5, 2.0)
+# Contacts of pads with what they do not hold: time constant [s] and damping; from 0 to full stiffness within 3 mm.
+_TOUCH, _YIELDING = (5e-3, 1.0), (0.01, 0.9, 0.003, 0.5, 1.0)
 
 
-def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: float, **geoms: Any) -> None:
+def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, **geoms: Any) -> None:
     """Add a gripper to the tool of an arm: bodies ``NAME/left`` and ``NAME/right``, or geoms of a cup.
 
     Args:
@@ -44,16 +46,16 @@ def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: flo
         name: of the arm.
         tool: its body.
         gripper: what it holds parts with.
-        timestep: of the world [s].
         geoms: options of all geoms.
     """
     pads = {
         "friction": (gripper.friction, *_ROLLING),
         "condim": 4,
-        # The stiffest that MuJoCo lets pass: held parts slip by less the stiffer the contact is while a carry turns.
-        "solref": (2 * timestep, 1.0),
-        "solimp": _STIFF,
-        "priority": 1,
+        # What they touch but do not hold yields like a spring, so that the force of a contact grows with its depth and
+        # is no blow: before what stands, which is stiffer, and behind the plane, which is a spring itself.
+        "solref": _TOUCH,
+        "solimp": _YIELDING,
+        "priority": 3,
     }
     if gripper.kind == "suction":
         _add_cup(spec, name, tool, gripper, geoms | pads)

@@ -27,7 +27,7 @@ class Log:
         """Begin with nothing."""
         self._cell, self._parts = cell, tuple(world.parts)
         self._full: dict[str, list[Array]] = {name: [] for name in cell.arms}
-        self._rows = {name: np.empty((_BLOCK, 4 * arm.arm.n + 1)) for name, arm in cell.arms.items()}
+        self._rows = {name: np.empty((_BLOCK, 5 * arm.arm.n + 1)) for name, arm in cell.arms.items()}
         self._count = 0
         self._every = max(1, round(_PARTS / cell.period))
         self._tracks: dict[str, list[tuple[float, Array]]] = {
@@ -48,7 +48,7 @@ class Log:
         row = self._rows[arm][tick % _BLOCK]
         n = len(measured.q)
         row[:n], row[n : 2 * n], row[2 * n : 3 * n] = measured.q, measured.qd, measured.tau
-        row[3 * n : 4 * n], row[-1] = reference.q, opening
+        row[3 * n : 4 * n], row[4 * n : 5 * n], row[-1] = reference.q, measured.actual, opening
         if tick % _BLOCK == _BLOCK - 1:
             self._full[arm].append(self._rows[arm])
             self._rows[arm] = np.empty_like(self._rows[arm])
@@ -73,7 +73,7 @@ class Log:
 
     def _stream(self, name: str) -> MeasuredStream:
         rows = np.concatenate([*self._full[name], self._rows[name]])[: self._count]
-        n = (rows.shape[1] - 1) // 4
+        n = (rows.shape[1] - 1) // 5
         return MeasuredStream(
             arm=name,
             t=np.arange(self._count, dtype=np.float64) * self._cell.period,
@@ -81,6 +81,7 @@ class Log:
             qd=rows[:, n : 2 * n],
             tau=rows[:, 2 * n : 3 * n],
             sent=rows[:, 3 * n : 4 * n],
+            actual=rows[:, 4 * n : 5 * n],
             opening=rows[:, -1],
         )
 

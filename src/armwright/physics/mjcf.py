@@ -153,7 +153,8 @@ def _lost_of_arm(arm: Arm, spec: Any, plant: PlantArm) -> list[str]:
         error = _mass_matrix_error(arm, spec, plant.name)
         names = ", ".join(_short(inertia.body) for inertia in changed)
         lost.append(
-            f"the mass matrix of the file differs by up to {error:.2g} of its largest entry, because of {names}"
+            f"the mass matrix of the file differs by up to {error:.2g} of its largest entry in {_COMPARED} random "
+            f"configurations, because of {names}"
         )
     return lost
 

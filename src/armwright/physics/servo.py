@@ -10,7 +10,7 @@ import numpy as np
 
 from armwright.arm.drive import Motor
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, exact_shape
 from armwright.cell.control import Sensors, Servo
 from armwright.compiled.arm import compile_arm
 from armwright.dynamics.drives import friction_law
@@ -74,11 +74,19 @@ class Sent:
 
 @attrs.define(eq=False)
 class Measured:
-    """What the servo did at a tick: positions, speeds and efforts, (n,) each."""
+    """What the servo read and did at a tick, (n,) each.
+
+    Attributes:
+        q: joint positions, as the sensors read them.
+        qd: joint speeds, as the sensors read them.
+        tau: efforts of the motors.
+        actual: joint positions, as they are.
+    """
 
     q: Array
     qd: Array
     tau: Array
+    actual: Array
 
 
 class ArmServo:
@@ -115,6 +123,8 @@ class ArmServo:
         self._offsets = constant_efforts(plant)
         # What is known of a part in the hand: its mass [kg] at the tool point.
         self.load = 0.0
+        # Whether errors are not to be integrated: against what an arm leans on the integral would grow and grow.
+        self.leaning = False
         self._sums = np.zeros(arm.n)
         self._effort = arm.limits.effort
         # Noise is a part of the largest efforts; there is none of those that are not known.
@@ -137,9 +147,10 @@ class ArmServo:
 
     def drive(self, data: Any, t: float, reference: Reference) -> Measured:
         """Read the sensors, and command the motors until the next tick."""
-        q, qd = self._read(data)
+        actual = data.qpos[self.indices.positions]
+        q, qd = self._read(actual, data)
         if self._law is not None:
-            tau = np.asarray(self._law(t, q, qd, reference), dtype=np.float64)
+            tau = self._own_efforts(self._law, t, q, qd, reference)
         else:
             error = reference.q - q
             correction = self._kd * (reference.qd - qd) + self._kp * error + self._ki * self._sums
@@ -152,10 +163,23 @@ class ArmServo:
                     tau = tau + self._load_efforts(q, reference.qdd + correction)
             tau = tau + self._friction(reference.qd)
             # What a motor cannot give is not to be asked for twice.
-            self._sums += error * self._period * (np.abs(tau) < self._effort)
+            if not self.leaning:
+                self._sums += error * self._period * (np.abs(tau) < self._effort)
         tau = np.minimum(np.maximum(tau, -self._effort), self._effort)
         data.ctrl[self.indices.motors] = tau
-        return Measured(q, qd, tau)
+        return Measured(q, qd, tau, actual)
+
+    def _own_efforts(self, law: TorqueLaw, t: float, q: Array, qd: Array, reference: Reference) -> Array:
+        """Return the efforts (n,) of a user's law.
+
+        Raises:
+            KindError: they are not real numbers.
+            ShapeError: they are not one for each joint.
+            InvalidValueError: one is NaN or infinite.
+        """
+        # The law may change the arrays that it is given.
+        efforts = law(t, q.copy(), qd.copy(), Reference(*(row.copy() for row in reference)))
+        return exact_shape(efforts, (self.arm.n,), f"efforts of the torque law of '{self.arm.name}' at {t:.3f} s")
 
     def _friction(self, qd: Array) -> Array:
         """Return the friction (n,) at the speeds of the reference, but the viscous one."""
@@ -168,9 +192,8 @@ class ArmServo:
         J = self._compiled.jacobian(q)[:3]
         return np.asarray(J.T @ (self.load * (J @ qdd - self.arm.gravity)))
 
-    def _read(self, data: Any) -> tuple[Array, Array]:
+    def _read(self, q: Array, data: Any) -> tuple[Array, Array]:
         """Return positions and speeds as the controller knows them."""
-        q = data.qpos[self.indices.positions]
         if self._sensors.exact:
             return q, data.qvel[self.indices.speeds]
         if self._count is not None:

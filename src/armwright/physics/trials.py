@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.cell.model import Cell, CellArm
 from armwright.cell.scene import Camera, Part, Spread
 from armwright.cell.trials import Interval
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, counted
 from armwright.physics.draws import drawn_frames, drawn_parts, drawn_pose
 from armwright.physics.world import PhysicsCell
 from armwright.spatial.poses import homogeneous
@@ -155,7 +155,7 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
     cause, message = ended_by or _fault(world, cell, moving, errors) or ("", "")
     return Verdict(
         cause=cause,
-        message=message,
+        message=f"{message}{_before(world)}" if cause in {MOVING, UNRELEASED, MISPLACED} else message,
         distance=max((distance for distance, _ in errors.values()), default=0.0),
         angle=max((angle for _, angle in errors.values()), default=0.0),
     )
@@ -179,6 +179,15 @@ def _fault(
             amount = f"{distance * 1e3:.3g} mm and {math.degrees(angle):.3g} deg"
             return MISPLACED, f"{part} is {amount} from its goal at {goal.at}"
     return None
+
+
+def _before(world: PhysicsCell) -> str:
+    """Return which mishap the program dealt with last, as that may be why it went wrong; nothing where none was."""
+    if not world.mishaps:
+        return ""
+    last = world.mishaps[-1]
+    count = counted(len(world.mishaps), "mishap")
+    return f"; {count} before, the last {last.code} at {last.time:.3f} s: {last.message}"
 
 
 def _come_to_rest(world: PhysicsCell, cell: Cell, now: float) -> tuple[str, ...]:

@@ -33,15 +33,17 @@ from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
 from armwright.physics.seeing import target_of
 from armwright.physics.servo import ArmServo, Sent, TorqueLaw
+from armwright.physics.start import buried_bases, check_arguments
 from armwright.physics.vision import camera_in_world, look
 from armwright.physics.watch import Watch
 from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
+from armwright.physics.wrist_sensor import WristSensor
 from armwright.spatial.poses import inverse, to_noap
 
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
-# Of very many pictures the last ones are kept.
-_MAX_PICTURES = 500
+# Of very many pictures the last ones are kept, and of large ones those of so many bytes together.
+_MAX_PICTURES, _MAX_PICTURE_BYTES = 500, 200_000_000
 # So are they of very many mishaps.
 _MAX_MISHAPS = 1000
 # Ticks between poses of the tool that are compared.
@@ -70,11 +72,13 @@ class PhysicsCell:
             frames: (4, 4) where the frames of the cell are in this world; drawn likewise. Programs know nothing of it.
 
         Raises:
+            KindError: an argument is of another kind.
             UnsupportedArmError: masses of an arm are unknown.
             InvalidValueError: things stand inside each other at the start, a camera looks for a part without a marker,
-                or a law is for no arm of the cell.
+                a law is for no arm of the cell, or the parts are not those of the cell.
             MissingExtraError: a camera takes pictures, and OpenCV is missing.
         """
+        check_arguments(cell, seed, laws, parts)
         for sight in cell.sights.values():
             if sight.camera is not None:
                 target_of(cell, sight)
@@ -112,8 +116,7 @@ class PhysicsCell:
         self._mishaps: tuple[Mishap, ...] = ()
         # Made for the first picture, and shared by copies.
         self._photographers: list[Photographer] = []
-        # The latest readings of sensors of forces, with their numbers.
-        self._forces: dict[str, tuple[int, Array]] = {}
+        self._wrists = {name: WristSensor(arm.force_sensor) for name, arm in cell.arms.items()}
         self._settle()
 
     def _settle(self) -> None:
@@ -122,6 +125,7 @@ class PhysicsCell:
 
         mujoco.mj_forward(self._world.model, self._data)
         overlaps = self._contacts.overlaps(self._data)
+        overlaps += buried_bases(self._cell, self._contacts, self._world.model, self._data)
         if overlaps:
             worst = max(overlaps, key=lambda overlap: overlap.depth)
             raise InvalidValueError(
@@ -139,7 +143,7 @@ class PhysicsCell:
         mujoco.mj_copyData(other._data, self._world.model, self._data)
         other._servos = {name: servo.copy() for name, servo in self._servos.items()}
         other._sent = dict(self._sent)
-        other._forces = dict(self._forces)
+        other._wrists = {name: wrist.copy() for name, wrist in self._wrists.items()}
         other._log, other._rng = self._log.copy(), np.random.default_rng()
         other._rng.bit_generator.state = self._rng.bit_generator.state
         other._contacts = copy.copy(self._contacts)
@@ -168,7 +172,7 @@ class PhysicsCell:
         data = self._data
         for name, servo in self._servos.items():
             reference, drive = self._sent[name].at(self._tick), self._watch.hands[name].drive
-            servo.load = self._watch.known_load(name)
+            servo.load, servo.leaning = self._watch.known_load(name), self._watch.hands[name].guarded
             try:
                 measured = servo.drive(data, self.now, reference)
             except InvalidValueError:
@@ -214,17 +218,17 @@ class PhysicsCell:
         """Return the deepest contact of an arm with the plane since its latest motion began."""
         return self._watch.peak_contact(arm)
 
-    def contact_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
-        """Return the force (3,) on the tool of an arm and what it holds, as its sensor reads it [N]."""
-        sensor = self._cell.arms[arm].force_sensor
-        reading = math.floor(self.now * sensor.rate + _TICK_TOLERANCE) if sensor.rate else self._tick
-        if arm in self._forces and self._forces[arm][0] == reading:
-            return self._forces[arm][1]
-        force = self._contacts.tool_force(self._data, arm) + sensor.bias
-        if sensor.noise:
-            force = force + self._rng.normal(scale=sensor.noise, size=3)
-        self._forces[arm] = (reading, np.asarray(force))
-        return self._forces[arm][1]
+    def contact_wrench(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Return the wrench (6,) on the tool of an arm and what it holds, as its sensor reads it [N] and [N m]."""
+        return self._wrists[arm].read(self._tick, self.now, lambda: self._true_wrench(arm), self._rng)
+
+    def zero_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Let what the sensor of an arm reads count as zero from now on; return it (6,)."""
+        return self._wrists[arm].zero(self._tick, self.now, lambda: self._true_wrench(arm), self._rng)
+
+    def _true_wrench(self, arm: str) -> Array:
+        """Return the wrench (6,) on a tool and what it holds, without the weights that the controller knows."""
+        return self._contacts.tool_wrench(self._data, arm) - self._watch.known_wrench(self._data, arm)
 
     def tool_wrenches(self, arm: str, now: float) -> Array:  # noqa: ARG002 - nobody knows beforehand
         """Return no wrenches (1, 6): planned efforts are those of free motion."""
@@ -302,7 +306,7 @@ class PhysicsCell:
         taken = Picture(
             time=self.now, camera=camera, frame=frame, png=png(seen.picture), found=seen.pose is not None, text=text
         )
-        self._pictures = (*self._pictures, taken)[-_MAX_PICTURES:]
+        self._pictures = _latest((*self._pictures, taken))
         if seen.pose is None:
             raise DeviceError(seen.message)
         return seen.pose
@@ -352,6 +356,14 @@ class PhysicsCell:
         return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)
 
 
+def _latest(pictures: tuple[Picture, ...]) -> tuple[Picture, ...]:
+    """Return the last pictures, as many as are kept."""
+    pictures = pictures[-_MAX_PICTURES:]
+    while sum(len(picture.png) for picture in pictures) > _MAX_PICTURE_BYTES:
+        pictures = pictures[1:]
+    return pictures
+
+
 def _initial_data(world: WorldModel) -> Any:
     import mujoco  # noqa: PLC0415 - only cells with physics need it
 
@@ -367,9 +379,14 @@ def _initial_data(world: WorldModel) -> Any:
 
 
 def _tip_error(cell: Cell, stream: MeasuredStream) -> float:
-    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m]."""
-    arm = cell.arms[stream.arm].arm
-    sent, there = (forward(arm, q[::_TIP_TICKS])[:, :3, 3] for q in (stream.sent, stream.q))
+    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m].
+
+    The tool is where the arm of the world has it, whatever the sensors read; where it was sent is what the controller
+    believes.
+    """
+    arm = cell.arms[stream.arm]
+    sent = forward(arm.arm, stream.sent[::_TIP_TICKS])[:, :3, 3]
+    there = forward(arm.plant or arm.arm, stream.actual[::_TIP_TICKS])[:, :3, 3]
     return float(np.linalg.norm(sent - there, axis=1).max(initial=0.0))
 
 

@@ -128,7 +128,7 @@ def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantA
         gripper = cell_arm.gripper_or_usual
         plant = add_arm(spec, name, arm, cell_arm.base, arm_bodies(name, arm, gripper), **bits)
         hand = {"contype": bit | _HAND, "conaffinity": affinity, "rgba": _GRIPPER}
-        add_gripper(spec, name, plant.tool, gripper, spec.option.timestep, **hand)
+        add_gripper(spec, name, plant.tool, gripper, **hand)
         plants.append(plant)
     _add_standing(spec, cell)
     _add_floor(spec, cell, parts)
@@ -234,7 +234,7 @@ def _add_plate(spec: Any, cell: Cell) -> None:
         rgba=_FURNITURE,
         contype=0,
         conaffinity=_PART | _HAND,
-        **_furniture(0.8),
+        **{**_furniture(0.8), "priority": 4},
     )
 
 

@@ -23,7 +23,7 @@ from armwright.report.page import ArmRecord, Effect, LeastDistance, Message, Run
 from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, moved_parts, placed_arms
 from armwright.report.shape_table import ShapeTable
 from armwright.report.stick_figure import arm_record
-from armwright.report.tracking import measured_motion, nearest_ticks, seen_pictures
+from armwright.report.tracking import measured_motion, nearest_ticks, physics_text, seen_pictures
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -76,9 +76,16 @@ def run_page_data(
         arms=_arm_records(recording),
         animation=animation,
         collisions=collision_text(recording),
+        physics=_physics(recording),
         pictures=pictures,
         clearance=cell.clearance,
     )
+
+
+def _physics(recording: Recording) -> str:
+    """Return engine, seed and largest errors of a run in a cell with physics; nothing of another one."""
+    facts = recording.observations.facts
+    return f"{facts['engine']} {facts['version']}, seed {facts['seed']}; {physics_text(recording)}" if facts else ""
 
 
 def _arm_records(recording: Recording) -> list[ArmRecord]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 import warnings
 from pathlib import Path
 from typing import Any
 
 from armwright.arm.mjcf.elements import MjcfText, Node, path_below
-from armwright.errors import FileFormatError
+from armwright.errors import FileFormatError, shown
 from armwright.files.inputs import read_bytes
 from armwright.files.limits import MEGABYTE, limit, limit_message
 from armwright.mujoco_library import load_mujoco
@@ -64,14 +65,20 @@ def _leave_out_pictures(mujoco: Any, spec: Any) -> None:
 
 def _mesh_files(spec: Any, path: Path, text: MjcfText) -> dict[str, bytes]:
     """Read the mesh files, and return them by the names that the meshes have from now on."""
-    nodes = {node.attributes.get("file"): node for node in text.nodes if node.tag == "mesh"}
+    nodes: dict[str, Node] = {}
+    for each in text.nodes:
+        if each.tag == "mesh" and (name := each.attributes.get("file")):
+            # MuJoCo shortens paths such as `./a//b.stl`.
+            nodes[name] = nodes[posixpath.normpath(re.sub(r"[\\/]+", "/", name))] = each
     names: dict[Path, str] = {}
     files: dict[str, bytes] = {}
     total = 0
     for mesh in spec.meshes:
         if not mesh.file:
             continue
-        node = nodes[mesh.file]
+        node = nodes.get(mesh.file)
+        if node is None:
+            raise FileFormatError(path, None, "mesh", f"expected a plain file name, got one such as {shown(mesh.file)}")
         place = path_below(text.mesh_folder, node, "file", root=path.parent, bare=text.bare_names)
         kind = place.suffix.lower()
         if kind not in _MESH_FILES:

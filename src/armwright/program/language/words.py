@@ -19,6 +19,9 @@ WITH_CLAUSES = ("APPROACH", "DEPARTURE", "SPEED")
 # Words only after READ: programs may use them as names.
 SENSORS = ("VISIONS", "SYSTEM")
 
+# What starts a statement only in front of another word, and that word: programs may use both as names.
+STATEMENT_PHRASES = {"ZERO": "FORCE"}
+
 # What starts a statement in RLO-2, and what RLO-83 lacks. All of these may be names in RLO-83.
 RLO_2_STATEMENTS = {
     "FOR": "RLO-83 has no loops",

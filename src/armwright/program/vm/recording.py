@@ -36,7 +36,7 @@ _TICK_TOLERANCE = 1e-6
 # Of statements that take time, and take effect at its end.
 TimedKind: TypeAlias = Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
 _MotionKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "MOVE", "STOP"]
-EffectKind: TypeAlias = TimedKind | _MotionKind | Literal["SIGNAL", "WAIT", "LOCK", "PRINT", "ERROR", "END"]
+EffectKind: TypeAlias = TimedKind | _MotionKind | Literal["ZERO", "SIGNAL", "WAIT", "LOCK", "PRINT", "ERROR", "END"]
 # Not of the trace: assignments, locks and the end of the text.
 _SILENT = ("PLACE", "LOCK", "END")
 
