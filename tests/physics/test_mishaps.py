@@ -122,7 +122,7 @@ def test_without_try(name: str, tmp_path: Path) -> None:
     assert case.message in diagnostic.message
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [name for name in CASES if name != "no numbers"])
 def test_with_try(name: str, tmp_path: Path) -> None:
     """In a TRY the program goes on with RECOVER, and behind it."""
     case = CASES[name]
@@ -146,7 +146,7 @@ def test_a_move_into_the_table(tmp_path: Path) -> None:
     assert "would hit TABLE" in caught.value.diagnostic.message
 
 
-@pytest.mark.parametrize("recovery", ["PAUSE 1", "RETRY"])
+@pytest.mark.parametrize("recovery", ['PRINT("recovered")', "PAUSE 1", "RETRY"])
 def test_a_world_without_meaning_ends(recovery: str, tmp_path: Path) -> None:
     """A world that has become unstable stays so: a program that waits for better times, or tries for ever, ends."""
     with pytest.raises(RunError) as caught:

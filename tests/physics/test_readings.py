@@ -48,9 +48,12 @@ def test_readings_are_late_by_whole_ticks(delay: int, counts: float, tmp_path: P
     world = PhysicsCell(attrs.evolve(cell, arms={"ARM_1": arm}), laws={"ARM_1": falls})
     true = []
     for tick in range(30):
-        true.append(world.configuration("ARM_1", world.now))
+        true.append(world._data.qpos[world._servos["ARM_1"].indices.positions].copy())
         world.advance((tick + 1) * cell.period)
 
+    # What a program reads is what the controller reads.
+    if counts or delay:
+        np.testing.assert_array_equal(world.configuration("ARM_1", world.now), read[-1])
     late = np.array([true[max(0, tick - delay)] for tick in range(30)])
     turns = np.where([joint.revolute for joint in arm.arm.joints], 2 * np.pi, 1.0)
     count = turns / (counts * np.abs(arm.arm.motor_values("gear_ratio"))) if counts else np.zeros(6)

@@ -178,6 +178,8 @@ class PhysicsCell:
             except InvalidValueError:
                 if np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all():
                     raise
+                # Time goes by, but nothing happens any more.
+                self._tick += 1
                 return mishaps.unstable(self.now)
             drive.step(data)
             noise = self._cell.arms[name].sensors.effort_noise
