@@ -368,11 +368,17 @@ def test_ctrl_c(tmp_path: Path) -> None:
         screen.until("n = 77")
         screen.interrupt()
         screen.until("rlo 2> ")
+        # A terminal may drop what is typed while it hears of the interrupt.
+        time.sleep(0.3)
         screen.type("BEGIN\n")
         screen.until("... 3> ")
         screen.interrupt()
         screen.until("rlo 3> ")
+        time.sleep(0.3)
         screen.type("WHILE 1 = 1 DO n = n + 1\n")
+        screen.until("n = n + 1")
+        # The line has been read then, and the statement runs.
+        time.sleep(0.5)
         screen.interrupt()
         assert "interrupted; the current statement was undone" in screen.until("rlo 4> ")
         screen.type("n\n")

@@ -86,10 +86,10 @@ def test_other_files_are_other_trials(folder: Path) -> None:
     (folder / "wedge.obj").write_text(wedge.format(30), encoding="utf-8")
     text = _run(folder, *command, program="idle.rlo", status=3)
 
-    assert "contains another sweep: settings.hashes.meshes is '" in text
+    assert "contains another sweep: settings.cell.fixtures.WEDGE is '" in text
     (folder / "wedge.obj").write_text(wedge.format(20), encoding="utf-8")
     (folder / "idle.rlo").write_text("BEGIN END.\n", encoding="utf-8")
-    assert "settings.hashes.program is '" in _run(folder, *command, program="idle.rlo", status=3)
+    assert "settings.code is '" in _run(folder, *command, program="idle.rlo", status=3)
 
 
 def test_failures_are_reported_for_people(folder: Path) -> None:

@@ -29,7 +29,6 @@ MAX_TRIALS = 100_000
 # The folder of the sweep, in that of the results, and how many blocks it has at most.
 _FOLDER, _MAX_BLOCKS = "trials", 1000
 # So many digits of a hash tell files apart, and can be read in a message.
-_HASH = 16
 
 
 def check_trial_options(cell: "Cell", trials: int | None, number: int | None, *, physics: bool) -> None:
@@ -120,17 +119,12 @@ def run_trials(
 
     With a folder, every finished trial is stored in it, and the same command resumes trials that were interrupted.
     """
-    from hashlib import sha256
-
-    from armwright.arm.write import toml_text
     from armwright.program.vm.trials import ProgramTrials
     from armwright.report.run_files import input_hashes
     from armwright.report.trials_files import trials_files
     from armwright.report.trials_summary import TrialsSummary
 
-    arms = "".join(toml_text(arm.plant or arm.arm) for arm in cell.arms.values())
-    hashes = {**input_hashes(inputs), "arms": sha256(arms.encode()).hexdigest(), "meshes": _mesh_hash(cell)}
-    identity = {"options": inputs.options, "hashes": {name: it and it[:_HASH] for name, it in hashes.items()}}
+    identity = {"options": inputs.options, "inputs": input_hashes(inputs)}
     task = ProgramTrials(code=code, cell=cell, seed=seed, limits=limits, identity=identity)
     with sweep_bar(f"{count} trials", quiet=not watched) as progress:
         trials = evaluate_trials(task, count, output, machines, progress)
@@ -138,25 +132,6 @@ def run_trials(
     if output is not None:
         write_results(output, trials_files(summary, command=command_line()))
     return summary
-
-
-def _mesh_hash(cell: "Cell") -> str:
-    """Return the SHA-256 hash of all meshes of a cell: its file has their names only."""
-    from hashlib import sha256
-
-    from armwright.spatial.shapes import Mesh
-
-    arms = [arm for it in cell.arms.values() for arm in (it.arm, it.plant) if arm is not None]
-    solids = [
-        solid for arm in arms for solids in (arm.base_solids, *(it.solids for it in arm.links)) for solid in solids
-    ]
-    bodies = [it.shape for it in cell.parts.values()] + [it.shape for it in cell.fixtures.values()]
-    shapes = bodies + [it.shape for it in solids]
-    total = sha256()
-    for mesh in (mesh for it in shapes if isinstance(it, Mesh) for mesh in (it, *it.pieces)):
-        total.update(mesh.vertices.tobytes())
-        total.update(mesh.faces.tobytes())
-    return total.hexdigest()
 
 
 def evaluate_trials(
