@@ -98,7 +98,7 @@ class Contacts:
         for part in held.values():
             self._carried[self._part_geoms[part]] = self._weights[self._part_geoms[part]]
         self._unwanted = apart & ~reach & ~reach.T
-        self._holders = owners
+        self._holders, self._harmless = owners, b""
 
     def unwanted(self, data: Any, least: float) -> Touch | None:
         """Return the hardest contact of an arm with what it should not touch, of at least a force [N].
@@ -108,8 +108,13 @@ class Contacts:
         if not data.ncon:
             return None
         geoms = data.contact.geom
+        # Mostly the same things touch as at the tick before.
+        touching = geoms.tobytes()
+        if touching == self._harmless:
+            return None
         suspicious = self._unwanted[geoms[:, 0], geoms[:, 1]]
         if not np.count_nonzero(suspicious):
+            self._harmless = touching
             return None
         worst = None
         for number in np.flatnonzero(suspicious).tolist():

@@ -223,7 +223,8 @@ class GripperDrive:
 
     def opening(self, data: Any) -> float:
         """Return the distance between the fingers [m]; 0 for suction."""
-        return float(sum(data.qpos[position] for position in self._addresses))
+        qpos = data.qpos
+        return float(sum(qpos[position] for position in self._addresses))
 
     def copy(self) -> GripperDrive:
         """Return a drive in the same state."""

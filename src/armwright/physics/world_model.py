@@ -71,7 +71,8 @@ class WorldModel:
 
     def step(self, data: Any) -> None:
         """Let one period of the servo go by."""
-        mujoco = load_mujoco()
+        import mujoco  # noqa: PLC0415 - loaded before; to look for it at every tick costs as much as the gripper
+
         if not self.frictions:
             mujoco.mj_step(self.model, data, self.substeps)
             return
