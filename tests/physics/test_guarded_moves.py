@@ -18,6 +18,8 @@ from armwright.spatial.shapes import Box
 from oracles.benches import ARMS, TABLE, bench, compiled
 from samples import Sample
 
+pytestmark = pytest.mark.early
+
 # Times of contact differ by this, beside the time in which an arm stops [s].
 LATER = 0.06
 # Speeds at which an arm stops within 5 mm, which is what a cell allows.

@@ -18,6 +18,8 @@ from armwright.physics.world import PhysicsCell
 from armwright.spatial.poses import homogeneous
 from samples import Sample
 
+pytestmark = pytest.mark.early
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PROGRAM, CELL = EXAMPLES / "insert_peg.rlo", EXAMPLES / "socket_cell.toml"
 # The peg's origin is half its length above the floor of the hole.

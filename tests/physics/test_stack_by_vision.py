@@ -16,6 +16,8 @@ from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 from samples import Sample
 
+pytestmark = pytest.mark.early
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 PROGRAM, CELL = EXAMPLES / "stack_by_vision.rlo", EXAMPLES / "vision_cell.toml"
