@@ -73,6 +73,7 @@ def both(cell: Cell, program: str) -> tuple[Recording, Recording, PhysicsCell]:
     return interpret(code, cell, kinematic_cell(cell)), interpret(code, cell, world), world
 
 
+@pytest.mark.drawn(0.5)
 @pytest.mark.parametrize("plane", [False, True])
 @pytest.mark.parametrize("arm", ["stanford", "puma560"])
 def test_as_without_physics(arm: str, sample: Sample, tmp_path: Path, *, plane: bool) -> None:

@@ -40,6 +40,7 @@ def planned(task: Task, **options: float) -> PlannedPath:
     return plan_path(task.checker, ARM, task.start, task.goals, **options)
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.proof
 @pytest.mark.parametrize("name", ARMS)
 def test_cluttered_cells(name: str, sample: Sample) -> None:

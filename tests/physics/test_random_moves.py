@@ -73,6 +73,7 @@ def random_move(arm: Arm, rng: np.random.Generator) -> Trajectory:
     return quintic(start, start + (1.0 if rng.random() < 0.5 else rng.uniform(0.02, 0.2)) * (goal - start), 1.0)
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("name", ["stanford", "puma560", "ur5"])
 def test_no_collision_is_missed(name: str, sample: Sample) -> None:
     """What another library finds at 10,000 configurations of a move was found before, and little else."""

@@ -127,6 +127,7 @@ def slip_and_law(world: Watched, recording: Recording, factor: float) -> tuple[A
     return (there - there[0])[:, ::2], np.cumsum(law, axis=0)[:, ::2]
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.share(0.05)
 @pytest.mark.parametrize("arm", ARMS)
 def test_slip_of_arms(arm: str, sample: Sample, tmp_path: Path) -> None:

@@ -59,6 +59,7 @@ def moved(cell: Cell, x: float, y: float) -> dict[str, Part]:
 # ---- parts are placed ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.share(0.02)
 @pytest.mark.parametrize("arm", ARMS)
 def test_placed_by_vision(arm: str, sample: Sample, tmp_path: Path) -> None:
