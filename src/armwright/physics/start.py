@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
-
-import numpy as np
+from itertools import product
 
 from armwright.arrays import integer
 from armwright.cell.model import Cell
-from armwright.errors import InvalidValueError, KindError, shown
-from armwright.physics.contacts import OVERLAP, Contacts, Overlap
+from armwright.errors import InvalidValueError, KindError, closest, shown
+from armwright.physics.cell_bodies import Body, arm_bodies
+from armwright.physics.contacts import OVERLAP, Overlap
+from armwright.physics.distances import Distances
+from armwright.spatial.shapes import Solid, convex_solids
 
 
 def check_arguments(cell: Cell, seed: int, laws: object, parts: object) -> None:
@@ -24,7 +25,7 @@ def check_arguments(cell: Cell, seed: int, laws: object, parts: object) -> None:
 
     Raises:
         KindError: one of them is of another kind.
-        InvalidValueError: the seed is below 0, or the parts are not those of the cell.
+        InvalidValueError: the seed is below 0, a law is for no arm of the cell, or the parts are not those of the cell.
     """
     if not isinstance(cell, Cell):
         raise KindError(f"cell: expected a Cell, such as read_cell returns, got {shown(cell)}")
@@ -34,28 +35,40 @@ def check_arguments(cell: Cell, seed: int, laws: object, parts: object) -> None:
     for name, law in (laws or {}).items():
         if not isinstance(name, str) or not callable(law):
             raise KindError(f"laws: expected a function of t, q, qd and reference for {shown(name)}, got {shown(law)}")
+        if name not in cell.arms:
+            near = closest(name, cell.arms)
+            hint = f"; did you mean {near}?" if near else ""
+            raise InvalidValueError(f"laws: {name} is no arm of cell '{cell.name}'{hint}")
     if parts is not None and (not isinstance(parts, Mapping) or parts.keys() != cell.parts.keys()):
         known = ", ".join(cell.parts) or "none"
         raise InvalidValueError(f"parts: expected those of cell '{cell.name}' by name ({known}), got {shown(parts)}")
 
 
-def buried_bases(cell: Cell, contacts: Contacts, model: Any, data: Any) -> list[Overlap]:
+def buried_bases(cell: Cell) -> list[Overlap]:
     """Return which bases of arms stand inside fixtures: neither can move, so MuJoCo has no contacts between them.
 
     Args:
-        cell: the cell.
-        contacts: its geoms.
-        model: the MjModel.
-        data: the MjData, with the poses of the geoms.
+        cell: the cell, its fixtures where they stand in the world.
     """
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
-    bases = [number for number, name in enumerate(contacts.names) if name in {f"{arm} base" for arm in cell.arms}]
-    standing = [number for number, name in enumerate(contacts.names) if name in cell.fixtures]
-    found, nearest = [], np.zeros(6)
-    for base in bases:
-        for fixture in standing:
-            depth = -mujoco.mj_geomDistance(model, data, base, fixture, 0.0, nearest)
-            if depth > OVERLAP:
-                found.append(Overlap(contacts.names[base], contacts.names[fixture], depth))
+    bases = [
+        Body(body.name, body.solid.moved(placed.base @ placed.arm.base))
+        for name, placed in cell.arms.items()
+        for body in arm_bodies(name, placed.arm)
+        if body.link == 0
+    ]
+    fixtures = [
+        Body(name, piece)
+        for name, it in cell.fixtures.items()
+        for piece in convex_solids([Solid(shape=it.shape, pose=it.pose)])
+    ]
+    if not bases or not fixtures:
+        return []
+    distances = Distances([body.solid.shape for body in (*bases, *fixtures)])
+    for number, body in enumerate((*bases, *fixtures)):
+        distances.set_pose(number, body.solid.pose)
+    found = []
+    for (i, base), (j, fixture) in product(enumerate(bases), enumerate(fixtures, len(bases))):
+        depth = -distances.between(i, j, 0.0)
+        if depth > OVERLAP:
+            found.append(Overlap(base.name, fixture.name, depth))
     return found

@@ -22,7 +22,7 @@ from armwright.cell.observations import MeasuredStream, Observations, Picture
 from armwright.cell.part_poses import PartPoses
 from armwright.cell.scene import Part
 from armwright.cell.simulator import Simulator
-from armwright.errors import InvalidValueError, closest
+from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics import mishaps
@@ -92,7 +92,6 @@ class PhysicsCell:
         model, period = self._world.model, cell.period
         self._watch = Watch(cell, self._world, self._contacts)
         self._servos, self._sent = {}, {}
-        laws = dict(laws or {})
         for name, arm in cell.arms.items():
             self._servos[name] = ArmServo(
                 arm.arm,
@@ -101,15 +100,11 @@ class PhysicsCell:
                 arm.servo,
                 arm.sensors,
                 period,
-                laws.pop(name, None),
+                (laws or {}).get(name),
             )
             self._servos[name].start(self._data)
             self._watch.hands[name].drive.start(self._data)
             self._sent[name] = Sent(hold(arm.start, 0.0), 0, period, self._servos[name].friction)
-        for name in laws:
-            near = closest(name, cell.arms)
-            hint = f"; did you mean {near}?" if near else ""
-            raise InvalidValueError(f"laws: {name} is no arm of cell '{cell.name}'{hint}")
         self._tick = 0
         self._log = Log(cell, self._world)
         self._pictures: tuple[Picture, ...] = ()
@@ -125,7 +120,7 @@ class PhysicsCell:
 
         mujoco.mj_forward(self._world.model, self._data)
         overlaps = self._contacts.overlaps(self._data)
-        overlaps += buried_bases(self._cell, self._contacts, self._world.model, self._data)
+        overlaps += buried_bases(self._world.cell)
         if overlaps:
             worst = max(overlaps, key=lambda overlap: overlap.depth)
             raise InvalidValueError(
