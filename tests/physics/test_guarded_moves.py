@@ -15,32 +15,20 @@ from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import Box
-from oracles.benches import ARMS, TABLE, bench, compiled
+from oracles.benches import ARMS, HOLD, STOPPING_SPEEDS, TABLE, bench, compiled, without_pictures
 from samples import Sample
 
 pytestmark = pytest.mark.early
 
 # Times of contact differ by this, beside the time in which an arm stops [s].
 LATER = 0.06
-# Speeds at which an arm stops within 5 mm, which is what a cell allows.
-SPEEDS = {"stanford": (3.0, 25.0), "puma560": (3.0, 9.0)}
 # What was pressed on, and how hard, is not the same: a table is stiffer in a world with physics.
 PRESSED = re.compile(r"; pressed [0-9.e-]+ mm deep, [0-9.e+-]+ N")
-HOLD = """  READ VISIONS (obj) ;
-  AFFIX apo TO obj AT XYZ(0, 0, -0.08) ;
-  OPEN ARM_1 ;
-  MOVE ARM_1 TO obj WITH APPROACH = apo ;
-  GRASP ARM_1 ;
-  AFFIX obj TO ARM_1 ;
-  MOVE ARM_1 TO apo STRAIGHTLY ;
-"""
 
 
 def drawn(folder: Path, arm: str, rng: np.random.Generator, *, plane: bool) -> tuple[Cell, tuple[float, float], float]:
     """Return a cell with a box of any height on its table, or a plane; where that is, and how high."""
-    cell = bench(folder, arm)
-    sights = {name: attrs.evolve(sight, camera=None) for name, sight in cell.sights.items()}
-    cell = attrs.evolve(cell, cameras={}, sights=sights)
+    cell = without_pictures(bench(folder, arm))
     (x0, y0), (x1, _) = ARMS[arm][2]
     x, y, top = rng.uniform(x0, x1), y0 + 0.04, TABLE + rng.uniform(0.005, 0.06)
     if plane:
@@ -81,7 +69,7 @@ def test_as_without_physics(arm: str, sample: Sample, tmp_path: Path, *, plane: 
     late = []
     for rng in sample.cases(20):
         cell, at, top = drawn(tmp_path, arm, rng, plane=plane)
-        program = text_of(at, top, rng.uniform(*SPEEDS[arm]), rng.uniform(4, 12))
+        program = text_of(at, top, rng.uniform(*STOPPING_SPEEDS[arm]), rng.uniform(4, 12))
         plain, physical, _ = both(cell, program)
 
         assert [e.kind for e in plain.effects] == [e.kind for e in physical.effects]

@@ -18,7 +18,7 @@ from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import Box
-from oracles.benches import PROGRAM, SIDE, bench, compiled, flat_pose
+from oracles.benches import PROGRAM, SIDE, bench, compiled, flat_pose, without_pictures
 
 TRIED = PROGRAM.replace("BEGIN\n", "BEGIN\n  TRY\n", 1).replace(
     "END.\n", '  RECOVER\n    PRINT("recovered") ;\n  END ;\n  PRINT("goes on") ;\nEND.\n'
@@ -99,9 +99,7 @@ CASES = {
 
 
 def run(case: Case, folder: Path, program: str) -> Recording:
-    cell = bench(folder, "stanford", case.change)
-    sights = {name: attrs.evolve(sight, camera=None) for name, sight in cell.sights.items()}
-    cell = attrs.evolve(cell, cameras={}, sights=sights)
+    cell = without_pictures(bench(folder, "stanford", case.change))
     world = case.world(cell)
     return interpret(compiled(cell, program).code, cell, world)
 

@@ -8,7 +8,6 @@ part loses h² c / 2 of that. It slips by the integral of c (1 / b - h / 2), out
 from pathlib import Path
 from typing import Any
 
-import attrs
 import mujoco
 import numpy as np
 import pytest
@@ -26,7 +25,7 @@ from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Box, Solid
-from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench
+from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, without_pictures
 from samples import Sample
 
 STEP = 1e-3
@@ -139,8 +138,7 @@ def test_slip_of_arms(arm: str, sample: Sample, tmp_path: Path) -> None:
     code, slips, worst = compiled(plain, CARRY).code, [], 0.0
     for rng in sample.cases(20):
         drawn, parts, _, _ = drawn_bench(plain, arm, rng)
-        sights = {name: attrs.evolve(sight, camera=None) for name, sight in drawn.sights.items()}
-        cell = attrs.evolve(drawn, cameras={}, sights=sights)
+        cell = without_pictures(drawn)
         for damping in (None, 1.0):
             world = Watched(cell, parts=parts)
             model = world._world.model

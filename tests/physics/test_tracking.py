@@ -16,7 +16,7 @@ from armwright.physics.world import PhysicsCell
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
-from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_pose, reachable
+from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_pose, reachable, without_pictures
 from samples import Sample
 
 # Largest distances of tools from where they are sent, at SPEED 100 [m].
@@ -27,12 +27,6 @@ MOVES = 4
 # The wrist of ur5 has a hundredth of the inertia of what it carries here, as its published model is without rotors. To
 # bear what it does not know it needs some, as seen behind the gears [kg m²], and a faster servo [rad/s].
 ROTOR, FAST = 0.3, 100.0
-
-
-def blind(cell: Cell) -> Cell:
-    """A cell whose camera answers with what is true."""
-    sights = {name: attrs.evolve(sight, camera=None) for name, sight in cell.sights.items()}
-    return attrs.evolve(cell, cameras={}, sights=sights)
 
 
 def tip_errors(recording: Recording) -> tuple[float, float]:
@@ -66,7 +60,7 @@ def free_moves(cell: Cell, arm: str, rng: np.random.Generator) -> str:
 @pytest.mark.parametrize("arm", ARMS)
 def test_free_moves(arm: str, sample: Sample, tmp_path: Path) -> None:
     """At SPEED 100 the tool is within 0.5 mm of where it is sent, and within 0.1 mm when it has come to rest."""
-    cell = blind(bench(tmp_path, arm))
+    cell = without_pictures(bench(tmp_path, arm))
     off = []
     for rng in sample.cases(20):
         while True:
@@ -102,7 +96,7 @@ def test_with_a_part(arm: str, mass: float, sample: Sample, tmp_path: Path) -> N
     code, off = compiled(plain, text).code, []
     for rng in sample.cases(20):
         drawn, parts, _, _ = drawn_bench(plain, arm, rng)
-        cell = blind(drawn)
+        cell = without_pictures(drawn)
         off.append(tip_errors(interpret(code, cell, PhysicsCell(cell, parts=parts))))
     moving, resting = np.max(off, axis=0)
     sample.record(f"{mass:g} kg set down by {arm}", len(off), 0, moving=moving, resting=resting)

@@ -21,7 +21,7 @@ from armwright.program.debugger.history import Timeline
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
-from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_pose, placing_error
+from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_pose, placing_error, without_pictures
 from samples import Sample
 
 # The block is found where the file says, without pictures.
@@ -40,9 +40,7 @@ RETRIED = PROGRAM.replace("BEGIN\n", "BEGIN\n  TRY\n", 1).replace(
 
 def blind(folder: Path, *changes: tuple[str, str], arm: str = "stanford") -> Cell:
     """A bench whose camera answers with what is true."""
-    cell = bench(folder, arm, *changes)
-    sights = {name: attrs.evolve(sight, camera=None) for name, sight in cell.sights.items()}
-    return attrs.evolve(cell, cameras={}, sights=sights)
+    return without_pictures(bench(folder, arm, *changes))
 
 
 def run(cell: Cell, program: str = PROGRAM, hardware: Any = None, **options: Any) -> Recording:

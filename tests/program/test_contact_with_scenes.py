@@ -23,30 +23,18 @@ from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.spatial.shapes import Box
-from oracles.benches import ARMS, TABLE, bench, compiled
+from oracles.benches import ARMS, HOLD, STOPPING_SPEEDS, TABLE, bench, compiled, without_pictures
 from oracles.solids import coal_distance, coal_shape, random_shape
 from samples import Sample
 
 STIFFNESS = 2e4
-# Speeds at which an arm stops within 5 mm, which is what a cell allows.
-SPEEDS = {"stanford": (3.0, 25.0), "puma560": (3.0, 9.0)}
 # A pin under the hand: half its height, and the half size of its top [m].
 PIN = (0.02, 0.002)
-HOLD = """  READ VISIONS (obj) ;
-  AFFIX apo TO obj AT XYZ(0, 0, -0.08) ;
-  OPEN ARM_1 ;
-  MOVE ARM_1 TO obj WITH APPROACH = apo ;
-  GRASP ARM_1 ;
-  AFFIX obj TO ARM_1 ;
-  MOVE ARM_1 TO apo STRAIGHTLY ;
-"""
 
 
 def bare(folder: Path, arm: str = "stanford", *changes: tuple[str, str]) -> Cell:
     """A bench whose camera answers with what is true."""
-    cell = bench(folder, arm, *changes)
-    sights = {name: attrs.evolve(sight, camera=None) for name, sight in cell.sights.items()}
-    return attrs.evolve(cell, cameras={}, sights=sights)
+    return without_pictures(bench(folder, arm, *changes))
 
 
 def pressing(cell: Cell, x: float, y: float, z: float, then: str = "", **move: Any) -> tuple[Recording, Simulator]:
@@ -85,7 +73,7 @@ def test_down_on_the_table(arm: str, sample: Sample, tmp_path: Path) -> None:
         # Not on the block.
         y = min(y, cell.parts["BLOCK"].pose[1, 3] - 0.08)
         force = rng.uniform(2, 30)
-        recording, hardware = pressing(cell, x, y, TABLE, speed=rng.uniform(*SPEEDS[arm]), force=force)
+        recording, hardware = pressing(cell, x, y, TABLE, speed=rng.uniform(*STOPPING_SPEEDS[arm]), force=force)
 
         placed, q = cell.arms["ARM_1"], recording.streams[0].q
         depths = TABLE - (placed.base @ forward(placed.arm, q))[:, 2, 3]
