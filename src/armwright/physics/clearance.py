@@ -257,15 +257,22 @@ class ClearanceChecker:
 
     def poses(self, motions: Mapping[str, Trajectory], times: Array) -> Array:
         """Return the poses (k, b, 4, 4) of all bodies in the world at times (k,) [s]."""
-        poses = np.empty((len(times), len(self._bodies), 4, 4))
-        for name, placed in self.arms.items():
-            frames = placed.base @ placed.arm.link_poses(motions[name](times))
-            for number, body in enumerate(self._bodies):
-                if body.arm == name:
-                    poses[:, number] = frames[:, body.link] @ body.solid.pose
+        return self.body_poses(self.link_frames({name: motions[name](times) for name in self.arms}))
+
+    def link_frames(self, configurations: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the frames (k, n + 2, 4, 4) of arms in the world, by name, at joint positions (k, n)."""
+        return {name: self.arms[name].base @ self.arms[name].arm.link_poses(q) for name, q in configurations.items()}
+
+    def body_poses(self, frames: Mapping[str, Array]) -> Array:
+        """Return the poses (k, b, 4, 4) of all bodies in the world, where the frames of all arms are there.
+
+        Args:
+            frames: (k, n + 2, 4, 4) of each arm, or (1, n + 2, 4, 4) of one that stands.
+        """
+        poses = np.empty((max(map(len, frames.values()), default=1), len(self._bodies), 4, 4))
         for number, body in enumerate(self._bodies):
-            if body.arm is None:
-                poses[:, number] = body.solid.pose
+            pose = body.solid.pose
+            poses[:, number] = pose if body.arm is None else frames[body.arm][:, body.link] @ pose
         return poses
 
     def nearest_points(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:
@@ -311,23 +318,18 @@ class ClearanceChecker:
         time of the interval, as seen from the base of its arm and from each of its links.
         """
         middles = (starts + ends) / 2
-        poses = np.empty((len(starts), len(self._bodies), 4, 4))
+        frames = self.link_frames({name: motions[name](middles) for name in self.arms})
+        poses = self.body_poses(frames)
         links = max((placed.arm.arm.n for placed in self.arms.values()), default=0)
         moved = np.zeros((len(starts), len(self._bodies), links + 1))
         for name, placed in self.arms.items():
-            motion = motions[name]
-            frames = placed.base @ placed.arm.link_poses(motion(middles))
-            changes = _largest_changes(motion, starts, ends)
+            changes = _largest_changes(motions[name], starts, ends)
             for number, body in enumerate(self._bodies):
                 if body.arm == name:
-                    poses[:, number] = frames[:, body.link] @ body.solid.pose
-                    carried = frames[:, : body.link + 1]
+                    carried = frames[name][:, : body.link + 1]
                     moved[:, number, : body.link + 1] = _movement(
                         placed.arm.arm, carried, poses[:, number], self.radii[number], changes
                     )
-        for number, body in enumerate(self._bodies):
-            if body.arm is None:
-                poses[:, number] = body.solid.pose
         return poses, moved
 
 

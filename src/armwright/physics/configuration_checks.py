@@ -73,14 +73,8 @@ class ConfigurationChecks:
 
     def _poses_at(self, configurations: Mapping[str, Array]) -> Array:
         """Return the poses (k, b, 4, 4) of all bodies at configurations."""
-        frames = {}
-        for name, q in configurations.items():
-            frames[name] = self._checker.arms[name].base @ self._checker.arms[name].arm.link_poses(np.atleast_2d(q))
-        poses = np.empty((max(map(len, frames.values())), len(self._checker.bodies), 4, 4))
-        for number, body in enumerate(self._checker.bodies):
-            carrier = np.eye(4) if body.arm is None else frames[body.arm][:, body.link]
-            poses[:, number] = carrier @ body.solid.pose
-        return poses
+        rows = {name: np.atleast_2d(q) for name, q in configurations.items()}
+        return self._checker.body_poses(self._checker.link_frames(rows))
 
     def _least_distances(self, poses: Array) -> Array:
         """Return lower bounds (k, p) of the distances of pairs: from a ball about one body to a box about the other."""
