@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 MAX_TRIALS = 100_000
 # The folder of the sweep, in that of the results, and how many blocks it has at most.
 _FOLDER, _MAX_BLOCKS = "trials", 1000
-# So many digits of a hash tell files apart, and can be read in a message.
 
 
 def check_trial_options(cell: "Cell", trials: int | None, number: int | None, *, physics: bool) -> None:

@@ -16,7 +16,7 @@ Source:
 
 import math
 
-from armwright.tracing.graph import Traced, traced
+from armwright.tracing.graph import LARGEST_POWER, Traced, traced
 from armwright.tracing.scalar import Scalar, select
 
 # (1 - atan(t) / t) / t² in powers of t², interpolated at the Chebyshev nodes of |t| <= 0.6: 6e-18 of the angle.
@@ -31,7 +31,7 @@ _POWERS = tuple(1.0 / math.factorial(k) for k in range(13, 1, -1))
 # Powers of 2 down to this one are numbers of full precision, and have one factor 2 to spare.
 _LEAST_POWER = -1021
 # The exponential function of less is 0, that of more infinite.
-_POWER_RANGE = -707.0, 709.782712893384
+_POWER_RANGE = -707.0, LARGEST_POWER
 
 # Adding 1.5 · 2^52 rounds to an integer, which then stands in the last bits of the sum.
 _ROUNDING = 6755399441055744.0

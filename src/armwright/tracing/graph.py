@@ -29,7 +29,7 @@ from armwright.arrays import number
 
 _COMMUTATIVE = frozenset({"add", "multiply"})
 # The exponential function of more than this is beyond the range of float64.
-_LARGEST_POWER = 709.782712893384
+LARGEST_POWER = 709.782712893384
 # The results of a loop.
 _LOOP_RESULTS = frozenset({"state", "each"})
 
@@ -318,7 +318,7 @@ def _quotient(a: float, b: float) -> float:
 
 def exponential(a: float) -> float:
     """Return e to the power of ``a``, infinity beyond the range of float64."""
-    return math.exp(a) if not a > _LARGEST_POWER else math.inf
+    return math.exp(a) if not a > LARGEST_POWER else math.inf
 
 
 _FOLD: dict[str, Callable[..., float]] = {

@@ -7,7 +7,7 @@ from itertools import pairwise, takewhile
 import attrs
 
 from armwright.program.language.source import Span
-from armwright.program.language.words import SENSORS, STATEMENT_PHRASES
+from armwright.program.language.words import SENSORS, statement_phrase
 from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import ScannedText, Token, TokenKind
@@ -152,8 +152,7 @@ def _spellings(tokens: Sequence[Token], program: tree.Program) -> Iterator[str]:
         elif kind is _NAME:
             follows = tokens[index + 1].key if index < last else ""
             is_axis = before == "(" and earlier in WITH_AXIS and key in AXES and follows == ")"
-            is_phrase = STATEMENT_PHRASES.get(key) == follows or STATEMENT_PHRASES.get(before) == key
-            if in_units or is_axis or is_phrase or (before == "READ" and key in SENSORS):
+            if in_units or is_axis or statement_phrase(before, key, follows) or (before == "READ" and key in SENSORS):
                 yield key
             elif before == "OPERATE":
                 yield token.text

@@ -53,10 +53,7 @@ class RloLexer(RegexLexer):
         "root": [
             include("blank"),
             (_any_of(["READ"]), Keyword, "sensor"),
-            *(
-                (rf"(?a:{one}(?=[ \t]+{other}(?!\w)))", Keyword.Pseudo, "phrase")
-                for one, other in STATEMENT_PHRASES.items()
-            ),
+            *_phrases(),
             (_any_of(["UNITS"]), Keyword.Declaration, "units"),
             (_any_of(["PROCEDURE"]), Keyword.Declaration, "procedure"),
             include("reserved"),

@@ -8,7 +8,7 @@ import attrs
 
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
-from armwright.program.language.words import SENSORS, STATEMENT_PHRASES
+from armwright.program.language.words import SENSORS, statement_phrase
 from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -139,7 +139,7 @@ def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, 
         return Occurrence(start, end, key, NameKind.PROCEDURE, declares=declares)
     if in_units:
         return Occurrence(start, end, key, NameKind.UNIT)
-    phrase = _phrase(previous, key, next_key)
+    phrase = statement_phrase(previous, key, next_key)
     if phrase or (previous == "READ" and key in SENSORS):
         return Occurrence(start, end, phrase or key, NameKind.SENSOR)
     if previous == "OPERATE":
@@ -147,12 +147,6 @@ def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, 
     if next_key == "(" and key in FUNCTIONS:
         return Occurrence(start, end, key, NameKind.FUNCTION)
     return _classify_variable(token, scope)
-
-
-def _phrase(previous: str, key: str, next_key: str) -> str:
-    """Return the two words that start a statement together, where a name is one of them; empty where it is not."""
-    pairs = (pair for pair in ((key, next_key), (previous, key)) if STATEMENT_PHRASES.get(pair[0]) == pair[1])
-    return " ".join(next(pairs, ()))
 
 
 def _classify_variable(token: Token, scope: Scope) -> Occurrence:
